@@ -1,0 +1,171 @@
+//! A call of a kernel on the host's own processor: untyped arguments in the order of the
+//! kernel's description, and how to run it.
+
+use std::sync::atomic::AtomicU32;
+
+use super::describe::TexelFormat;
+
+/// An argument: first those of the parameters that are bound to something, in their order
+/// (constants, index, group and phase take none), then one for each output.
+///
+/// Byte slices must be aligned to the layout's alignment; 16 always is.
+#[derive(Debug)]
+pub enum Arg<'a> {
+    /// Uniform value, read-only buffer, vertex attributes or varyings.
+    Bytes(&'a [u8]),
+    /// What is written.
+    BytesMut(&'a mut [u8]),
+    /// Counters.
+    Atomics(&'a [AtomicU32]),
+    /// A texture that is read.
+    Texture(TextureRef<'a>),
+    /// A texture that is written.
+    TextureMut(TextureMut<'a>),
+    /// A sampler.
+    Sampler(Sampler),
+}
+
+/// A texture in memory: texels row by row, slice by slice, each texel's samples together; no
+/// padding.
+#[derive(Clone, Copy, Debug)]
+pub struct TextureRef<'a> {
+    /// Width, height, depth in texels; 1 for a dimension that is not there.
+    pub size: [u32; 3],
+    /// Samples of a texel, 1 unless multisampled.
+    pub samples: u32,
+    /// Format of the texels.
+    pub format: TexelFormat,
+    /// `size[0] * size[1] * size[2] * samples * format.bytes()` bytes.
+    pub bytes: &'a [u8],
+}
+
+/// As [`TextureRef`], to be written; one sample.
+#[derive(Debug)]
+pub struct TextureMut<'a> {
+    /// Width, height, depth in texels.
+    pub size: [u32; 3],
+    /// Format of the texels; the kernel's own.
+    pub format: TexelFormat,
+    /// `size[0] * size[1] * size[2] * format.bytes()` bytes.
+    pub bytes: &'a mut [u8],
+}
+
+/// A sampler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Sampler {
+    /// Between texels.
+    pub filter: Filter,
+    /// Beyond the edge.
+    pub address: Address,
+}
+
+/// What a sampler does between texels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Filter {
+    /// The nearest texel.
+    Nearest,
+    /// Linear interpolation of the nearest texels.
+    Linear,
+}
+
+/// What a sampler does beyond the texture's edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Address {
+    /// The texel at the edge.
+    ClampToEdge,
+    /// The texture again.
+    Repeat,
+}
+
+/// How a call is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mode {
+    /// Run a map over SIMD lanes where its source allows it. The lanes do not fuse: results are
+    /// those of the scalar run, bit for bit.
+    pub lanes: bool,
+    /// Use all cores (rayon's global pool).
+    pub parallel: bool,
+}
+
+impl Default for Mode {
+    fn default() -> Self {
+        Self { lanes: true, parallel: true }
+    }
+}
+
+impl Mode {
+    /// One thread, no lanes: what every other way to run a kernel is compared with.
+    pub const REFERENCE: Self = Self { lanes: false, parallel: false };
+}
+
+/// A call.
+#[derive(Debug)]
+pub struct Call<'a> {
+    /// Arguments, see [`Arg`].
+    pub args: Vec<Arg<'a>>,
+    /// Values of the specialisation constants in the order of the parameters; as many as the
+    /// kernel has.
+    pub constants: Vec<u32>,
+    /// How to run it.
+    pub mode: Mode,
+}
+
+/// Why a call did not run.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CallError {
+    /// Too few or too many arguments.
+    #[error("{expected} arguments are expected, {got} were given")]
+    Count {
+        /// Number that the description asks for.
+        expected: usize,
+        /// Number given.
+        got: usize,
+    },
+    /// An argument of the wrong kind.
+    #[error("argument `{name}` must be {expected}")]
+    Kind {
+        /// The parameter's name.
+        name: &'static str,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A buffer whose size or alignment does not fit its type.
+    #[error("argument `{name}`: {bytes} bytes at this address are no whole number of aligned elements of {size} bytes")]
+    Size {
+        /// The parameter's name.
+        name: &'static str,
+        /// Its bytes.
+        bytes: usize,
+        /// Size of an element.
+        size: usize,
+    },
+    /// Element buffers of different lengths.
+    #[error("argument `{name}` has {got} elements, but {expected} invocations run: give each element buffer as many elements as the output")]
+    Length {
+        /// The parameter's name.
+        name: &'static str,
+        /// Invocations.
+        expected: usize,
+        /// Elements.
+        got: usize,
+    },
+    /// A texture of another format than the kernel's, or bytes that do not fit its size.
+    #[error("argument `{name}`: {problem}")]
+    Texture {
+        /// The parameter's name.
+        name: &'static str,
+        /// What does not fit.
+        problem: String,
+    },
+    /// The kernel itself panicked: an index out of range, most likely.
+    #[error("the kernel panicked: {message}")]
+    Panic {
+        /// The panic's message.
+        message: String,
+    },
+}
+
+/// Runs a kernel natively.
+pub type Run = fn(&mut Call<'_>) -> Result<(), CallError>;

@@ -1,0 +1,305 @@
+//! What a kernel is, without its code: the one record from which codegen writes the manifest, the
+//! host allocates and binds, and the command line prints. `#[kernel]` fills it in from the
+//! function's signature; nothing in it is written by hand.
+
+use serde::{Deserialize, Serialize};
+
+/// One entry point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kernel {
+    /// The entry point's name in SPIR-V: the function's name, with the precision (`_f64`) or the
+    /// output's texel format (`_rgba16unorm`) appended where one function makes several.
+    pub name: String,
+    /// The name of the Rust function.
+    pub function: String,
+    /// The first paragraph of the function's documentation.
+    pub summary: String,
+    /// Where the function stands: file as the compiler saw it.
+    pub file: String,
+    /// Line of the attribute, from 1.
+    pub line: u32,
+    /// The pipeline stage, with what only that stage has.
+    pub stage: Stage,
+    /// The floating-point type of a function that is generic over `Real`; `None` for one that is
+    /// written for `f32` as it stands.
+    pub precision: Option<Precision>,
+    /// The function's parameters, in order.
+    pub params: Vec<Param>,
+    /// What the function returns, in order; empty for a kernel that only adds to atomics.
+    pub outputs: Vec<Output>,
+    /// How closely every backend must agree with the native scalar run.
+    pub tolerance: Tolerance,
+}
+
+/// A pipeline stage.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Stage {
+    /// A compute shader.
+    Compute {
+        /// Invocations of a workgroup along x, y, z.
+        threads: [u32; 3],
+        /// How many of the dimensions index the output: 1, 2 or 3.
+        dimensions: u32,
+        /// 0 for a map; else the number of phases that barriers separate.
+        phases: u32,
+        /// Bytes of workgroup memory.
+        workgroup_bytes: u32,
+    },
+    /// A vertex shader: one invocation for each vertex.
+    Vertex,
+    /// A fragment shader: one invocation for each covered fragment.
+    Fragment,
+}
+
+/// A floating-point type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// IEEE 754 binary32.
+    F32,
+    /// IEEE 754 binary64.
+    F64,
+}
+
+/// A parameter of a kernel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Param {
+    /// The parameter's name in Rust; also the variable's name in every language that allows it.
+    pub name: String,
+    /// What it is bound to.
+    pub role: Role,
+}
+
+/// What a parameter is bound to. `binding` is the number in descriptor set 0, counted over the
+/// parameters in order and then the outputs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Role {
+    /// A uniform buffer with one value.
+    Uniform {
+        /// Number in set 0.
+        binding: u32,
+        /// Layout of the value.
+        layout: Layout,
+    },
+    /// A read-only storage buffer of which the invocation gets its own element.
+    Element {
+        /// Number in set 0.
+        binding: u32,
+        /// Layout of an element.
+        layout: Layout,
+    },
+    /// A read-only storage buffer that any invocation may read anywhere.
+    Storage {
+        /// Number in set 0.
+        binding: u32,
+        /// Layout of an element.
+        layout: Layout,
+    },
+    /// A storage buffer of `u32` on which only commutative atomics work.
+    Atomic {
+        /// Number in set 0.
+        binding: u32,
+    },
+    /// A texture that is read by coordinates or through a sampler.
+    Texture {
+        /// Number in set 0.
+        binding: u32,
+        /// Shape and texel type.
+        texture: TextureKind,
+    },
+    /// A sampler.
+    Sampler {
+        /// Number in set 0.
+        binding: u32,
+    },
+    /// A specialisation constant (`u32`).
+    Constant {
+        /// `SpecId`.
+        id: u32,
+        /// The value unless specialised.
+        default: u32,
+    },
+    /// The invocation's own index; bound to nothing.
+    Index,
+    /// The invocation's workgroup memory; bound to nothing.
+    Group,
+    /// The phase's number; bound to nothing.
+    Phase,
+    /// A vertex attribute (vertex stage).
+    Attribute {
+        /// Input location.
+        location: u32,
+        /// Its type.
+        ty: Type,
+    },
+    /// A value interpolated between vertices (fragment stage).
+    Varying {
+        /// Input location.
+        location: u32,
+        /// Its type.
+        ty: Type,
+    },
+}
+
+/// Shape of a sampled texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TextureKind {
+    /// Two dimensions, filterable.
+    Texture2d,
+    /// Two dimensions with several samples in each texel; read sample by sample.
+    Texture2dMultisampled,
+    /// Three dimensions, filterable.
+    Texture3d,
+}
+
+/// What a kernel writes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Output {
+    /// A storage buffer: element `i` is written by invocation `i`, and by no other; with
+    /// `per_group`, element `g` by workgroup `g`.
+    Buffer {
+        /// Number in set 0.
+        binding: u32,
+        /// Layout of an element.
+        layout: Layout,
+        /// One element for each workgroup, not for each invocation.
+        per_group: bool,
+    },
+    /// A storage texture: its texel at the invocation's index.
+    Texture {
+        /// Number in set 0.
+        binding: u32,
+        /// The format, which is part of the shader.
+        format: TexelFormat,
+        /// 2 or 3.
+        dimensions: u32,
+    },
+    /// The clip-space position (vertex stage).
+    Position,
+    /// A value handed to the fragment stage (vertex stage).
+    Varying {
+        /// Output location.
+        location: u32,
+        /// Its type.
+        ty: Type,
+    },
+    /// A colour attachment (fragment stage).
+    Target {
+        /// Output location.
+        location: u32,
+        /// Its type.
+        ty: Type,
+    },
+}
+
+/// The type of a value in memory or at a stage's interface.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Type {
+    /// A scalar.
+    Scalar {
+        /// Which.
+        scalar: Scalar,
+    },
+    /// A vector.
+    Vector {
+        /// Its components' type.
+        scalar: Scalar,
+        /// 2, 3 or 4.
+        size: u32,
+    },
+    /// An array of fixed length.
+    Array {
+        /// Its elements' type.
+        element: Box<Type>,
+        /// Number of elements.
+        length: u32,
+        /// Bytes from one element to the next.
+        stride: u32,
+    },
+    /// A structure.
+    Struct {
+        /// Its layout.
+        layout: Layout,
+    },
+}
+
+/// A scalar type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scalar {
+    /// 32-bit float.
+    F32,
+    /// 64-bit float.
+    F64,
+    /// 32-bit unsigned integer.
+    U32,
+    /// 32-bit signed integer.
+    I32,
+}
+
+/// Where the parts of a value lie, in bytes (std430).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Layout {
+    /// The structure's name, without type parameters; for a buffer of plain numbers the number's
+    /// own name (`f32`).
+    pub name: String,
+    /// Size, which is also the stride in an array.
+    pub size: u32,
+    /// Alignment.
+    pub align: u32,
+    /// The fields in order. A buffer of plain numbers has one, with an empty name.
+    pub fields: Vec<Field>,
+}
+
+/// A field of a structure.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Field {
+    /// Its name.
+    pub name: String,
+    /// The first paragraph of its documentation: meaning, unit, range.
+    pub summary: String,
+    /// Its type.
+    pub ty: Type,
+    /// Bytes from the structure's start.
+    pub offset: u32,
+    /// Size in bytes.
+    pub size: u32,
+}
+
+/// Formats that a kernel can write, or that a texture it reads can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[repr(u32)]
+pub enum TexelFormat {
+    /// One 32-bit float.
+    R32Float,
+    /// Four 32-bit floats.
+    Rgba32Float,
+    /// Four 16-bit floats.
+    Rgba16Float,
+    /// Four 16-bit numbers from 0 to 1.
+    Rgba16Unorm,
+    /// Four 8-bit numbers from 0 to 1.
+    Rgba8Unorm,
+    /// One 32-bit unsigned integer.
+    R32Uint,
+    /// Four 32-bit unsigned integers.
+    Rgba32Uint,
+}
+
+/// How closely a backend must agree with the native scalar run: an element passes when it is
+/// within `ulp` units in the last place *or* within `absolute` of it. Both zero: bit for bit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tolerance {
+    /// Units in the last place of the kernel's precision.
+    pub ulp: u32,
+    /// Absolute difference.
+    pub absolute: f64,
+    /// Why it is that.
+    pub why: String,
+}

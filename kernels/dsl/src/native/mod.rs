@@ -1,0 +1,23 @@
+//! The host's half of the DSL: descriptions, untyped calls, the native executors. Not compiled
+//! for SPIR-V.
+
+pub mod call;
+pub mod describe;
+#[doc(hidden)]
+pub mod exec;
+pub mod layout;
+#[doc(hidden)]
+pub mod lanes;
+pub mod plugin;
+pub mod texel;
+
+pub use call::{Address, Arg, Call, CallError, Filter, Mode, Run, Sampler, TextureMut, TextureRef};
+
+/// An entry point: what it is, and its native code.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// What it is.
+    pub kernel: describe::Kernel,
+    /// Its native code.
+    pub run: Run,
+}
