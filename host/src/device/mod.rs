@@ -1,0 +1,409 @@
+//! One interface to run kernels by their description, and two devices behind it: this machine's
+//! processor ([`native::NativeDevice`]) and any Vulkan adapter ([`vulkan::VulkanDevice`]).
+//!
+//! A caller makes buffers and textures, names them in the order of the kernel's description, and
+//! reads the results back:
+//! - [`Device::dispatch`] runs compute kernels on both devices; the native one also runs vertex
+//!   and fragment kernels, as maps over arrays of attributes or varyings.
+//! - [`Device::draw`] rasterises; only the Vulkan device does.
+//!
+//! Every argument is checked against the description before anything is submitted, alike on both
+//! devices. The number of invocations follows from what is written, see [`slots::extent`].
+
+pub mod error;
+pub mod native;
+pub mod slots;
+pub mod vulkan;
+
+use std::fmt;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use hankel_dsl::native::describe::{Kernel, TexelFormat};
+use hankel_dsl::native::{Call, CallError, Sampler};
+use serde::{Deserialize, Serialize};
+
+pub use error::{DeviceError, Result};
+pub use native::NativeDevice;
+pub use vulkan::VulkanDevice;
+
+/// A buffer of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BufferId {
+    device: u32,
+    index: u32,
+}
+
+/// A texture of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TextureId {
+    device: u32,
+    index: u32,
+}
+
+/// A number for a new device, so that handles of one are not taken for another's.
+fn next_device() -> u32 {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// Which of the devices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Backend {
+    /// This machine's processor.
+    Native,
+    /// A Vulkan adapter through wgpu.
+    Vulkan,
+}
+
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Native => "native",
+            Self::Vulkan => "vulkan",
+        })
+    }
+}
+
+/// Opens a device.
+///
+/// # Errors
+/// [`DeviceError::NoDriver`] or [`DeviceError::NoDevice`] for Vulkan; the native device always
+/// opens.
+pub fn open(backend: Backend) -> Result<Box<dyn Device>> {
+    Ok(match backend {
+        Backend::Native => Box::new(NativeDevice::new()),
+        Backend::Vulkan => Box::new(VulkanDevice::new()?),
+    })
+}
+
+/// What texels are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// A colour format.
+    Texel(TexelFormat),
+    /// 32-bit float depth: what [`Depth`] draws into, and what a kernel reads as one float.
+    Depth32,
+}
+
+impl Format {
+    /// The format of the bytes in memory: depth is one 32-bit float.
+    #[must_use]
+    pub const fn texel(self) -> TexelFormat {
+        match self {
+            Self::Texel(t) => t,
+            Self::Depth32 => TexelFormat::R32Float,
+        }
+    }
+
+    /// The name in lower case, as in WebGPU.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Texel(t) => t.name(),
+            Self::Depth32 => "depth32float",
+        }
+    }
+}
+
+/// What a texture is to be. One mip level, one layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TextureShape {
+    /// 2 or 3.
+    pub dimensions: u32,
+    /// Width, height, depth in texels, each at least 1; depth 1 in two dimensions.
+    pub size: [u32; 3],
+    /// Samples of a texel: 1, or 4 in two dimensions.
+    pub samples: u32,
+    /// Its texels.
+    pub format: Format,
+}
+
+impl TextureShape {
+    /// Two dimensions, one sample.
+    #[must_use]
+    pub const fn d2(width: u32, height: u32, format: TexelFormat) -> Self {
+        Self { dimensions: 2, size: [width, height, 1], samples: 1, format: Format::Texel(format) }
+    }
+
+    /// Three dimensions.
+    #[must_use]
+    pub const fn d3(size: [u32; 3], format: TexelFormat) -> Self {
+        Self { dimensions: 3, size, samples: 1, format: Format::Texel(format) }
+    }
+
+    /// A depth buffer.
+    #[must_use]
+    pub const fn depth(width: u32, height: u32) -> Self {
+        Self { dimensions: 2, size: [width, height, 1], samples: 1, format: Format::Depth32 }
+    }
+
+    /// The same with so many samples.
+    #[must_use]
+    pub const fn multisampled(mut self, samples: u32) -> Self {
+        self.samples = samples;
+        self
+    }
+
+    /// Bytes of all texels, packed: row by row, slice by slice, a texel's samples together.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.size.iter().fold(self.samples as usize * self.format.texel().bytes(), |n, &s| {
+            n.saturating_mul(s as usize)
+        })
+    }
+}
+
+/// An argument of a kernel, in the order of [`slots::slots`].
+#[derive(Clone, Copy, Debug)]
+pub enum Bind<'a> {
+    /// A buffer.
+    Buffer(BufferId),
+    /// Bytes for this one call; only for what is read.
+    Bytes(&'a [u8]),
+    /// A texture.
+    Texture(TextureId),
+    /// A sampler.
+    Sampler(Sampler),
+}
+
+/// A kernel's native code: how it is called.
+pub type NativeCode<'a> = &'a (dyn Fn(&mut Call<'_>) -> std::result::Result<(), CallError> + Sync);
+
+/// A kernel's shader, and which way it takes to the driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shader<'a> {
+    /// SPIR-V handed to the driver as it is. It must be valid (spirv-val): nothing checks it.
+    SpirvPassthrough(&'a [u32]),
+    /// SPIR-V read, validated and written anew by naga.
+    SpirvThroughNaga(&'a [u32]),
+    /// WGSL. Specialisation constants are already part of the text.
+    Wgsl {
+        /// The text.
+        text: &'a str,
+        /// The entry point's name in it.
+        entry_point: &'a str,
+    },
+}
+
+/// A kernel with its code for one device or both.
+#[derive(Clone, Copy)]
+pub struct Program<'a> {
+    /// What it is.
+    pub kernel: &'a Kernel,
+    /// Values of the specialisation constants in the order of the parameters; none stands for
+    /// their defaults.
+    pub constants: &'a [u32],
+    /// What the native device runs.
+    pub native: Option<NativeCode<'a>>,
+    /// What the Vulkan device runs.
+    pub shader: Option<Shader<'a>>,
+}
+
+impl fmt::Debug for Program<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Program")
+            .field("kernel", &self.kernel.name)
+            .field("constants", &self.constants)
+            .field("native", &self.native.is_some())
+            .field("shader", &self.shader.is_some())
+            .finish()
+    }
+}
+
+/// What vertices make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topology {
+    /// Three vertices each.
+    Triangles,
+    /// One vertex each, one pixel large.
+    Points,
+}
+
+/// Which triangles are left out. Front faces wind counter-clockwise on the target with y up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cull {
+    /// None.
+    None,
+    /// Those that face away.
+    Back,
+    /// Those that face the viewer.
+    Front,
+}
+
+/// A colour target of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Colour {
+    /// What is drawn into.
+    pub texture: TextureId,
+    /// Where the mean of the samples goes, if anywhere; for a multisampled `texture`.
+    pub resolve: Option<TextureId>,
+    /// What it is filled with first; `None` keeps what is there.
+    pub clear: Option<[f64; 4]>,
+}
+
+/// Which depths pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DepthTest {
+    /// Nearer ones, where near is small.
+    Less,
+    /// Nearer ones and equal ones.
+    LessEqual,
+    /// Larger ones (reversed depth).
+    Greater,
+    /// All.
+    Always,
+}
+
+/// The depth buffer of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Depth {
+    /// A [`Format::Depth32`] texture with as many samples as the colour targets.
+    pub texture: TextureId,
+    /// What it is filled with first; `None` keeps what is there.
+    pub clear: Option<f32>,
+    /// What passes.
+    pub test: DepthTest,
+    /// Whether what passes is written.
+    pub write: bool,
+}
+
+/// A draw call of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw<'a> {
+    /// The vertex stage.
+    pub vertex: Program<'a>,
+    /// Its arguments: bound parameters and attributes in the order of the parameters. An
+    /// attribute takes a buffer of tightly packed values, one for each vertex.
+    pub vertex_args: &'a [Bind<'a>],
+    /// The fragment stage; none draws depth alone.
+    pub fragment: Option<Program<'a>>,
+    /// Its arguments: bound parameters only; varyings come from the vertex stage, targets from
+    /// the pass.
+    pub fragment_args: &'a [Bind<'a>],
+    /// Indices into the attributes, `u32` each; none takes the vertices in their order.
+    pub indices: Option<BufferId>,
+    /// Number of indices, or of vertices where there are none.
+    pub count: u32,
+    /// What they make.
+    pub topology: Topology,
+    /// What is left out.
+    pub cull: Cull,
+}
+
+/// A render pass: its targets, then what is drawn into them. Clip space is WebGPU's: y up,
+/// depth from 0 to 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Pass<'a> {
+    /// Name for messages.
+    pub label: &'a str,
+    /// Targets in the order of the fragment kernel's outputs.
+    pub colours: &'a [Colour],
+    /// The depth buffer.
+    pub depth: Option<Depth>,
+    /// Draw calls, in order.
+    pub draws: &'a [Draw<'a>],
+}
+
+/// A device.
+///
+/// Handles belong to the device that made them. Work is done in the order of the calls; reading
+/// waits for it.
+pub trait Device {
+    /// A name for messages and reports, with the driver's version where there is one.
+    fn name(&self) -> &str;
+
+    /// Which of the devices this is.
+    fn backend(&self) -> Backend;
+
+    /// Makes a buffer of `bytes` bytes, filled with zeros. `label` is for messages.
+    ///
+    /// # Errors
+    /// [`DeviceError::Limit`], [`DeviceError::OutOfMemory`], [`DeviceError::Lost`].
+    fn buffer(&mut self, label: &str, bytes: usize) -> Result<BufferId>;
+
+    /// Makes a texture, filled with zeros.
+    ///
+    /// # Errors
+    /// As for [`Device::buffer`], and [`DeviceError::Missing`] for a format that the device lacks.
+    fn texture(&mut self, label: &str, shape: &TextureShape) -> Result<TextureId>;
+
+    /// Overwrites a buffer from its start.
+    ///
+    /// # Errors
+    /// [`DeviceError::Transfer`] if `bytes` is longer than the buffer.
+    fn write_buffer(&mut self, buffer: BufferId, bytes: &[u8]) -> Result<()>;
+
+    /// Overwrites a texture: [`TextureShape::bytes`] bytes. A depth buffer only takes what is
+    /// drawn into it.
+    ///
+    /// # Errors
+    /// [`DeviceError::Transfer`] for any other number of bytes.
+    fn write_texture(&mut self, texture: TextureId, bytes: &[u8]) -> Result<()>;
+
+    /// Waits, and reads a buffer.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`], [`DeviceError::OutOfMemory`], [`DeviceError::Handle`].
+    fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>>;
+
+    /// Waits, and reads a texture: [`TextureShape::bytes`] bytes.
+    ///
+    /// # Errors
+    /// As for [`Device::read_buffer`].
+    fn read_texture(&mut self, texture: TextureId) -> Result<Vec<u8>>;
+
+    /// Frees a buffer.
+    ///
+    /// # Errors
+    /// [`DeviceError::Handle`].
+    fn free_buffer(&mut self, buffer: BufferId) -> Result<()>;
+
+    /// Frees a texture.
+    ///
+    /// # Errors
+    /// [`DeviceError::Handle`].
+    fn free_texture(&mut self, texture: TextureId) -> Result<()>;
+
+    /// Runs a kernel over all elements of its outputs.
+    ///
+    /// # Errors
+    /// [`DeviceError::Count`], [`DeviceError::Argument`], [`DeviceError::Constants`] for what does
+    /// not fit the description; [`DeviceError::NoCode`]; [`DeviceError::Stage`];
+    /// [`DeviceError::Refused`] for a shader that wgpu, naga or the driver refuse;
+    /// [`DeviceError::Native`]; [`DeviceError::Limit`].
+    fn dispatch(&mut self, program: &Program<'_>, args: &[Bind<'_>]) -> Result<()>;
+
+    /// Draws.
+    ///
+    /// # Errors
+    /// As for [`Device::dispatch`], and [`DeviceError::Pass`]. The native device has no
+    /// rasteriser and refuses.
+    fn draw(&mut self, pass: &Pass<'_>) -> Result<()>;
+
+    /// Waits until all that was asked is done.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`], and whatever went wrong meanwhile.
+    fn wait(&mut self) -> Result<()>;
+
+    /// Makes a buffer that holds `bytes`.
+    ///
+    /// # Errors
+    /// As for [`Device::buffer`].
+    fn buffer_from(&mut self, label: &str, bytes: &[u8]) -> Result<BufferId> {
+        let id = self.buffer(label, bytes.len())?;
+        self.write_buffer(id, bytes)?;
+        Ok(id)
+    }
+
+    /// Makes a texture that holds `bytes`.
+    ///
+    /// # Errors
+    /// As for [`Device::texture`] and [`Device::write_texture`].
+    fn texture_from(&mut self, label: &str, shape: &TextureShape, bytes: &[u8]) -> Result<TextureId> {
+        let id = self.texture(label, shape)?;
+        self.write_texture(id, bytes)?;
+        Ok(id)
+    }
+}
