@@ -123,19 +123,34 @@ impl TextureShape {
     /// Two dimensions, one sample.
     #[must_use]
     pub const fn d2(width: u32, height: u32, format: TexelFormat) -> Self {
-        Self { dimensions: 2, size: [width, height, 1], samples: 1, format: Format::Texel(format) }
+        Self {
+            dimensions: 2,
+            size: [width, height, 1],
+            samples: 1,
+            format: Format::Texel(format),
+        }
     }
 
     /// Three dimensions.
     #[must_use]
     pub const fn d3(size: [u32; 3], format: TexelFormat) -> Self {
-        Self { dimensions: 3, size, samples: 1, format: Format::Texel(format) }
+        Self {
+            dimensions: 3,
+            size,
+            samples: 1,
+            format: Format::Texel(format),
+        }
     }
 
     /// A depth buffer.
     #[must_use]
     pub const fn depth(width: u32, height: u32) -> Self {
-        Self { dimensions: 2, size: [width, height, 1], samples: 1, format: Format::Depth32 }
+        Self {
+            dimensions: 2,
+            size: [width, height, 1],
+            samples: 1,
+            format: Format::Depth32,
+        }
     }
 
     /// The same with so many samples.
@@ -148,10 +163,43 @@ impl TextureShape {
     /// Bytes of all texels, packed: row by row, slice by slice, a texel's samples together.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.size.iter().fold(self.samples as usize * self.format.texel().bytes(), |n, &s| {
-            n.saturating_mul(s as usize)
-        })
+        self.size.iter().fold(
+            self.samples as usize * self.format.texel().bytes(),
+            |n, &s| n.saturating_mul(s as usize),
+        )
     }
+}
+
+/// Refuses shapes that no device has.
+fn check_shape(label: &str, shape: &TextureShape) -> Result<()> {
+    let problem = if !matches!(shape.dimensions, 2 | 3) {
+        format!("{} dimensions; textures have 2 or 3", shape.dimensions)
+    } else if shape.size.contains(&0) {
+        format!("a size of {:?}; each must be at least 1", shape.size)
+    } else if shape.dimensions == 2 && shape.size[2] != 1 {
+        format!("a depth of {} in two dimensions", shape.size[2])
+    } else if !matches!(shape.samples, 1 | 4) {
+        format!("{} samples; textures have 1 or 4", shape.samples)
+    } else if shape.dimensions == 3 && (shape.samples != 1 || shape.format == Format::Depth32) {
+        "several samples or depth in three dimensions".into()
+    } else {
+        return Ok(());
+    };
+    Err(DeviceError::Transfer {
+        what: format!("texture `{label}`"),
+        problem: format!("it was asked for with {problem}"),
+    })
+}
+
+/// Refuses what does not fit into a buffer (`exact` false) or a texture (`exact` true).
+fn check_write(what: &str, given: usize, room: usize, exact: bool) -> Result<()> {
+    if given > room || (exact && given != room) {
+        return Err(DeviceError::Transfer {
+            what: what.into(),
+            problem: format!("{given} bytes were given, but it has {room}"),
+        });
+    }
+    Ok(())
 }
 
 /// An argument of a kernel, in the order of [`slots::slots`].
@@ -401,7 +449,12 @@ pub trait Device {
     ///
     /// # Errors
     /// As for [`Device::texture`] and [`Device::write_texture`].
-    fn texture_from(&mut self, label: &str, shape: &TextureShape, bytes: &[u8]) -> Result<TextureId> {
+    fn texture_from(
+        &mut self,
+        label: &str,
+        shape: &TextureShape,
+        bytes: &[u8],
+    ) -> Result<TextureId> {
         let id = self.texture(label, shape)?;
         self.write_texture(id, bytes)?;
         Ok(id)

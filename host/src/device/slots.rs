@@ -1,0 +1,500 @@
+//! A kernel's arguments, one after the other, and whether what was given fits them: the checks
+//! that both devices make before anything runs.
+
+use std::fmt;
+
+use hankel_dsl::native::Sampler;
+use hankel_dsl::native::describe::{
+    Kernel, Layout, Output, Role, Scalar, Stage, TexelFormat, TextureKind, Type,
+};
+
+use super::error::{DeviceError, Result};
+use super::{Format, TextureShape};
+
+/// What an argument is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Use<'a> {
+    /// One value that every invocation reads.
+    Uniform(&'a Layout),
+    /// A buffer of which each invocation reads its own element.
+    Element(&'a Layout),
+    /// A buffer that every invocation reads anywhere.
+    Storage(&'a Layout),
+    /// `u32` counters.
+    Atomic,
+    /// A texture that is read.
+    Texture(TextureKind),
+    /// A sampler.
+    Sampler,
+    /// One value for each vertex.
+    Attribute(u32, &'a Type),
+    /// One value for each fragment; an argument on the native device only.
+    Varying(u32, &'a Type),
+    /// A buffer that is written, one element for each invocation or each workgroup.
+    Output {
+        /// An element's layout.
+        layout: &'a Layout,
+        /// One for each workgroup.
+        per_group: bool,
+    },
+    /// A texture that is written.
+    StorageTexture {
+        /// Its format.
+        format: TexelFormat,
+        /// 2 or 3.
+        dimensions: u32,
+    },
+    /// What a vertex or fragment stage returns; an argument on the native device only.
+    Interface(&'a Type),
+}
+
+/// An argument of a kernel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slot<'a> {
+    /// The parameter's name, or `output`; `output[1]` is the second of several outputs.
+    pub name: String,
+    /// Number in descriptor set 0, if it has one.
+    pub binding: Option<u32>,
+    /// What it is for.
+    pub role: Use<'a>,
+}
+
+impl fmt::Display for Slot<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "argument `{}`", self.name)?;
+        if let Some(binding) = self.binding {
+            write!(f, " (binding {binding})")?;
+        }
+        Ok(())
+    }
+}
+
+impl Use<'_> {
+    /// Whether the kernel writes it.
+    #[must_use]
+    pub const fn is_written(&self) -> bool {
+        matches!(
+            self,
+            Self::Atomic | Self::Output { .. } | Self::StorageTexture { .. } | Self::Interface(_)
+        )
+    }
+
+    /// Size of an element in bytes, for what lies in a buffer.
+    #[must_use]
+    pub fn element_bytes(&self) -> Option<usize> {
+        Some(match self {
+            Self::Uniform(l) | Self::Element(l) | Self::Storage(l) => l.size as usize,
+            Self::Output { layout, .. } => layout.size as usize,
+            Self::Atomic => 4,
+            Self::Attribute(_, ty) | Self::Varying(_, ty) | Self::Interface(ty) => type_bytes(ty),
+            Self::Texture(_) | Self::Sampler | Self::StorageTexture { .. } => return None,
+        })
+    }
+
+    /// What must be given for it, in words.
+    const fn wanted(&self) -> &'static str {
+        match self {
+            Self::Texture(_) => "a texture",
+            Self::Sampler => "a sampler",
+            Self::StorageTexture { .. } => "a texture to write",
+            Self::Uniform(_)
+            | Self::Element(_)
+            | Self::Storage(_)
+            | Self::Attribute(..)
+            | Self::Varying(..) => "a buffer or bytes",
+            Self::Atomic | Self::Output { .. } | Self::Interface(_) => "a buffer",
+        }
+    }
+}
+
+/// Bytes of a scalar.
+#[must_use]
+pub const fn scalar_bytes(scalar: Scalar) -> usize {
+    match scalar {
+        Scalar::F64 => 8,
+        Scalar::F32 | Scalar::U32 | Scalar::I32 => 4,
+    }
+}
+
+/// Bytes of a value, tightly packed where it is a vector.
+#[must_use]
+pub fn type_bytes(ty: &Type) -> usize {
+    match ty {
+        Type::Scalar { scalar } => scalar_bytes(*scalar),
+        Type::Vector { scalar, size } => scalar_bytes(*scalar) * *size as usize,
+        Type::Array { length, stride, .. } => *length as usize * *stride as usize,
+        Type::Struct { layout } => layout.size as usize,
+    }
+}
+
+/// The type of a clip-space position.
+pub const POSITION: Type = Type::Vector {
+    scalar: Scalar::F32,
+    size: 4,
+};
+
+/// A kernel's arguments in order: the bound parameters, attributes and varyings, then the
+/// outputs. On the native device these are all arguments, in every stage.
+#[must_use]
+pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
+    let mut all = Vec::new();
+    for param in &kernel.params {
+        let (binding, role) = match &param.role {
+            Role::Uniform { binding, layout } => (Some(*binding), Use::Uniform(layout)),
+            Role::Element { binding, layout } => (Some(*binding), Use::Element(layout)),
+            Role::Storage { binding, layout } => (Some(*binding), Use::Storage(layout)),
+            Role::Atomic { binding } => (Some(*binding), Use::Atomic),
+            Role::Texture { binding, texture } => (Some(*binding), Use::Texture(*texture)),
+            Role::Sampler { binding } => (Some(*binding), Use::Sampler),
+            Role::Attribute { location, ty } => (None, Use::Attribute(*location, ty)),
+            Role::Varying { location, ty } => (None, Use::Varying(*location, ty)),
+            Role::Constant { .. } | Role::Index | Role::Group | Role::Phase => continue,
+        };
+        all.push(Slot {
+            name: param.name.clone(),
+            binding,
+            role,
+        });
+    }
+    for (i, output) in kernel.outputs.iter().enumerate() {
+        let (binding, role) = match output {
+            Output::Buffer {
+                binding,
+                layout,
+                per_group,
+            } => (
+                Some(*binding),
+                Use::Output {
+                    layout,
+                    per_group: *per_group,
+                },
+            ),
+            Output::Texture {
+                binding,
+                format,
+                dimensions,
+            } => (
+                Some(*binding),
+                Use::StorageTexture {
+                    format: *format,
+                    dimensions: *dimensions,
+                },
+            ),
+            Output::Position => (None, Use::Interface(&POSITION)),
+            Output::Varying { ty, .. } | Output::Target { ty, .. } => (None, Use::Interface(ty)),
+        };
+        let name = if kernel.outputs.len() == 1 {
+            "output".into()
+        } else {
+            format!("output[{i}]")
+        };
+        all.push(Slot {
+            name,
+            binding,
+            role,
+        });
+    }
+    all
+}
+
+/// The arguments of a stage of a pipeline that draws: without varyings, positions and targets,
+/// which the pipeline hands on itself.
+#[must_use]
+pub fn drawn_slots(kernel: &Kernel) -> Vec<Slot<'_>> {
+    let mut all = slots(kernel);
+    all.retain(|s| !matches!(s.role, Use::Varying(..) | Use::Interface(_)));
+    all
+}
+
+/// The values of a kernel's specialisation constants: those given, or the defaults if none are.
+///
+/// # Errors
+/// [`DeviceError::Constants`] for another number of them than the kernel has.
+pub fn constants(kernel: &Kernel, given: &[u32]) -> Result<Vec<u32>> {
+    let defaults: Vec<u32> = kernel
+        .params
+        .iter()
+        .filter_map(|p| match p.role {
+            Role::Constant { default, .. } => Some(default),
+            _ => None,
+        })
+        .collect();
+    if given.is_empty() {
+        return Ok(defaults);
+    }
+    if given.len() != defaults.len() {
+        return Err(DeviceError::Constants {
+            kernel: kernel.name.clone(),
+            problem: format!(
+                "it has {} constants, {} were given",
+                defaults.len(),
+                given.len()
+            ),
+        });
+    }
+    Ok(given.to_vec())
+}
+
+/// What was given for an argument, as far as the checks look at it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Given {
+    /// A buffer of so many bytes. The number tells buffers apart.
+    Buffer {
+        /// Its number.
+        id: u32,
+        /// Its size.
+        bytes: usize,
+    },
+    /// Bytes.
+    Bytes(usize),
+    /// A texture.
+    Texture {
+        /// Its number.
+        id: u32,
+        /// Its shape.
+        shape: TextureShape,
+    },
+    /// A sampler.
+    Sampler(Sampler),
+}
+
+/// Checks what was given for `slots` of `kernel`: number, kinds, sizes, formats, and that nothing
+/// is both read and written.
+///
+/// # Errors
+/// [`DeviceError::Count`] and [`DeviceError::Argument`].
+pub fn check(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given]) -> Result<()> {
+    if slots.len() != given.len() {
+        return Err(DeviceError::Count {
+            kernel: kernel.name.clone(),
+            expected: slots.len(),
+            names: slots
+                .iter()
+                .map(|s| s.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+            got: given.len(),
+        });
+    }
+    for (slot, given) in slots.iter().zip(given) {
+        check_one(slot, given).map_err(|problem| refuse(kernel, slot, problem))?;
+    }
+    for (i, slot) in slots
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| s.role.is_written())
+    {
+        for (j, other) in slots.iter().enumerate().filter(|(j, _)| *j != i) {
+            let same = match (&given[i], &given[j]) {
+                (Given::Buffer { id: a, .. }, Given::Buffer { id: b, .. })
+                | (Given::Texture { id: a, .. }, Given::Texture { id: b, .. }) => a == b,
+                _ => false,
+            };
+            if same {
+                let problem = format!(
+                    "it is written, and also given as `{}`: use two",
+                    slots[j].name
+                );
+                debug_assert!(other.name != slot.name);
+                return Err(refuse(kernel, slot, problem));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// An argument error.
+pub(super) fn refuse(kernel: &Kernel, slot: &Slot<'_>, problem: String) -> DeviceError {
+    DeviceError::Argument {
+        kernel: kernel.name.clone(),
+        argument: slot.to_string(),
+        problem,
+    }
+}
+
+fn check_one(slot: &Slot<'_>, given: &Given) -> std::result::Result<(), String> {
+    let wanted = || Err(format!("it must be {}", slot.role.wanted()));
+    let bytes = match given {
+        Given::Buffer { bytes, .. } => Some(*bytes),
+        Given::Bytes(n) if !slot.role.is_written() => Some(*n),
+        _ => None,
+    };
+    if let Some(size) = slot.role.element_bytes() {
+        let Some(bytes) = bytes else { return wanted() };
+        if let Use::Uniform(layout) = slot.role {
+            return if bytes == size {
+                Ok(())
+            } else {
+                Err(format!(
+                    "it has {bytes} bytes, but one `{}` has {size}",
+                    layout.name
+                ))
+            };
+        }
+        if size == 0 || !bytes.is_multiple_of(size) {
+            return Err(format!(
+                "{bytes} bytes are no whole number of elements of {size} bytes"
+            ));
+        }
+        if bytes == 0 && matches!(slot.role, Use::Storage(_) | Use::Atomic) {
+            return Err("it is empty: give at least one element".into());
+        }
+        return Ok(());
+    }
+    match (slot.role, given) {
+        (Use::Sampler, Given::Sampler(_)) => Ok(()),
+        (Use::Texture(kind), Given::Texture { shape, .. }) => check_texture(kind, shape),
+        (Use::StorageTexture { format, dimensions }, Given::Texture { shape, .. }) => {
+            if shape.format != Format::Texel(format) {
+                Err(format!(
+                    "its format is {}, but the kernel writes {}",
+                    shape.format.name(),
+                    format.name()
+                ))
+            } else if shape.dimensions != dimensions {
+                Err(format!(
+                    "it has {} dimensions, not {dimensions}",
+                    shape.dimensions
+                ))
+            } else if shape.samples != 1 {
+                Err("it is multisampled".into())
+            } else {
+                Ok(())
+            }
+        }
+        _ => wanted(),
+    }
+}
+
+fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result<(), String> {
+    let (dimensions, multisampled) = match kind {
+        TextureKind::Texture2d => (2, false),
+        TextureKind::Texture2dMultisampled => (2, true),
+        TextureKind::Texture3d => (3, false),
+    };
+    if shape.dimensions != dimensions {
+        return Err(format!(
+            "it has {} dimensions, not {dimensions}",
+            shape.dimensions
+        ));
+    }
+    match (multisampled, shape.samples) {
+        (true, 1) => return Err("it has one sample, but the kernel reads several".into()),
+        (false, n) if n != 1 => {
+            return Err(format!("it has {n} samples, but the kernel reads one"));
+        }
+        _ => {}
+    }
+    if shape.format.texel().is_uint() {
+        return Err(format!(
+            "its format is {}, but the kernel reads floats",
+            shape.format.name()
+        ));
+    }
+    Ok(())
+}
+
+/// How many invocations run along x, y, z: as many as the first output has elements or texels
+/// (times the workgroup where it gets one element for each group); without outputs, as many as
+/// the first element buffer, else the first texture, has. Element buffers must have at least as
+/// many elements, and every other output the same size.
+///
+/// # Errors
+/// [`DeviceError::Argument`] for a buffer that is too short or an output of another size;
+/// [`DeviceError::Stage`] for a kernel that nothing tells the number of invocations.
+pub fn extent(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given]) -> Result<[u32; 3]> {
+    let threads = match kernel.stage {
+        Stage::Compute { threads, .. } => threads,
+        Stage::Vertex | Stage::Fragment => [1; 3],
+    };
+    let elements = |i: usize| -> Result<u32> {
+        let bytes = match given[i] {
+            Given::Buffer { bytes, .. } | Given::Bytes(bytes) => bytes,
+            Given::Texture { .. } | Given::Sampler(_) => 0,
+        };
+        let n = bytes / slots[i].role.element_bytes().unwrap_or(1).max(1);
+        u32::try_from(n).map_err(|_| {
+            refuse(
+                kernel,
+                &slots[i],
+                format!("{n} elements are more than 32 bits can count"),
+            )
+        })
+    };
+    let size_of = |i: usize| -> Result<Option<[u32; 3]>> {
+        Ok(match (slots[i].role, given[i]) {
+            (
+                Use::Output {
+                    per_group: true, ..
+                },
+                _,
+            ) => Some([elements(i)?.saturating_mul(threads[0]), 1, 1]),
+            (
+                Use::Output {
+                    per_group: false, ..
+                }
+                | Use::Interface(_),
+                _,
+            ) => Some([elements(i)?, 1, 1]),
+            (Use::StorageTexture { .. }, Given::Texture { shape, .. }) => Some(shape.size),
+            _ => None,
+        })
+    };
+    let mut extent: Option<([u32; 3], usize)> = None;
+    for i in 0..slots.len() {
+        let Some(size) = size_of(i)? else { continue };
+        match extent {
+            None => extent = Some((size, i)),
+            Some((first, _)) if first == size => {}
+            Some((first, j)) => {
+                return Err(refuse(
+                    kernel,
+                    &slots[i],
+                    format!(
+                        "{size:?} invocations would write it, but `{}` needs {first:?}",
+                        slots[j].name
+                    ),
+                ));
+            }
+        }
+    }
+    let extent = match extent {
+        Some((size, _)) => size,
+        None => {
+            let first = |wanted: fn(&Use<'_>) -> bool| slots.iter().position(|s| wanted(&s.role));
+            if let Some(i) = first(|u| matches!(u, Use::Element(_))) {
+                [elements(i)?, 1, 1]
+            } else if let Some(i) = first(|u| matches!(u, Use::Texture(_)))
+                && let Given::Texture { shape, .. } = given[i]
+            {
+                shape.size
+            } else {
+                return Err(DeviceError::Stage {
+                    kernel: kernel.name.clone(),
+                    stage: "compute",
+                    problem: "nothing says how many invocations it runs: give it an output, an \
+                              element parameter or a texture"
+                        .into(),
+                });
+            }
+        }
+    };
+    let invocations = extent[0];
+    for (i, slot) in slots.iter().enumerate() {
+        let own = matches!(
+            slot.role,
+            Use::Element(_) | Use::Attribute(..) | Use::Varying(..)
+        );
+        if own && elements(i)? < invocations {
+            return Err(refuse(
+                kernel,
+                slot,
+                format!(
+                    "it has {} elements, but {invocations} invocations run",
+                    elements(i)?
+                ),
+            ));
+        }
+    }
+    Ok(extent)
+}

@@ -1,0 +1,584 @@
+//! Buffers and textures of the Vulkan device, and what goes to and from them.
+
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_dsl::native::{Address, Filter, Sampler};
+
+use super::super::error::{DeviceError, Result};
+use super::super::{Format, TextureId, TextureShape};
+use super::VulkanDevice;
+
+/// Rows of a texture start at multiples of this in a buffer that it is copied to.
+const ROW: usize = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize;
+
+/// A buffer.
+#[derive(Debug)]
+pub struct Memory {
+    pub buffer: wgpu::Buffer,
+    /// Bytes that were asked for.
+    pub bytes: usize,
+    label: String,
+}
+
+impl Memory {
+    /// Bytes that it really has: no less than a uniform's, whose end is padded.
+    pub fn physical(&self) -> u64 {
+        padded(self.bytes)
+    }
+
+    /// Name for messages.
+    pub fn what(&self) -> String {
+        format!("buffer `{}`", self.label)
+    }
+}
+
+/// A texture.
+#[derive(Debug)]
+pub struct Texture {
+    pub texture: wgpu::Texture,
+    pub view: wgpu::TextureView,
+    pub shape: TextureShape,
+    /// What the adapter lets it be used for.
+    pub usage: wgpu::TextureUsages,
+    /// Whether a linear sampler may be used on it.
+    pub filterable: bool,
+    label: String,
+}
+
+impl Texture {
+    /// Name for messages.
+    pub fn what(&self) -> String {
+        format!("texture `{}`", self.label)
+    }
+}
+
+fn padded(bytes: usize) -> u64 {
+    (bytes as u64).next_multiple_of(16).max(16)
+}
+
+/// The format in wgpu.
+pub fn format(format: Format) -> wgpu::TextureFormat {
+    match format {
+        Format::Depth32 => wgpu::TextureFormat::Depth32Float,
+        Format::Texel(TexelFormat::R32Float) => wgpu::TextureFormat::R32Float,
+        Format::Texel(TexelFormat::Rgba32Float) => wgpu::TextureFormat::Rgba32Float,
+        Format::Texel(TexelFormat::Rgba16Float) => wgpu::TextureFormat::Rgba16Float,
+        Format::Texel(TexelFormat::Rgba16Unorm) => wgpu::TextureFormat::Rgba16Unorm,
+        Format::Texel(TexelFormat::Rgba8Unorm) => wgpu::TextureFormat::Rgba8Unorm,
+        Format::Texel(TexelFormat::R32Uint) => wgpu::TextureFormat::R32Uint,
+        Format::Texel(TexelFormat::Rgba32Uint) => wgpu::TextureFormat::Rgba32Uint,
+    }
+}
+
+fn extent(size: [u32; 3]) -> wgpu::Extent3d {
+    wgpu::Extent3d {
+        width: size[0],
+        height: size[1],
+        depth_or_array_layers: size[2],
+    }
+}
+
+impl VulkanDevice {
+    pub(super) fn make_buffer(&self, label: &str, bytes: usize) -> Result<Memory> {
+        self.limit(
+            format!("the size of buffer `{label}` in bytes"),
+            bytes as u64,
+            self.limits.max_buffer_size,
+        )?;
+        let usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::UNIFORM
+            | wgpu::BufferUsages::VERTEX
+            | wgpu::BufferUsages::INDEX
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        let during = || format!("making buffer `{label}` of {bytes} bytes");
+        let buffer = self.guarded(&during, |device| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: padded(bytes),
+                usage,
+                mapped_at_creation: false,
+            })
+        })?;
+        Ok(Memory {
+            buffer,
+            bytes,
+            label: label.into(),
+        })
+    }
+
+    pub(super) fn upload(&self, memory: &Memory, bytes: &[u8]) -> Result<()> {
+        let during = || format!("writing {}", memory.what());
+        let whole = bytes.len() / 4 * 4;
+        self.guarded(&during, |_| {
+            if whole > 0 {
+                self.queue.write_buffer(&memory.buffer, 0, &bytes[..whole]);
+            }
+            if whole < bytes.len() {
+                // The last word is padded: wgpu writes whole words.
+                let mut word = [0; 4];
+                word[..bytes.len() - whole].copy_from_slice(&bytes[whole..]);
+                self.queue.write_buffer(&memory.buffer, whole as u64, &word);
+            }
+        })
+    }
+
+    /// Reads the first `size` bytes of a buffer, `size` a multiple of 4.
+    pub(super) fn download(&self, from: &wgpu::Buffer, size: u64, what: &str) -> Result<Vec<u8>> {
+        let during = || format!("reading {what}");
+        let staging = self.guarded(&during, |device| {
+            let staging = device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read"),
+                size,
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            });
+            let mut encoder = device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(from, 0, &staging, 0, size);
+            self.queue.submit([encoder.finish()]);
+            staging
+        })?;
+        self.map(&staging, &during)
+    }
+
+    /// Waits for a staging buffer and takes its bytes.
+    fn map(&self, staging: &wgpu::Buffer, during: &dyn Fn() -> String) -> Result<Vec<u8>> {
+        let refused = |detail: String| DeviceError::Refused {
+            during: during(),
+            detail,
+        };
+        let (send, receive) = std::sync::mpsc::channel();
+        self.guarded(during, |_| {
+            staging.slice(..).map_async(wgpu::MapMode::Read, move |r| {
+                // The receiver outlives the wait below.
+                let _ = send.send(r);
+            });
+        })?;
+        self.finish(during)?;
+        match receive.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(e)) => return Err(refused(e.to_string())),
+            Err(_) => return Err(refused("the driver never finished".into())),
+        }
+        let bytes = staging
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|e| refused(e.to_string()))?;
+        Ok(bytes.to_vec())
+    }
+
+    pub(super) fn make_texture(&self, label: &str, shape: &TextureShape) -> Result<Texture> {
+        super::super::check_shape(label, shape)?;
+        let limit = if shape.dimensions == 3 {
+            self.limits.max_texture_dimension_3d
+        } else {
+            self.limits.max_texture_dimension_2d
+        };
+        for (axis, n) in ["width", "height", "depth"].into_iter().zip(shape.size) {
+            self.limit(
+                format!("the {axis} of texture `{label}`"),
+                n.into(),
+                limit.into(),
+            )?;
+        }
+        let missing = |feature: &str| DeviceError::Missing {
+            device: self.name.clone(),
+            feature: format!("{} {feature}", shape.format.name()),
+            what: format!("texture `{label}`"),
+        };
+        let format = format(shape.format);
+        if !self.device.features().contains(format.required_features()) {
+            return Err(missing("textures"));
+        }
+        let can = self.adapter.get_texture_format_features(format);
+        let mut usage =
+            wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT;
+        if shape.samples > 1 {
+            if !can
+                .flags
+                .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4)
+            {
+                return Err(missing("textures with 4 samples"));
+            }
+        } else {
+            usage |= wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::STORAGE_BINDING;
+        }
+        if shape.dimensions == 3 {
+            usage -= wgpu::TextureUsages::RENDER_ATTACHMENT;
+        }
+        usage &= can.allowed_usages;
+        let during = || {
+            format!(
+                "making texture `{label}` of {:?} {} texels",
+                shape.size,
+                shape.format.name()
+            )
+        };
+        let (texture, view) = self.guarded(&during, |device| {
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: extent(shape.size),
+                mip_level_count: 1,
+                sample_count: shape.samples,
+                dimension: if shape.dimensions == 3 {
+                    wgpu::TextureDimension::D3
+                } else {
+                    wgpu::TextureDimension::D2
+                },
+                format,
+                usage,
+                view_formats: &[],
+            });
+            let view = texture.create_view(&Default::default());
+            (texture, view)
+        })?;
+        let float = wgpu::TextureSampleType::Float { filterable: true };
+        let filterable = shape.samples == 1
+            && format.sample_type(None, Some(self.device.features())) == Some(float);
+        Ok(Texture {
+            texture,
+            view,
+            shape: *shape,
+            usage,
+            filterable,
+            label: label.into(),
+        })
+    }
+
+    pub(super) fn upload_texels(&self, texture: &Texture, bytes: &[u8]) -> Result<()> {
+        if texture.shape.format == Format::Depth32 {
+            return Err(DeviceError::Transfer {
+                what: texture.what(),
+                problem: "a depth buffer takes only what is drawn into it; use r32float".into(),
+            });
+        }
+        let size = texture.shape.size;
+        let row = size[0] * texture.shape.format.texel().bytes() as u32;
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(row),
+            rows_per_image: Some(size[1]),
+        };
+        self.guarded(&|| format!("writing {}", texture.what()), |_| {
+            self.queue
+                .write_texture(texture.texture.as_image_copy(), bytes, layout, extent(size));
+        })
+    }
+
+    pub(super) fn download_texels(&self, texture: &Texture) -> Result<Vec<u8>> {
+        let size = texture.shape.size;
+        let row = size[0] as usize * texture.shape.format.texel().bytes();
+        let pitch = row.next_multiple_of(ROW);
+        let rows = size[1] as usize * size[2] as usize;
+        let during = || format!("reading {}", texture.what());
+        let staging = self.guarded(&during, |device| {
+            let staging = device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read"),
+                size: (pitch * rows) as u64,
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            });
+            let mut encoder = device.create_command_encoder(&Default::default());
+            encoder.copy_texture_to_buffer(
+                texture.texture.as_image_copy(),
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(pitch as u32),
+                        rows_per_image: Some(size[1]),
+                    },
+                },
+                extent(size),
+            );
+            self.queue.submit([encoder.finish()]);
+            staging
+        })?;
+        let padded = self.map(&staging, &during)?;
+        Ok(padded
+            .chunks_exact(pitch)
+            .flat_map(|r| &r[..row])
+            .copied()
+            .collect())
+    }
+
+    pub(super) fn sampler(&mut self, sampler: Sampler) -> Result<wgpu::Sampler> {
+        if let Some(made) = self.samplers.get(&sampler) {
+            return Ok(made.clone());
+        }
+        let (filter, mipmap) = match sampler.filter {
+            Filter::Nearest => (wgpu::FilterMode::Nearest, wgpu::MipmapFilterMode::Nearest),
+            Filter::Linear => (wgpu::FilterMode::Linear, wgpu::MipmapFilterMode::Nearest),
+        };
+        let address = match sampler.address {
+            Address::ClampToEdge => wgpu::AddressMode::ClampToEdge,
+            Address::Repeat => wgpu::AddressMode::Repeat,
+        };
+        let made = self.guarded(&|| "making a sampler".into(), |device| {
+            device.create_sampler(&wgpu::SamplerDescriptor {
+                label: None,
+                address_mode_u: address,
+                address_mode_v: address,
+                address_mode_w: address,
+                mag_filter: filter,
+                min_filter: filter,
+                mipmap_filter: mipmap,
+                ..Default::default()
+            })
+        })?;
+        self.samplers.insert(sampler, made.clone());
+        Ok(made)
+    }
+
+    /// Draws the samples of a multisampled texture from a buffer: copies do not reach them.
+    pub(super) fn upload_samples(&mut self, texture: TextureId, bytes: &[u8]) -> Result<()> {
+        let (view, shape, what) = {
+            let t = self.image(texture)?;
+            if !t.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
+                return Err(DeviceError::Missing {
+                    device: self.name.clone(),
+                    feature: format!("drawing into {}", shape_name(&t.shape)),
+                    what: t.what(),
+                });
+            }
+            (t.view.clone(), t.shape, t.what())
+        };
+        let values = to_vec4(shape.format, bytes);
+        let memory = self.make_buffer("samples", values.len())?;
+        self.upload(&memory, &values)?;
+        let depth = shape.format == Format::Depth32;
+        let (result, scalar) = if depth {
+            ("@builtin(frag_depth) f32", ".x")
+        } else if shape.format.texel().is_uint() {
+            ("@location(0) vec4<u32>", "")
+        } else {
+            ("@location(0) vec4<f32>", "")
+        };
+        let ty = if shape.format.texel().is_uint() {
+            "u32"
+        } else {
+            "f32"
+        };
+        let text = format!(
+            "@group(0) @binding(0) var<storage, read> samples: array<vec4<{ty}>>;\n\
+             @vertex fn corner(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {{\n\
+             return vec4<f32>(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);\n\
+             }}\n\
+             @fragment fn fill(@builtin(position) at: vec4<f32>, @builtin(sample_index) s: u32) -> {result} {{\n\
+             let i = (u32(at.y) * {width}u + u32(at.x)) * {samples}u + s;\n\
+             return samples[i]{scalar};\n\
+             }}\n",
+            width = shape.size[0],
+            samples = shape.samples,
+        );
+        let format = format(shape.format);
+        self.guarded(&|| format!("writing {what}"), |device| {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("samples"),
+                source: wgpu::ShaderSource::Wgsl(text.into()),
+            });
+            let target = [Some(wgpu::ColorTargetState {
+                format,
+                blend: None,
+                write_mask: wgpu::ColorWrites::ALL,
+            })];
+            let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("samples"),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("corner"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: Default::default(),
+                depth_stencil: depth.then(|| wgpu::DepthStencilState {
+                    format,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::Always),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                multisample: wgpu::MultisampleState {
+                    count: shape.samples,
+                    ..Default::default()
+                },
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some("fill"),
+                    compilation_options: Default::default(),
+                    targets: if depth { &[] } else { &target },
+                }),
+                multiview_mask: None,
+                cache: None,
+            });
+            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("samples"),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &[wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: memory.buffer.as_entire_binding(),
+                }],
+            });
+            let mut encoder = device.create_command_encoder(&Default::default());
+            {
+                let colour = [Some(wgpu::RenderPassColorAttachment {
+                    view: &view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })];
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("samples"),
+                    color_attachments: if depth { &[] } else { &colour },
+                    depth_stencil_attachment: depth.then_some(
+                        wgpu::RenderPassDepthStencilAttachment {
+                            view: &view,
+                            depth_ops: Some(wgpu::Operations {
+                                load: wgpu::LoadOp::Clear(0.0),
+                                store: wgpu::StoreOp::Store,
+                            }),
+                            stencil_ops: None,
+                        },
+                    ),
+                    ..Default::default()
+                });
+                pass.set_pipeline(&pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                pass.draw(0..3, 0..1);
+            }
+            self.queue.submit([encoder.finish()]);
+        })
+    }
+
+    /// Reads the samples of a multisampled texture through a compute shader.
+    pub(super) fn download_samples(&mut self, texture: TextureId) -> Result<Vec<u8>> {
+        let (view, shape, what) = {
+            let t = self.image(texture)?;
+            (t.view.clone(), t.shape, t.what())
+        };
+        let values = shape.bytes() / shape.format.texel().bytes() * 16;
+        let memory = self.make_buffer("samples", values)?;
+        let ty = if shape.format.texel().is_uint() {
+            "u32"
+        } else {
+            "f32"
+        };
+        let (kind, load) = if shape.format == Format::Depth32 {
+            (
+                "texture_depth_multisampled_2d".to_string(),
+                "vec4<f32>(textureLoad(image, at, s), 0.0, 0.0, 1.0)",
+            )
+        } else {
+            (
+                format!("texture_multisampled_2d<{ty}>"),
+                "textureLoad(image, at, s)",
+            )
+        };
+        let text = format!(
+            "@group(0) @binding(0) var image: {kind};\n\
+             @group(0) @binding(1) var<storage, read_write> samples: array<vec4<{ty}>>;\n\
+             @compute @workgroup_size(8, 8) fn take(@builtin(global_invocation_id) id: vec3<u32>) {{\n\
+             let size = textureDimensions(image);\n\
+             if (id.x >= size.x || id.y >= size.y) {{ return; }}\n\
+             let at = vec2<i32>(id.xy);\n\
+             for (var s = 0; s < {samples}; s++) {{\n\
+             samples[(id.y * size.x + id.x) * {samples}u + u32(s)] = {load};\n\
+             }}\n\
+             }}\n",
+            samples = shape.samples,
+        );
+        self.guarded(&|| format!("reading {what}"), |device| {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("samples"),
+                source: wgpu::ShaderSource::Wgsl(text.into()),
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("samples"),
+                layout: None,
+                module: &module,
+                entry_point: Some("take"),
+                compilation_options: Default::default(),
+                cache: None,
+            });
+            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("samples"),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &[
+                    wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: wgpu::BindingResource::TextureView(&view),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 1,
+                        resource: memory.buffer.as_entire_binding(),
+                    },
+                ],
+            });
+            let mut encoder = device.create_command_encoder(&Default::default());
+            {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                pass.set_pipeline(&pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                let [x, y, _] = shape.size;
+                pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), 1);
+            }
+            self.queue.submit([encoder.finish()]);
+        })?;
+        let values = self.download(&memory.buffer, memory.physical(), &what)?;
+        Ok(from_vec4(shape.format, &values[..memory.bytes]))
+    }
+}
+
+/// A shape for messages.
+fn shape_name(shape: &TextureShape) -> String {
+    format!("{} with {} samples", shape.format.name(), shape.samples)
+}
+
+/// Texels as four 32-bit channels each.
+fn to_vec4(format: Format, bytes: &[u8]) -> Vec<u8> {
+    let texel = format.texel();
+    let wide = if texel.is_uint() {
+        TexelFormat::Rgba32Uint
+    } else {
+        TexelFormat::Rgba32Float
+    };
+    let mut out = vec![0; bytes.len() / texel.bytes() * 16];
+    for (from, to) in bytes
+        .chunks_exact(texel.bytes())
+        .zip(out.chunks_exact_mut(16))
+    {
+        if texel.is_uint() {
+            wide.store_uint(to, texel.load_uint(from));
+        } else {
+            wide.store(to, texel.load(from));
+        }
+    }
+    out
+}
+
+/// The inverse of [`to_vec4`].
+fn from_vec4(format: Format, values: &[u8]) -> Vec<u8> {
+    let texel = format.texel();
+    let wide = if texel.is_uint() {
+        TexelFormat::Rgba32Uint
+    } else {
+        TexelFormat::Rgba32Float
+    };
+    let mut out = vec![0; values.len() / 16 * texel.bytes()];
+    for (from, to) in values
+        .chunks_exact(16)
+        .zip(out.chunks_exact_mut(texel.bytes()))
+    {
+        if texel.is_uint() {
+            texel.store_uint(to, wide.load_uint(from));
+        } else {
+            texel.store(to, wide.load(from));
+        }
+    }
+    out
+}

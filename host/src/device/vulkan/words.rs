@@ -1,0 +1,224 @@
+//! SPIR-V as words: what must be known of a module before a driver gets it unseen, and the small
+//! changes that need no compiler.
+
+use std::collections::HashSet;
+
+/// `OpEntryPoint`.
+const ENTRY_POINT: u16 = 15;
+/// `OpCapability`.
+const CAPABILITY: u16 = 17;
+/// `OpSpecConstant`.
+const SPEC_CONSTANT: u16 = 50;
+/// `OpDecorate`.
+const DECORATE: u16 = 71;
+
+/// Decoration `SpecId`.
+const SPEC_ID: u32 = 1;
+/// Decoration `NonReadable`.
+const NON_READABLE: u32 = 25;
+/// Decoration `Binding`.
+const BINDING: u32 = 33;
+/// Decoration `DescriptorSet`.
+const DESCRIPTOR_SET: u32 = 34;
+
+/// Words before the first instruction.
+const HEADER: usize = 5;
+
+/// An instruction: where it starts, its number, its operands.
+struct Instruction<'a> {
+    at: usize,
+    opcode: u16,
+    operands: &'a [u32],
+}
+
+/// The instructions of a module.
+fn instructions(words: &[u32]) -> Result<Vec<Instruction<'_>>, String> {
+    if words.len() < HEADER || words[0] != 0x0723_0203 {
+        return Err("it does not begin as SPIR-V does".into());
+    }
+    let mut all = Vec::new();
+    let mut at = HEADER;
+    while at < words.len() {
+        let length = (words[at] >> 16) as usize;
+        let end = at + length;
+        if length == 0 || end > words.len() {
+            return Err(format!("the instruction at word {at} runs past the end"));
+        }
+        let opcode = (words[at] & 0xffff) as u16;
+        all.push(Instruction {
+            at,
+            opcode,
+            operands: &words[at + 1..end],
+        });
+        at = end;
+    }
+    Ok(all)
+}
+
+/// A literal string, as operands hold it.
+fn string(words: &[u32]) -> String {
+    let bytes: Vec<u8> = words
+        .iter()
+        .flat_map(|w| w.to_le_bytes())
+        .take_while(|&b| b != 0)
+        .collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// What is known of a module.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Execution model and name of each entry point.
+    pub entry_points: Vec<(u32, String)>,
+    /// Capabilities.
+    pub capabilities: HashSet<u32>,
+    /// Descriptor sets and bindings.
+    pub bindings: Vec<(u32, u32)>,
+}
+
+/// Reads a module's entry points, capabilities and bindings.
+pub fn summary(words: &[u32]) -> Result<Summary, String> {
+    let mut found = Summary::default();
+    let mut numbers = std::collections::BTreeMap::<u32, (u32, Option<u32>)>::new();
+    for i in instructions(words)? {
+        match (i.opcode, i.operands) {
+            (ENTRY_POINT, [model, _, name @ ..]) => {
+                found.entry_points.push((*model, string(name)));
+            }
+            (CAPABILITY, [capability]) => {
+                found.capabilities.insert(*capability);
+            }
+            (DECORATE, [target, DESCRIPTOR_SET, set]) => {
+                numbers.entry(*target).or_default().0 = *set
+            }
+            (DECORATE, [target, BINDING, binding]) => {
+                numbers.entry(*target).or_default().1 = Some(*binding);
+            }
+            _ => {}
+        }
+    }
+    found.bindings = numbers
+        .values()
+        .filter_map(|&(set, b)| b.map(|b| (set, b)))
+        .collect();
+    Ok(found)
+}
+
+/// The module with the values of its specialisation constants changed, `(SpecId, value)` each.
+pub fn specialise(words: &[u32], values: &[(u32, u32)]) -> Result<Vec<u32>, String> {
+    let mut changed = words.to_vec();
+    let all = instructions(words)?;
+    for &(id, value) in values {
+        // A module that does not use a constant does not have it either.
+        let Some(target) = all.iter().find_map(|i| match (i.opcode, i.operands) {
+            (DECORATE, [target, SPEC_ID, n]) if *n == id => Some(*target),
+            _ => None,
+        }) else {
+            continue;
+        };
+        for i in all.iter().filter(|i| i.opcode == SPEC_CONSTANT) {
+            if let [_, result, _] = i.operands
+                && *result == target
+            {
+                changed[i.at + 3] = value;
+            }
+        }
+    }
+    Ok(changed)
+}
+
+/// The module with all its bindings in another descriptor set.
+pub fn move_to_set(words: &[u32], set: u32) -> Result<Vec<u32>, String> {
+    let mut changed = words.to_vec();
+    for i in instructions(words)? {
+        if let (DECORATE, [_, DESCRIPTOR_SET, _]) = (i.opcode, i.operands) {
+            changed[i.at + 3] = set;
+        }
+    }
+    Ok(changed)
+}
+
+/// The module with the variables at `bindings` declared as never read, which naga needs to know of
+/// a storage texture that is only written.
+pub fn write_only(words: &[u32], bindings: &[u32]) -> Result<Vec<u32>, String> {
+    let all = instructions(words)?;
+    let already: HashSet<u32> = all
+        .iter()
+        .filter_map(|i| match (i.opcode, i.operands) {
+            (DECORATE, [target, NON_READABLE]) => Some(*target),
+            _ => None,
+        })
+        .collect();
+    let mut changed = words[..HEADER].to_vec();
+    for i in &all {
+        changed.extend_from_slice(&words[i.at..=i.at + i.operands.len()]);
+        if let (DECORATE, [target, BINDING, n]) = (i.opcode, i.operands)
+            && bindings.contains(n)
+            && !already.contains(target)
+        {
+            changed.extend([3 << 16 | u32::from(DECORATE), *target, NON_READABLE]);
+        }
+    }
+    Ok(changed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A module of decorations and one constant; no driver would take it.
+    fn module() -> Vec<u32> {
+        let mut w = vec![0x0723_0203, 0x0001_0500, 0, 20, 0];
+        let mut op = |opcode: u16, operands: &[u32]| {
+            w.push((operands.len() as u32 + 1) << 16 | u32::from(opcode));
+            w.extend_from_slice(operands);
+        };
+        op(CAPABILITY, &[10]);
+        op(ENTRY_POINT, &[5, 1, u32::from_le_bytes(*b"abcd"), 0]);
+        op(DECORATE, &[7, SPEC_ID, 3]);
+        op(DECORATE, &[8, BINDING, 2]);
+        op(DECORATE, &[8, DESCRIPTOR_SET, 0]);
+        op(SPEC_CONSTANT, &[9, 7, 41]);
+        w
+    }
+
+    #[test]
+    fn a_summary_names_entry_points_and_bindings() {
+        let s = summary(&module()).unwrap();
+        assert_eq!(s.entry_points, [(5, "abcd".to_string())]);
+        assert_eq!(s.bindings, [(0, 2)]);
+        assert!(s.capabilities.contains(&10));
+    }
+
+    #[test]
+    fn what_is_cut_short_is_refused() {
+        let w = module();
+        assert!(
+            summary(&w[..w.len() - 1])
+                .unwrap_err()
+                .contains("past the end")
+        );
+        assert!(summary(&[1, 2, 3, 4, 5]).is_err());
+        assert!(summary(&[]).is_err());
+        let mut zero = module();
+        zero[5] = 0;
+        assert!(summary(&zero).is_err());
+    }
+
+    #[test]
+    fn a_constant_is_changed_by_its_number() {
+        let w = specialise(&module(), &[(3, 5), (4, 6)]).unwrap();
+        assert_eq!(w.last(), Some(&5));
+        assert_eq!(w[..w.len() - 1], module()[..w.len() - 1]);
+    }
+
+    #[test]
+    fn sets_and_write_only_are_declared_once() {
+        let w = move_to_set(&module(), 1).unwrap();
+        assert_eq!(summary(&w).unwrap().bindings, [(1, 2)]);
+        let once = write_only(&module(), &[2]).unwrap();
+        assert_eq!(once.len(), module().len() + 3);
+        assert_eq!(write_only(&once, &[2]).unwrap(), once);
+        assert_eq!(write_only(&module(), &[1]).unwrap(), module());
+    }
+}
