@@ -2,14 +2,18 @@
 //! callback, and the end of it into the error if they fail.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use crate::error::{During, Error, Result};
 
 /// Lines of output that an error quotes.
 const TAIL_LINES: usize = 12;
+
+/// Times that a busy program is tried again.
+const BUSY_RETRIES: u32 = 50;
 
 /// Kills the program when the caller unwinds, so that nothing goes on writing into a
 /// folder that nobody watches.
@@ -71,12 +75,21 @@ pub(crate) fn run(
 }
 
 /// What `command` prints on its standard output, if it succeeds.
+///
+/// A program that was written a moment ago may be refused as busy: another thread's
+/// child process has inherited the file while it was open and not let go of it yet.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
-    let output = command
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output()
-        .ok()?;
+    command.stdin(Stdio::null()).stderr(Stdio::null());
+    let busy = |error: &std::io::Error| error.kind() == ErrorKind::ExecutableFileBusy;
+    let mut output = command.output();
+    for _ in 0..BUSY_RETRIES {
+        if !output.as_ref().is_err_and(busy) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+        output = command.output();
+    }
+    let output = output.ok()?;
     output
         .status
         .success()
@@ -90,4 +103,71 @@ pub(crate) fn which(program: &str) -> Option<PathBuf> {
     std::env::split_paths(&path)
         .map(|folder| folder.join(&file))
         .find(|file| file.is_file())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::tests::scratch;
+
+    fn shell(script: &str) -> Command {
+        let mut command = Command::new("sh");
+        command.args(["-c", script]);
+        command
+    }
+
+    #[test]
+    fn a_failure_quotes_the_end_and_keeps_everything() {
+        let folder = scratch("process");
+        let log = folder.join("log");
+        let mut lines = 0;
+        let mut script = shell("for i in $(seq 40); do echo line $i; done; echo bad >&2; exit 3");
+        let error = run(&mut script, "the script", &log, |_| lines += 1)
+            .unwrap_err()
+            .to_string();
+        assert_eq!(lines, 41);
+        assert!(
+            error.contains("the script failed (exit status: 3)"),
+            "{error}"
+        );
+        assert!(
+            error.contains("line 40\n    bad") && !error.contains("line 20\n"),
+            "{error}"
+        );
+        assert!(
+            std::fs::read_to_string(&log)
+                .unwrap()
+                .starts_with("line 1\nline 2\n")
+        );
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn unwinding_ends_the_program() {
+        let folder = scratch("process");
+        let (log, file) = (folder.join("log"), folder.join("too-late"));
+        let mut script = shell("echo now; sleep 0.3; echo late > \"$0\"");
+        script.arg(&file);
+        let stopped = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            run(&mut script, "the script", &log, |_| {
+                panic!("stopped on purpose")
+            })
+        }));
+        assert!(stopped.is_err());
+        std::thread::sleep(Duration::from_millis(500));
+        assert!(!file.exists());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_named() {
+        let folder = scratch("process");
+        let mut command = Command::new("hankel-no-such-program");
+        let error = run(&mut command, "x", &folder.join("log"), |_| {})
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("hankel-no-such-program"), "{error}");
+        assert_eq!(output(&mut command), None);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

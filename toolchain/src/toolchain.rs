@@ -99,7 +99,14 @@ impl Toolchain {
                 return Err(format!("it has no {}", name.display()));
             }
         }
-        let Some(rustc_version) = version_of(&rustc) else {
+        // What is being installed has the same name each time, and often the same time stamp.
+        let staged = matches!(origin, Origin::Archive | Origin::Source);
+        let version = if staged {
+            ask_version(&rustc)
+        } else {
+            version_of(&rustc)
+        };
+        let Some(rustc_version) = version else {
             return Err("its bin/rustc does not run on this machine".to_owned());
         };
         let rust_gpu_version = rust_gpu_in(&rustc_version).unwrap_or("unknown").to_owned();
@@ -169,6 +176,11 @@ fn rust_gpu_in(version: &str) -> Option<&str> {
         .find(|c: char| !c.is_ascii_digit() && c != '.')
         .unwrap_or(rest.len());
     (end > 0).then(|| &rest[..end])
+}
+
+fn ask_version(rustc: &Path) -> Option<String> {
+    let version = process::output(Command::new(rustc).arg("--version"))?;
+    Some(version.trim().to_owned())
 }
 
 /// A program's file and its time stamp, and what it said.

@@ -105,6 +105,8 @@ fn download(work: &Path, progress: &mut dyn Progress) -> Result<PathBuf> {
         format!("Dir::State={}", apt.join("state").display()),
         format!("Dir::Cache={}", apt.join("cache").display()),
         "APT::Sandbox::User=root".to_owned(),
+        // A suite that cannot be reached is an error, not a warning.
+        "APT::Update::Error-Mode=any".to_owned(),
         "Acquire::Languages=none".to_owned(),
         "Acquire::Retries=2".to_owned(),
         "Acquire::http::Timeout=30".to_owned(),
@@ -113,10 +115,7 @@ fn download(work: &Path, progress: &mut dyn Progress) -> Result<PathBuf> {
     let wanted = format!("rust-src={DEBIAN_VERSION}");
     for arguments in [&["update"][..], &["download", &wanted]] {
         let mut command = Command::new("apt-get");
-        command
-            .current_dir(&apt)
-            .arg("--quiet")
-            .arg("--error-on=any");
+        command.current_dir(&apt).arg("--quiet");
         for setting in &settings {
             command.args(["-o", setting]);
         }
@@ -166,7 +165,9 @@ pub(super) fn unpack(package: &Path, work: &Path, tree: &Path) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::pick_mirror;
+    use super::*;
+    use crate::progress::Silent;
+    use crate::tests::scratch;
 
     #[test]
     fn the_mirror_is_debian_itself() {
@@ -177,5 +178,35 @@ mod tests {
             Some("http://mirror.example/debian/")
         );
         assert_eq!(pick_mirror("https://mirror.example/ubuntu/\n"), None);
+    }
+
+    #[test]
+    fn a_given_package_must_be_the_right_one() {
+        let folder = scratch("debian");
+        let file = folder.join("rust-src.deb");
+        fs::write(&file, "another").unwrap();
+        let options = Options {
+            rust_src: Some(file.clone()),
+            ..Options::default()
+        };
+        let error = package(&options, &folder, &mut Silent)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains(RUST_SRC_SHA256) && error.contains("rust-src.deb"),
+            "{error}"
+        );
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    #[ignore = "downloads 46 MB from a mirror of Debian"]
+    fn the_package_can_be_downloaded() {
+        let folder = scratch("debian");
+        let file = package(&Options::default(), &folder, &mut Silent).unwrap();
+        assert_eq!(file, folder.join("rust-src.deb"));
+        // The second time it is there already.
+        package(&Options::default(), &folder, &mut Silent).unwrap();
+        fs::remove_dir_all(folder).unwrap();
     }
 }

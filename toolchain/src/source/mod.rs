@@ -177,9 +177,11 @@ impl Build<'_> {
     fn cargo_online(&mut self, mut cargo: Command, step: &str, what: &str) -> Result<()> {
         let log = self.log(step);
         let progress = &mut *self.progress;
+        let mut downloaded = 0;
         process::run(&mut cargo, what, &log, |line| {
             if line.trim_start().starts_with("Downloaded ") {
-                progress.line(line.trim_start());
+                downloaded += 1;
+                progress.advance(downloaded, None);
             }
         })
         .map_err(|error| match error {
@@ -263,13 +265,11 @@ impl Build<'_> {
     }
 
     fn crates(&mut self) -> Result<()> {
-        let inputs = sha256::of_bytes([LOCK_FILE.as_bytes()]);
         // Cargo's cache is not ours: it is asked each time, and answers at once.
-        self.begin(4, "crates", "");
+        self.progress.step("crates", 4, STEPS);
         let mut cargo = self.cargo(&self.tree_folder());
         cargo.args(["fetch", "--locked", "--target", pinned::host()]);
-        self.cargo_online(cargo, "crates", "the crates that rustc depends on")?;
-        self.complete("crates", &inputs)
+        self.cargo_online(cargo, "crates", "the crates that rustc depends on")
     }
 
     /// Paths of this machine have no business in a file that is given to others.

@@ -271,3 +271,58 @@ pub(super) fn apply(tree: &Path) -> Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edited(text: &str) -> Edited {
+        Edited {
+            path: "some/file.rs".into(),
+            text: text.to_owned(),
+        }
+    }
+
+    #[test]
+    fn an_edit_applies_exactly_once_or_fails() {
+        let mut file = edited("one two two");
+        file.replace("one", "1").unwrap();
+        assert_eq!(file.text, "1 two two");
+        for (old, count) in [("two", "2 times"), ("three", "0 times")] {
+            let error = file.replace(old, "x").err().unwrap().to_string();
+            assert!(
+                error.contains("some/file.rs") && error.contains(count),
+                "{error}"
+            );
+        }
+        assert_eq!(file.text, "1 two two");
+    }
+
+    #[test]
+    fn a_span_is_replaced_with_both_its_ends() {
+        let mut file = edited("a {\n  b\n}\nc {\n}\n");
+        file.replace_span("a {", "\n}\n", "A\n").unwrap();
+        assert_eq!(file.text, "A\nc {\n}\n");
+        assert!(file.replace_span("d", "}", "").is_err());
+        assert!(file.replace_span("c", "end", "").is_err());
+    }
+
+    #[test]
+    fn crate_roots_and_manifests_are_read() {
+        let root = "#![feature(rustc_private)]\n#![cfg_attr(x, feature(y))]\nextern crate \
+                    rustc_abi;\nextern crate tracing;\nextern crate rustc_driver;\n";
+        assert_eq!(features(root), ["rustc_private"]);
+        let crates = linked_rustc_crates(root);
+        assert_eq!(
+            path_dependencies(&crates),
+            "[dependencies.rustc_abi]\npath = \"../rustc_abi\"\n\n\
+             [dependencies.rustc_driver]\npath = \"../rustc_driver_impl\"\n\
+             package = \"rustc_driver_impl\"\n\n"
+        );
+        let manifest = "[package]\nversion = \"1\"\n[dependencies]\n# comment\nlog = \"0.4\"\n\
+                        smallvec = { version = \"1.8\", features = [\"union\"] }\n\
+                        rustc_abi = { path = \"../rustc_abi\" }\n[features]\nx = \"y\"\n";
+        let found: Vec<_> = registry_dependencies(manifest).into_iter().collect();
+        assert_eq!(found, [("log", "0.4"), ("smallvec", "1.8")]);
+    }
+}
