@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::archive;
-use crate::cache::{Cache, Locked, Staging};
+use crate::cache::{Cache, Staging};
 use crate::error::{During, Error, Result};
 use crate::find::{self, Check};
 use crate::manifest::{MadeFrom, Manifest};
@@ -181,13 +181,6 @@ fn from_archive(
     })
 }
 
-/// A folder for logs and other things that need not stay.
-fn work_folder(lock: &Locked) -> Result<PathBuf> {
-    let work = lock.cache().build();
-    fs::create_dir_all(&work).during("create", &work)?;
-    Ok(work)
-}
-
 fn from_rustup(options: &Options, progress: &mut dyn Progress) -> Result<Toolchain> {
     let rustup = Rustup::usual().ok_or(Error::NoCacheFolder)?;
     if let Some(found) = rustup.find() {
@@ -195,7 +188,9 @@ fn from_rustup(options: &Options, progress: &mut dyn Progress) -> Result<Toolcha
         return Ok(found);
     }
     let lock = Cache::of(options)?.lock(progress)?;
-    rustup.install(&work_folder(&lock)?, progress)
+    // A log and a throw-away crate go there; nothing of it stays.
+    let work = lock.staging()?;
+    rustup.install(work.path(), progress)
 }
 
 fn from_source(options: &Options, progress: &mut dyn Progress) -> Result<Toolchain> {
@@ -206,7 +201,8 @@ fn from_source(options: &Options, progress: &mut dyn Progress) -> Result<Toolcha
         progress.line("it is built and installed already");
         return Ok(found);
     }
-    let work = work_folder(&lock)?;
+    let work = lock.cache().build();
+    fs::create_dir_all(&work).during("create", &work)?;
     let staging = lock.staging()?;
     source::build(options, &work, &staging, progress)?;
     let unusable = |why: String| Error::Damaged {

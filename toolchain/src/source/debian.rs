@@ -85,19 +85,16 @@ fn download(work: &Path, progress: &mut dyn Progress) -> Result<PathBuf> {
         fs::create_dir_all(&folder).during("create", &folder)?;
     }
     let sources = apt.join("suite.sources");
-    let signed = if Path::new(KEYRING).is_file() {
-        KEYRING
-    } else {
-        ""
+    let signed = match Path::new(KEYRING).is_file() {
+        true => format!(
+            "Signed-By: {KEYRING}
+"
+        ),
+        // Then apt looks among its trusted keys; our checksum is what counts.
+        false => String::new(),
     };
-    let text = format!(
-        "Types: deb\nURIs: {mirror}\nSuites: {DEBIAN_SUITE}\nComponents: main\n{}",
-        if signed.is_empty() {
-            String::new()
-        } else {
-            format!("Signed-By: {signed}\n")
-        }
-    );
+    let text =
+        format!("Types: deb\nURIs: {mirror}\nSuites: {DEBIAN_SUITE}\nComponents: main\n{signed}");
     fs::write(&sources, text).during("write", &sources)?;
     let settings = [
         format!("Dir::Etc::sourcelist={}", sources.display()),
