@@ -25,7 +25,7 @@ pub enum Method {
     Source,
 }
 
-/// The toolchain to use: what [`crate::find`] finds, but an archive that was given is
+/// The toolchain to use: what [`crate::find()`] finds, but an archive that was given is
 /// unpacked into the cache before rustup is looked at. Nothing else is installed.
 pub fn ensure(options: &Options, progress: &mut dyn Progress) -> Result<Toolchain> {
     if let Some(found) = find::explicit(options)? {

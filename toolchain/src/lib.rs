@@ -10,8 +10,8 @@
 //! 5. a build from source, from Debian's `rust-src` package and crates.io, into the
 //!    cache: see `source/mod.rs`.
 //!
-//! [`find`] says in milliseconds what can be used now. [`ensure`] also unpacks an archive
-//! that was given. [`install`] goes all the way, and [`status`] explains every way to
+//! [`find()`] says in milliseconds what can be used now. [`ensure`] also unpacks an archive
+//! that was given. [`install()`] goes all the way, and [`status()`] explains every way to
 //! people. [`pack`] makes an archive of an installed toolchain, for others or for CI.
 //!
 //! ```no_run

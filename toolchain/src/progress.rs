@@ -1,7 +1,7 @@
 //! How long work reports itself.
 
 /// Receives the progress of an installation. All calls come from the thread that
-/// called [`crate::install`] or [`crate::ensure`].
+/// called [`crate::install()`] or [`crate::ensure`].
 pub trait Progress {
     /// Step `index` of `count` begins; the first one has index 1.
     fn step(&mut self, name: &str, index: usize, count: usize);

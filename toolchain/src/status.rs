@@ -45,7 +45,7 @@ pub struct Way {
     pub toolchain: Option<Toolchain>,
 }
 
-/// What [`status`] found out. Prints as text for people; serialises for programs.
+/// What [`status()`] found out. Prints as text for people; serialises for programs.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct Status {
@@ -58,7 +58,7 @@ pub struct Status {
     /// The way whose compiler is used now; `None`: there is none, or the first one that
     /// there is cannot be used.
     pub used: Option<Origin>,
-    /// What [`crate::install`] would start with if it were not told a way.
+    /// What [`crate::install()`] would start with if it were not told a way.
     pub install_would_use: Option<Origin>,
     /// Every way, in the order in which they are tried.
     pub ways: Vec<Way>,

@@ -13,19 +13,21 @@
 //!
 //! | step | leaves | done again when |
 //! | --- | --- | --- |
-//! | `rust-src` | `rust-src.deb` | its checksum is wrong |
 //! | `rust-gpu` | `backend/` | rust-gpu's version changes |
-//! | `patch` | `tree/` | any of the edits or driver files change |
-//! | `crates` | cargo's registry cache | the lock file changes |
-//! | `compiler` | `target/` (cargo resumes by itself) | the tree or the bootstrap changes |
+//! | `tree` | `rust-src.deb`; `tree/`, patched | any of the edits or driver files change |
+//! | `crates` | crates in cargo's own cache | always: cargo knows what it has |
+//! | `compiler` | `target/`, which cargo resumes | the tree or the bootstrap changes |
 //! | `std` | `std/` | the compiler changes |
 //! | `sysroot` | the finished toolchain | |
+//!
+//! A step is complete when its file in `stamps/` holds a checksum of what went into it.
 
 mod bootstrap;
 mod debian;
 mod patch;
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -48,7 +50,7 @@ const RUSTC_FOR_STD: &str = include_str!("../../driver/rustc-for-std.sh");
 /// Disk space that the build takes at its fullest, with some to spare.
 const SPACE: u64 = 3_200_000_000;
 
-const STEPS: usize = 7;
+const STEPS: usize = 6;
 
 /// Everything but the bootstrap compiler that the result depends on, as a checksum.
 pub(crate) fn recipe() -> String {
@@ -125,14 +127,20 @@ impl Build<'_> {
     }
 
     /// Announces a step; says whether an earlier run completed it with the same inputs.
-    fn begin(&mut self, index: usize, name: &str, inputs: &str) -> bool {
+    /// If not, the stamp goes: from now on what the step leaves is incomplete.
+    fn begin(&mut self, index: usize, name: &str, inputs: &str) -> Result<bool> {
         self.progress.step(name, index, STEPS);
         let stamp = self.work.join("stamps").join(name);
-        let done = fs::read_to_string(stamp).is_ok_and(|text| text == inputs);
-        if done {
-            self.progress.line("done by an earlier run");
+        match fs::read_to_string(&stamp) {
+            Ok(text) if text == inputs => {
+                self.progress.line("done by an earlier run");
+                return Ok(true);
+            }
+            Ok(_) => fs::remove_file(&stamp).during("remove", &stamp)?,
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error).during("read", &stamp),
         }
-        done
+        Ok(false)
     }
 
     fn complete(&self, name: &str, inputs: &str) -> Result<()> {
@@ -200,7 +208,7 @@ impl Build<'_> {
     fn backend(&mut self) -> Result<()> {
         let inputs = pinned::RUST_GPU_VERSION;
         let copy = self.work.join("backend");
-        if self.begin(1, "rust-gpu", inputs) && copy.is_dir() {
+        if self.begin(1, "rust-gpu", inputs)? && copy.is_dir() {
             return Ok(());
         }
         let fetch = self.work.join("fetch");
@@ -243,30 +251,30 @@ impl Build<'_> {
     fn tree(&mut self) -> Result<()> {
         let inputs = recipe();
         let tree = self.tree_folder();
-        self.progress.step("rust-src", 2, STEPS);
-        let stamp = self.work.join("stamps/patch");
-        let done = fs::read_to_string(stamp).is_ok_and(|text| text == inputs) && tree.is_dir();
-        if done {
-            self.progress.line("done by an earlier run");
-        } else {
-            let package = debian::package(self.options, self.work, self.progress)?;
-            debian::unpack(&package, self.work, &tree)?;
-        }
-        if self.begin(3, "patch", &inputs) && done {
+        if self.begin(2, "tree", &inputs)? && tree.is_dir() {
             return Ok(());
         }
+        // What was compiled from another tree: cargo goes by time stamps, and a file that
+        // is no longer patched has an old one.
+        for compiled in ["target", "std"].map(|name| self.work.join(name)) {
+            if compiled.exists() {
+                fs::remove_dir_all(&compiled).during("remove", &compiled)?;
+            }
+        }
+        let package = debian::package(self.options, self.work, self.progress)?;
+        debian::unpack(&package, self.work, &tree)?;
         copy_tree(
             &self.work.join("backend"),
             &tree.join("compiler/rustc_codegen_spirv"),
             &[],
         )?;
         patch::apply(&tree)?;
-        self.complete("patch", &inputs)
+        self.complete("tree", &inputs)
     }
 
     fn crates(&mut self) -> Result<()> {
         // Cargo's cache is not ours: it is asked each time, and answers at once.
-        self.progress.step("crates", 4, STEPS);
+        self.progress.step("crates", 3, STEPS);
         let mut cargo = self.cargo(&self.tree_folder());
         cargo.args(["fetch", "--locked", "--target", pinned::host()]);
         self.cargo_online(cargo, "crates", "the crates that rustc depends on")
@@ -292,7 +300,7 @@ impl Build<'_> {
 
     fn compiler(&mut self) -> Result<()> {
         let inputs = self.compiler_inputs();
-        if self.begin(5, "compiler", &inputs) && self.compiler_file().is_file() {
+        if self.begin(4, "compiler", &inputs)? && self.compiler_file().is_file() {
             return Ok(());
         }
         let release = format!("{}-nightly", pinned::RUST_VERSION);
@@ -371,7 +379,7 @@ impl Build<'_> {
     /// in the tree, so there is nothing to download.
     fn std(&mut self) -> Result<()> {
         let inputs = self.compiler_inputs();
-        if self.begin(6, "std", &inputs) && self.std_folder().is_dir() {
+        if self.begin(5, "std", &inputs)? && self.std_folder().is_dir() {
             return Ok(());
         }
         let target = self.work.join("std");
