@@ -9,6 +9,10 @@ const ENTRY_POINT: u16 = 15;
 const CAPABILITY: u16 = 17;
 /// `OpSpecConstant`.
 const SPEC_CONSTANT: u16 = 50;
+/// `OpFunction`.
+const FUNCTION: u16 = 54;
+/// `OpFunctionEnd`.
+const FUNCTION_END: u16 = 56;
 /// `OpDecorate`.
 const DECORATE: u16 = 71;
 
@@ -80,8 +84,12 @@ pub struct Summary {
 pub fn summary(words: &[u32]) -> Result<Summary, String> {
     let mut found = Summary::default();
     let mut numbers = std::collections::BTreeMap::<u32, (u32, Option<u32>)>::new();
+    let (mut functions, mut open) = (0, false);
     for i in instructions(words)? {
         match (i.opcode, i.operands) {
+            (FUNCTION, _) if !open => open = true,
+            (FUNCTION, _) => return Err("a function begins inside another".into()),
+            (FUNCTION_END, _) => (functions, open) = (functions + 1, false),
             (ENTRY_POINT, [model, _, name @ ..]) => {
                 found.entry_points.push((*model, string(name)));
             }
@@ -96,6 +104,9 @@ pub fn summary(words: &[u32]) -> Result<Summary, String> {
             }
             _ => {}
         }
+    }
+    if open || functions < found.entry_points.len() {
+        return Err("it ends before its functions do".into());
     }
     found.bindings = numbers
         .values()
@@ -179,6 +190,8 @@ mod tests {
         op(DECORATE, &[8, BINDING, 2]);
         op(DECORATE, &[8, DESCRIPTOR_SET, 0]);
         op(SPEC_CONSTANT, &[9, 7, 41]);
+        op(FUNCTION, &[2, 1, 0, 3]);
+        op(FUNCTION_END, &[]);
         w
     }
 
@@ -193,11 +206,10 @@ mod tests {
     #[test]
     fn what_is_cut_short_is_refused() {
         let w = module();
-        assert!(
-            summary(&w[..w.len() - 1])
-                .unwrap_err()
-                .contains("past the end")
-        );
+        let cut = |n: usize| summary(&w[..w.len() - n]).unwrap_err();
+        assert!(cut(1).contains("before its functions do"));
+        assert!(cut(2).contains("past the end"));
+        assert!(cut(6).contains("before its functions do"));
         assert!(summary(&[1, 2, 3, 4, 5]).is_err());
         assert!(summary(&[]).is_err());
         let mut zero = module();
@@ -208,8 +220,12 @@ mod tests {
     #[test]
     fn a_constant_is_changed_by_its_number() {
         let w = specialise(&module(), &[(3, 5), (4, 6)]).unwrap();
-        assert_eq!(w.last(), Some(&5));
-        assert_eq!(w[..w.len() - 1], module()[..w.len() - 1]);
+        let at = w.len() - 7;
+        assert_eq!((module()[at], w[at]), (41, 5));
+        assert_eq!(
+            (&w[..at], &w[at + 1..]),
+            (&module()[..at], &module()[at + 1..])
+        );
     }
 
     #[test]

@@ -1,0 +1,745 @@
+//! Both devices do the same with the same kernels, and refuse the same mistakes. Without a Vulkan
+//! driver these tests fail, with the message that says how to get one.
+
+mod common;
+
+use common::*;
+use hankel_dsl::native::describe::*;
+use hankel_dsl::native::{Address, Filter, Sampler};
+use hankel_host::device::{
+    Bind, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, NativeDevice, Pass, Program,
+    Shader, TextureShape, Topology,
+};
+
+const NEAREST: Sampler = Sampler {
+    filter: Filter::Nearest,
+    address: Address::ClampToEdge,
+};
+
+fn bytes<T: bytemuck::NoUninit>(values: &[T]) -> Vec<u8> {
+    bytemuck::cast_slice(values).to_vec()
+}
+
+fn f32s(bytes: &[u8]) -> Vec<f32> {
+    bytemuck::pod_collect_to_vec(bytes)
+}
+
+/// Runs `affine` over `pairs`.
+fn affine_on(device: &mut dyn Device, program: &Program<'_>, pairs: &[f32]) -> Vec<f32> {
+    let input = device.buffer_from("pairs", &bytes(pairs)).unwrap();
+    let out = device.buffer("out", pairs.len() / 2 * 4).unwrap();
+    let settings = bytes(&[3.0f32, -0.1]);
+    device
+        .dispatch(
+            program,
+            &[
+                Bind::Bytes(&settings),
+                Bind::Buffer(input),
+                Bind::Buffer(out),
+            ],
+        )
+        .unwrap();
+    let result = f32s(&device.read_buffer(out).unwrap());
+    device.free_buffer(input).unwrap();
+    device.free_buffer(out).unwrap();
+    result
+}
+
+#[test]
+fn a_map_gives_the_same_bits_every_way() {
+    let kernel = affine();
+    let pairs: Vec<f32> = (0..2000)
+        .map(|i| (i as f32 * 0.37).sin() * 1e3 + 1.5)
+        .collect();
+    let expected = affine_on(&mut NativeDevice::new(), &kernel.program(Way::Wgsl), &pairs);
+    assert_eq!(expected[3], (pairs[6] * 3.0 - 0.1) / pairs[7]);
+    let mut gpu = vulkan();
+    for way in WAYS {
+        let got = affine_on(&mut gpu, &kernel.program(way), &pairs);
+        let bits = |v: &[f32]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&got), bits(&expected), "{way:?}");
+    }
+}
+
+#[test]
+fn doubles_run_on_both() {
+    let kernel = double();
+    let x: Vec<f64> = (0..100).map(|i| f64::from(i) * 0.1).collect();
+    let table = bytes(&[1e-9f64, 2.0, -3.5]);
+    let mut results = Vec::new();
+    let run = |device: &mut dyn Device, way: Way| {
+        let out = device.buffer("out", 800).unwrap();
+        device
+            .dispatch(
+                &kernel.program(way),
+                &[
+                    Bind::Bytes(&bytes(&x)),
+                    Bind::Bytes(&table),
+                    Bind::Buffer(out),
+                ],
+            )
+            .unwrap();
+        device.read_buffer(out).unwrap()
+    };
+    results.push(run(&mut NativeDevice::new(), Way::Wgsl));
+    let mut gpu = vulkan();
+    results.extend(WAYS.map(|way| run(&mut gpu, way)));
+    assert!(results.iter().all(|r| *r == results[0]));
+    assert_eq!(
+        bytemuck::pod_collect_to_vec::<u8, f64>(&results[0])[4],
+        0.4f64.sqrt() + 2.0
+    );
+}
+
+#[test]
+fn atomics_and_workgroups_run_on_both() {
+    let values: Vec<u32> = (0..1000u32)
+        .map(|i| i.wrapping_mul(2_654_435_761) >> 7)
+        .collect();
+    let (bins, sums) = (histogram(), sums());
+    let mut results = Vec::new();
+    let mut run = |device: &mut dyn Device, way: Way| {
+        let input = device.buffer_from("values", &bytes(&values)).unwrap();
+        let counts = device.buffer_from("counts", &bytes(&[5u32; 16])).unwrap();
+        let out = device.buffer("out", 1000usize.div_ceil(64) * 4).unwrap();
+        device
+            .dispatch(
+                &bins.program(way),
+                &[Bind::Buffer(input), Bind::Buffer(counts)],
+            )
+            .unwrap();
+        device
+            .dispatch(
+                &sums.program(way),
+                &[Bind::Buffer(input), Bind::Buffer(out)],
+            )
+            .unwrap();
+        results.push((
+            device.read_buffer(counts).unwrap(),
+            device.read_buffer(out).unwrap(),
+        ));
+    };
+    run(&mut NativeDevice::new(), Way::Wgsl);
+    let mut gpu = vulkan();
+    for way in WAYS {
+        run(&mut gpu, way);
+    }
+    assert!(results.iter().all(|r| *r == results[0]));
+    let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&results[0].0);
+    assert_eq!(counts.iter().sum::<u32>(), 1000 + 16 * 5);
+}
+
+#[test]
+fn textures_run_on_both() {
+    let kernel = image();
+    let samples: Vec<f32> = (0..12 * 9 * 4).map(|i| i as f32 / 450.0).collect();
+    let volume: Vec<u8> = (0..32).map(|i| i * 8 + 3).collect();
+    let mut results = Vec::new();
+    let mut run = |device: &mut dyn Device, way: Way| {
+        let shape = TextureShape::d2(12, 9, TexelFormat::R32Float).multisampled(4);
+        let ms = device
+            .texture_from("samples", &shape, &bytes(&samples))
+            .unwrap();
+        assert_eq!(device.read_texture(ms).unwrap(), bytes(&samples));
+        let shape = TextureShape::d3([2, 2, 2], TexelFormat::Rgba8Unorm);
+        let cube = device.texture_from("volume", &shape, &volume).unwrap();
+        assert_eq!(device.read_texture(cube).unwrap(), volume);
+        let out = device
+            .texture("out", &TextureShape::d2(12, 9, TexelFormat::Rgba16Unorm))
+            .unwrap();
+        let args = [
+            Bind::Texture(ms),
+            Bind::Texture(cube),
+            Bind::Sampler(NEAREST),
+            Bind::Texture(out),
+        ];
+        device.dispatch(&kernel.program(way), &args).unwrap();
+        results.push(device.read_texture(out).unwrap());
+    };
+    run(&mut NativeDevice::new(), Way::Wgsl);
+    let mut gpu = vulkan();
+    for way in WAYS {
+        run(&mut gpu, way);
+    }
+    assert!(results.iter().all(|r| *r == results[0]));
+    assert!(results[0].iter().any(|&b| b != 0));
+}
+
+/// A triangle over the whole target, and one over its left half, in front.
+fn draw_two(gpu: &mut dyn Device, way: Way, samples: u32) -> (Vec<f32>, Vec<f32>) {
+    let (place, tint) = (place(), tint());
+    let corner = |x: f32, z: f32| [-1.0, -1.0, z, x, -1.0, z, -1.0, x, z];
+    let back = gpu.buffer_from("back", &bytes(&corner(3.0, 0.75))).unwrap();
+    let front = gpu
+        .buffer_from("front", &bytes(&corner(1.0, 0.25)))
+        .unwrap();
+    let red = gpu
+        .buffer_from("red", &bytes(&[1.0f32, 0.0, 0.0, 1.0].repeat(3)))
+        .unwrap();
+    let blue = gpu
+        .buffer_from("blue", &bytes(&[0.0f32, 0.0, 1.0, 1.0].repeat(3)))
+        .unwrap();
+    let indices = gpu.buffer_from("indices", &bytes(&[0u32, 1, 2])).unwrap();
+    let flat = TextureShape::d2(8, 8, TexelFormat::Rgba32Float);
+    let single = gpu.texture("single", &flat).unwrap();
+    let many = gpu
+        .texture(
+            "colour",
+            &TextureShape::d2(8, 8, TexelFormat::Rgba16Float).multisampled(samples),
+        )
+        .unwrap();
+    let resolved = gpu
+        .texture(
+            "resolved",
+            &TextureShape::d2(8, 8, TexelFormat::Rgba16Float),
+        )
+        .unwrap();
+    let depth = gpu
+        .texture("depth", &TextureShape::depth(8, 8).multisampled(samples))
+        .unwrap();
+    let (zero, half) = (bytes(&[0.0f32]), bytes(&[0.5f32]));
+    let draw = |position, colour, indices| {
+        [
+            Bind::Bytes(&zero),
+            Bind::Buffer(position),
+            Bind::Buffer(colour),
+        ]
+        .map(|b| (b, indices))
+    };
+    let front_args = draw(front, blue, ()).map(|(b, ())| b);
+    let back_args = draw(back, red, ()).map(|(b, ())| b);
+    let fragment_args = [Bind::Bytes(&half)];
+    let call = |vertex_args, indices| Draw {
+        vertex: place.program(way),
+        vertex_args,
+        fragment: Some(tint.program(way)),
+        fragment_args: &fragment_args,
+        indices,
+        count: 3,
+        topology: Topology::Triangles,
+        cull: Cull::Back,
+    };
+    // The nearer triangle is drawn first: only the depth buffer keeps it.
+    let draws = [
+        call(&front_args[..], None),
+        call(&back_args[..], Some(indices)),
+    ];
+    let colour = if samples == 1 {
+        Colour {
+            texture: single,
+            resolve: None,
+            clear: Some([0.0; 4]),
+        }
+    } else {
+        Colour {
+            texture: many,
+            resolve: Some(resolved),
+            clear: Some([0.0; 4]),
+        }
+    };
+    gpu.draw(&Pass {
+        label: "two triangles",
+        colours: &[colour],
+        depth: Some(Depth {
+            texture: depth,
+            clear: Some(1.0),
+            test: DepthTest::Less,
+            write: true,
+        }),
+        draws: &draws,
+    })
+    .unwrap();
+    let texels = if samples == 1 {
+        f32s(&gpu.read_texture(single).unwrap())
+    } else {
+        let bytes = gpu.read_texture(resolved).unwrap();
+        bytes
+            .chunks(8)
+            .flat_map(|t| TexelFormat::Rgba16Float.load(t).to_array())
+            .collect()
+    };
+    (texels, f32s(&gpu.read_texture(depth).unwrap()))
+}
+
+#[test]
+fn triangles_are_drawn_with_depth_samples_and_both_descriptor_sets() {
+    let mut gpu = vulkan();
+    for way in WAYS {
+        let (texels, depth) = draw_two(&mut gpu, way, 1);
+        // Bottom left is the nearer, blue; top right the farther, red. Row 0 is the top.
+        let at = |x: usize, y: usize| &texels[(y * 8 + x) * 4..][..4];
+        assert_eq!(at(0, 7), [0.0, 0.0, 1.0, 1.0], "{way:?}");
+        assert_eq!(at(7, 0), [1.0, 0.0, 0.0, 1.0], "{way:?}");
+        assert_eq!((depth[7 * 8], depth[7]), (0.25, 0.75), "{way:?}");
+        let (texels, depth) = draw_two(&mut gpu, way, 4);
+        assert_eq!(depth.len(), 8 * 8 * 4);
+        // The edge runs through the pixels of the diagonal: a mean of the two.
+        let edge = &texels[(3 * 8 + 3) * 4..][..4];
+        assert!(
+            edge[0] > 0.0 && edge[2] > 0.0 && edge[0] + edge[2] == 1.0,
+            "{way:?} {edge:?}"
+        );
+    }
+}
+
+#[test]
+fn stages_run_natively_over_arrays() {
+    let mut cpu = NativeDevice::new();
+    let (place, tint) = (place(), tint());
+    let (at, varying) = (
+        cpu.buffer("at", 32).unwrap(),
+        cpu.buffer("varying", 32).unwrap(),
+    );
+    let positions = bytes(&[1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let colours = bytes(&[1.0f32; 8]);
+    let shift = bytes(&[0.5f32]);
+    cpu.dispatch(
+        &place.program(Way::Wgsl),
+        &[
+            Bind::Bytes(&shift),
+            Bind::Bytes(&positions),
+            Bind::Bytes(&colours),
+            Bind::Buffer(at),
+            Bind::Buffer(varying),
+        ],
+    )
+    .unwrap();
+    let out = cpu.buffer("out", 32).unwrap();
+    cpu.dispatch(
+        &tint.program(Way::Wgsl),
+        &[
+            Bind::Bytes(&shift),
+            Bind::Buffer(varying),
+            Bind::Buffer(out),
+        ],
+    )
+    .unwrap();
+    assert_eq!(
+        f32s(&cpu.read_buffer(at).unwrap()),
+        [1.5, 2.0, 3.0, 1.0, 4.5, 5.0, 6.0, 1.0]
+    );
+    assert_eq!(f32s(&cpu.read_buffer(out).unwrap()), [1.0; 8]);
+    let error = cpu.draw(&Pass {
+        label: "none",
+        colours: &[],
+        depth: None,
+        draws: &[],
+    });
+    assert!(error.unwrap_err().to_string().contains("no rasteriser"));
+}
+
+/// What both devices say to a call of `affine` with these arguments.
+fn refusals(make: impl Fn(&mut dyn Device) -> Result<(), DeviceError>) -> Vec<String> {
+    let devices: [Box<dyn Device>; 2] = [Box::new(NativeDevice::new()), Box::new(vulkan())];
+    devices
+        .into_iter()
+        .map(|mut d| make(d.as_mut()).unwrap_err().to_string())
+        .collect()
+}
+
+#[test]
+fn wrong_arguments_are_named_before_anything_runs() {
+    let kernel = affine();
+    let program = kernel.program(Way::Wgsl);
+    let settings = bytes(&[1.0f32, 2.0]);
+    let pairs = bytes(&[1.0f32; 8]);
+    let check = |words: &[&str], make: &dyn Fn(&mut dyn Device) -> Result<(), DeviceError>| {
+        for text in refusals(make) {
+            assert!(text.contains("`affine`"), "{text}");
+            for word in words {
+                assert!(text.contains(word), "{text} lacks {word}");
+            }
+        }
+    };
+    check(
+        &["3 arguments (settings, pair, output)", "1 were given"],
+        &|d| d.dispatch(&program, &[Bind::Bytes(&settings)]),
+    );
+    check(
+        &["`settings` (binding 0)", "4 bytes", "`Settings` has 8"],
+        &|d| {
+            let out = d.buffer("out", 4)?;
+            d.dispatch(
+                &program,
+                &[Bind::Bytes(&[0; 4]), Bind::Bytes(&pairs), Bind::Buffer(out)],
+            )
+        },
+    );
+    check(
+        &["`pair` (binding 1)", "12 bytes are no whole number"],
+        &|d| {
+            let out = d.buffer("out", 4)?;
+            d.dispatch(
+                &program,
+                &[
+                    Bind::Bytes(&settings),
+                    Bind::Bytes(&pairs[..12]),
+                    Bind::Buffer(out),
+                ],
+            )
+        },
+    );
+    check(
+        &["`pair` (binding 1)", "4 elements, but 5 invocations"],
+        &|d| {
+            let out = d.buffer("out", 20)?;
+            d.dispatch(
+                &program,
+                &[
+                    Bind::Bytes(&settings),
+                    Bind::Bytes(&pairs),
+                    Bind::Buffer(out),
+                ],
+            )
+        },
+    );
+    check(&["`output` (binding 2)", "must be a buffer"], &|d| {
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Bytes(&pairs),
+            Bind::Bytes(&[0; 4]),
+        ];
+        d.dispatch(&program, &args)
+    });
+    check(&["`pair` (binding 1)", "must be a buffer or bytes"], &|d| {
+        let out = d.buffer("out", 4)?;
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Sampler(NEAREST),
+            Bind::Buffer(out),
+        ];
+        d.dispatch(&program, &args)
+    });
+    check(&["`output` (binding 2)", "also given as `pair`"], &|d| {
+        let both = d.buffer("both", 16)?;
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Buffer(both),
+            Bind::Buffer(both),
+        ];
+        d.dispatch(&program, &args)
+    });
+    check(&["0 constants", "2 were given"], &|d| {
+        let out = d.buffer("out", 4)?;
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Bytes(&pairs),
+            Bind::Buffer(out),
+        ];
+        d.dispatch(
+            &Program {
+                constants: &[1, 2],
+                ..program
+            },
+            &args,
+        )
+    });
+}
+
+#[test]
+fn textures_of_another_shape_are_refused() {
+    let kernel = image();
+    let program = kernel.program(Way::Wgsl);
+    let try_with = |samples: u32, dimensions: u32, format: TexelFormat| {
+        refusals(|d| {
+            let shape = TextureShape::d2(4, 4, TexelFormat::R32Float).multisampled(samples);
+            let ms = d.texture("ms", &shape)?;
+            let shape = if dimensions == 3 {
+                TextureShape::d3([2, 2, 2], TexelFormat::Rgba8Unorm)
+            } else {
+                TextureShape::d2(2, 2, TexelFormat::Rgba8Unorm)
+            };
+            let volume = d.texture("volume", &shape)?;
+            let out = d.texture("out", &TextureShape::d2(4, 4, format))?;
+            d.dispatch(
+                &program,
+                &[
+                    Bind::Texture(ms),
+                    Bind::Texture(volume),
+                    Bind::Sampler(NEAREST),
+                    Bind::Texture(out),
+                ],
+            )
+        })
+    };
+    for (texts, words) in [
+        (
+            try_with(1, 3, TexelFormat::Rgba16Unorm),
+            ["`samples` (binding 0)", "one sample"],
+        ),
+        (
+            try_with(4, 2, TexelFormat::Rgba16Unorm),
+            ["`volume` (binding 1)", "2 dimensions, not 3"],
+        ),
+        (
+            try_with(4, 3, TexelFormat::Rgba32Float),
+            [
+                "`output` (binding 3)",
+                "rgba32float, but the kernel writes rgba16unorm",
+            ],
+        ),
+    ] {
+        for text in texts {
+            assert!(words.iter().all(|w| text.contains(w)), "{text}");
+        }
+    }
+}
+
+#[test]
+fn stale_and_foreign_handles_are_refused() {
+    for mut device in [
+        Box::new(NativeDevice::new()) as Box<dyn Device>,
+        Box::new(vulkan()),
+    ] {
+        let buffer = device.buffer("b", 16).unwrap();
+        let foreign = NativeDevice::new().buffer("other", 16).unwrap();
+        assert!(matches!(
+            device.read_buffer(foreign),
+            Err(DeviceError::Handle { .. })
+        ));
+        let long = device
+            .write_buffer(buffer, &[0; 17])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            long.contains("17 bytes were given, but it has 16"),
+            "{long}"
+        );
+        device.free_buffer(buffer).unwrap();
+        assert!(matches!(
+            device.read_buffer(buffer),
+            Err(DeviceError::Handle { .. })
+        ));
+        let shape = TextureShape::d2(4, 4, TexelFormat::R32Float).multisampled(3);
+        assert!(
+            device
+                .texture("odd", &shape)
+                .unwrap_err()
+                .to_string()
+                .contains("1 or 4")
+        );
+        let shape = TextureShape::d2(0, 4, TexelFormat::R32Float);
+        assert!(device.texture("empty", &shape).is_err());
+    }
+}
+
+#[test]
+fn buffers_of_odd_sizes_come_back_whole() {
+    for mut device in [
+        Box::new(NativeDevice::new()) as Box<dyn Device>,
+        Box::new(vulkan()),
+    ] {
+        for n in [0usize, 1, 3, 5, 17] {
+            let content: Vec<u8> = (1..=n as u8).collect();
+            let b = device.buffer_from("odd", &content).unwrap();
+            assert_eq!(device.read_buffer(b).unwrap(), content);
+        }
+    }
+}
+
+#[test]
+fn too_much_is_refused_with_the_limit() {
+    let mut gpu = vulkan();
+    let wide = TextureShape::d2(1 << 20, 1, TexelFormat::R32Float);
+    let text = gpu.texture("wide", &wide).unwrap_err().to_string();
+    assert!(
+        text.contains("width of texture `wide`") && text.contains("1048576"),
+        "{text}"
+    );
+    let kernel = affine();
+    let most = gpu.max_storage_bytes();
+    if let Ok(big) = usize::try_from(most + 8)
+        && most <= 1 << 28
+    {
+        let input = gpu.buffer("big", big).unwrap();
+        let out = gpu.buffer("out", 4).unwrap();
+        let settings = bytes(&[1.0f32, 0.0]);
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Buffer(input),
+            Bind::Buffer(out),
+        ];
+        let error = gpu.dispatch(&kernel.program(Way::Wgsl), &args).unwrap_err();
+        assert!(matches!(error, DeviceError::Limit { .. }), "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("`affine`") && text.contains("`pair` (binding 1)"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn bad_code_is_refused_with_the_kernels_name() {
+    let kernel = affine();
+    let mut gpu = vulkan();
+    let settings = bytes(&[1.0f32, 0.0]);
+    let pairs = bytes(&[1.0f32; 2]);
+    let mut refuse = |shader: Option<Shader<'_>>| {
+        let out = gpu.buffer("out", 4).unwrap();
+        let program = Program {
+            shader,
+            ..kernel.program(Way::Wgsl)
+        };
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Bytes(&pairs),
+            Bind::Buffer(out),
+        ];
+        let text = gpu.dispatch(&program, &args).unwrap_err().to_string();
+        assert!(text.contains("`affine`"), "{text}");
+        text
+    };
+    assert!(refuse(None).contains("without a shader"));
+    let text = refuse(Some(Shader::Wgsl {
+        text: "fn oops(",
+        entry_point: "affine",
+    }));
+    assert!(text.contains("loading kernel"), "{text}");
+    let text = refuse(Some(Shader::Wgsl {
+        text: &kernel.wgsl,
+        entry_point: "other",
+    }));
+    assert!(text.contains("other"), "{text}");
+    // Another kernel's module under this one's name.
+    let other = double();
+    for shader in [
+        Shader::SpirvPassthrough(&other.spirv),
+        Shader::SpirvThroughNaga(&other.spirv),
+    ] {
+        assert!(refuse(Some(shader)).contains("affine"));
+    }
+    let cut = &kernel.spirv[..kernel.spirv.len() / 2 + 1];
+    for words in [cut, &[][..], &[0x0723_0203, 1, 2, 3, 4, 0][..]] {
+        refuse(Some(Shader::SpirvPassthrough(words)));
+        refuse(Some(Shader::SpirvThroughNaga(words)));
+    }
+    // A binding that the description does not have.
+    let moved = kernel.wgsl.replace("@binding(2)", "@binding(9)");
+    let words = spirv(&moved);
+    assert!(refuse(Some(Shader::SpirvPassthrough(&words))).contains("binds 9"));
+    refuse(Some(Shader::SpirvThroughNaga(&words)));
+    // The device still works.
+    assert_eq!(
+        affine_on(&mut gpu, &kernel.program(Way::Naga), &[2.0, 4.0]),
+        [1.475]
+    );
+}
+
+#[test]
+fn a_lost_device_says_so() {
+    let mut gpu = vulkan();
+    let buffer = gpu.buffer("b", 16).unwrap();
+    gpu.destroy();
+    let error = gpu.read_buffer(buffer).unwrap_err();
+    assert!(matches!(error, DeviceError::Lost { .. }), "{error}");
+    assert!(matches!(gpu.buffer("c", 16), Err(DeviceError::Lost { .. })));
+}
+
+#[test]
+fn passes_whose_parts_do_not_fit_are_refused() {
+    let mut gpu = vulkan();
+    let (place, tint) = (place(), tint());
+    let positions = bytes(&[0.0f32; 9]);
+    let colours = bytes(&[0.0f32; 12]);
+    let factor = bytes(&[1.0f32]);
+    let a = gpu
+        .texture("a", &TextureShape::d2(8, 8, TexelFormat::Rgba32Float))
+        .unwrap();
+    let uint = gpu
+        .texture("uint", &TextureShape::d2(8, 8, TexelFormat::Rgba32Uint))
+        .unwrap();
+    let deep = gpu.texture("deep", &TextureShape::depth(4, 4)).unwrap();
+    let vertex_args = [
+        Bind::Bytes(&factor),
+        Bind::Bytes(&positions),
+        Bind::Bytes(&colours),
+    ];
+    let fragment_args = [Bind::Bytes(&factor)];
+    let draw = Draw {
+        vertex: place.program(Way::Naga),
+        vertex_args: &vertex_args,
+        fragment: Some(tint.program(Way::Naga)),
+        fragment_args: &fragment_args,
+        indices: None,
+        count: 3,
+        topology: Topology::Triangles,
+        cull: Cull::None,
+    };
+    let target = |texture| Colour {
+        texture,
+        resolve: None,
+        clear: Some([0.0; 4]),
+    };
+    let mut refuse = |colours: &[Colour], depth, draw: Draw<'_>| {
+        gpu.draw(&Pass {
+            label: "odd",
+            colours,
+            depth,
+            draws: &[draw],
+        })
+        .unwrap_err()
+        .to_string()
+    };
+    let text = refuse(&[], None, draw);
+    assert!(text.contains("neither"), "{text}");
+    let text = refuse(&[target(uint)], None, draw);
+    assert!(
+        text.contains("rgba32uint, but kernel `tint` writes floats"),
+        "{text}"
+    );
+    let text = refuse(&[target(a), target(uint)], None, draw);
+    assert!(text.contains("2 colour targets"), "{text}");
+    let depth = Depth {
+        texture: deep,
+        clear: None,
+        test: DepthTest::Always,
+        write: false,
+    };
+    let text = refuse(&[target(a)], Some(depth), draw);
+    assert!(text.contains("the depth buffer is 4x4"), "{text}");
+    let text = refuse(&[target(a)], None, Draw { count: 4, ..draw });
+    assert!(
+        text.contains("`position`") && text.contains("4 vertices"),
+        "{text}"
+    );
+    let text = refuse(
+        &[target(a)],
+        None,
+        Draw {
+            vertex: tint.program(Way::Naga),
+            ..draw
+        },
+    );
+    assert!(text.contains("`tint` is a fragment kernel"), "{text}");
+    let text = refuse(
+        &[target(a)],
+        None,
+        Draw {
+            fragment: None,
+            fragment_args: &[],
+            ..draw
+        },
+    );
+    assert!(text.contains("without a fragment kernel"), "{text}");
+    let mut other = common::tint();
+    other.kernel.params[1] = param(
+        "colour",
+        Role::Varying {
+            location: 3,
+            ty: vector(Scalar::F32, 4),
+        },
+    );
+    let text = refuse(
+        &[target(a)],
+        None,
+        Draw {
+            fragment: Some(other.program(Way::Naga)),
+            ..draw
+        },
+    );
+    assert!(
+        text.contains("location 3") && text.contains("does not make"),
+        "{text}"
+    );
+}
