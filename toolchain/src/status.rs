@@ -55,8 +55,8 @@ pub struct Status {
     pub rust_gpu_version: String,
     /// Folder of installed toolchains.
     pub cache: Option<PathBuf>,
-    /// The way whose compiler is used now; `None`: there is none, or the first one that
-    /// there is cannot be used.
+    /// The way whose compiler [`crate::ensure`] would use; `None`: there is none, or the
+    /// first one that there is cannot be used.
     pub used: Option<Origin>,
     /// What [`crate::install()`] would start with if it were not told a way.
     pub install_would_use: Option<Origin>,
@@ -204,17 +204,16 @@ pub fn status(options: &Options) -> Status {
             .find(|way| way.origin == origin)
             .map(|way| way.state)
     };
-    // The first that is not merely absent decides, as in `find`.
-    let used = match (
-        state(Origin::ExplicitPath),
-        state(Origin::Cache),
-        state(Origin::Rustup),
-    ) {
-        (Some(State::Usable), ..) => Some(Origin::ExplicitPath),
-        (Some(State::Absent), Some(State::Usable), _) => Some(Origin::Cache),
-        (Some(State::Absent), Some(State::Absent), Some(State::Usable)) => Some(Origin::Rustup),
-        _ => None,
-    };
+    // The first that is not merely absent decides, as in `ensure`.
+    let order = [Origin::ExplicitPath, Origin::Cache, Origin::Archive];
+    let first = order
+        .into_iter()
+        .find(|origin| state(*origin) != Some(State::Absent));
+    let used = Some(first.unwrap_or(Origin::Rustup)).filter(|origin| match state(*origin) {
+        Some(State::Usable) => true,
+        Some(State::Installable) => *origin == Origin::Archive,
+        _ => false,
+    });
     let installable = ways.iter().find(|way| way.state == State::Installable);
     Status {
         host: pinned::host().to_owned(),
@@ -259,6 +258,12 @@ impl fmt::Display for Status {
             }
         }
         match (self.used, self.install_would_use) {
+            (Some(Origin::Archive), _) => {
+                write!(
+                    f,
+                    "used: archive, which is unpacked when it is first needed"
+                )
+            }
             (Some(origin), _) => write!(f, "used: {}", origin.name()),
             (None, Some(origin)) => write!(
                 f,

@@ -101,6 +101,12 @@ fn an_archive_comes_before_rustup_and_source() {
     };
     let answer = status(&options);
     assert_eq!(answer.ways[2].state, State::Installable);
+    assert_eq!(answer.used, Some(Origin::Archive));
+    assert!(
+        answer
+            .to_string()
+            .ends_with("used: archive, which is unpacked when it is first needed")
+    );
     assert_eq!(
         install(&options, None, &mut Silent).unwrap().origin,
         Origin::Archive
@@ -116,6 +122,7 @@ fn status_lists_all_five_in_order() {
         ..scratch.options()
     };
     let answer = status(&options);
+    assert_eq!(answer.used, None);
     let origins: Vec<Origin> = answer.ways.iter().map(|way| way.origin).collect();
     assert_eq!(origins, Origin::ALL);
     let text = answer.to_string();
