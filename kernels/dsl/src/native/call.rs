@@ -1,7 +1,9 @@
 //! A call of a kernel on the host's own processor: untyped arguments in the order of the
 //! kernel's description, and how to run it.
 
+use std::string::String;
 use std::sync::atomic::AtomicU32;
+use std::vec::Vec;
 
 use super::describe::TexelFormat;
 
@@ -91,13 +93,19 @@ pub struct Mode {
 
 impl Default for Mode {
     fn default() -> Self {
-        Self { lanes: true, parallel: true }
+        Self {
+            lanes: true,
+            parallel: true,
+        }
     }
 }
 
 impl Mode {
     /// One thread, no lanes: what every other way to run a kernel is compared with.
-    pub const REFERENCE: Self = Self { lanes: false, parallel: false };
+    pub const REFERENCE: Self = Self {
+        lanes: false,
+        parallel: false,
+    };
 }
 
 /// A call.
@@ -132,7 +140,9 @@ pub enum CallError {
         expected: &'static str,
     },
     /// A buffer whose size or alignment does not fit its type.
-    #[error("argument `{name}`: {bytes} bytes at this address are no whole number of aligned elements of {size} bytes")]
+    #[error(
+        "argument `{name}`: {bytes} bytes at this address are no whole number of aligned elements of {size} bytes"
+    )]
     Size {
         /// The parameter's name.
         name: &'static str,
@@ -142,7 +152,9 @@ pub enum CallError {
         size: usize,
     },
     /// Element buffers of different lengths.
-    #[error("argument `{name}` has {got} elements, but {expected} invocations run: give each element buffer as many elements as the output")]
+    #[error(
+        "argument `{name}` has {got} elements, but {expected} invocations run: give each element buffer as many elements as the output"
+    )]
     Length {
         /// The parameter's name.
         name: &'static str,
@@ -158,6 +170,12 @@ pub enum CallError {
         name: &'static str,
         /// What does not fit.
         problem: String,
+    },
+    /// What a plug-in reported.
+    #[error("{message}")]
+    Plugin {
+        /// Its words.
+        message: String,
     },
     /// The kernel itself panicked: an index out of range, most likely.
     #[error("the kernel panicked: {message}")]

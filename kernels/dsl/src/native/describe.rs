@@ -2,6 +2,10 @@
 //! host allocates and binds, and the command line prints. `#[kernel]` fills it in from the
 //! function's signature; nothing in it is written by hand.
 
+use std::boxed::Box;
+use std::string::String;
+use std::vec::Vec;
+
 use serde::{Deserialize, Serialize};
 
 /// One entry point.

@@ -5,9 +5,9 @@ pub mod call;
 pub mod describe;
 #[doc(hidden)]
 pub mod exec;
-pub mod layout;
 #[doc(hidden)]
 pub mod lanes;
+pub mod layout;
 pub mod plugin;
 pub mod texel;
 
@@ -21,3 +21,9 @@ pub struct Entry {
     /// Its native code.
     pub run: Run,
 }
+
+#[doc(hidden)]
+pub use std::vec::Vec;
+
+/// The entry points of a crate.
+pub type Entries = Vec<Entry>;

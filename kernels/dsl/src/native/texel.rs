@@ -173,7 +173,10 @@ mod tests {
     fn what_a_format_cannot_hold_is_clamped() {
         let mut b = [0u8; 8];
         TexelFormat::Rgba16Unorm.store(&mut b, Vec4::new(-1.0, 2.0, f32::NAN, f32::INFINITY));
-        assert_eq!(TexelFormat::Rgba16Unorm.load(&b), Vec4::new(0.0, 1.0, 0.0, 1.0));
+        assert_eq!(
+            TexelFormat::Rgba16Unorm.load(&b),
+            Vec4::new(0.0, 1.0, 0.0, 1.0)
+        );
     }
 
     #[test]

@@ -1,0 +1,146 @@
+//! The vocabulary a kernel is written in.
+//!
+//! A kernel is a plain function with [`#[kernel]`](macro@kernel) on it. From it come the SPIR-V
+//! entry point, the native executor and the [description](native::describe) that everything else
+//! goes by. The body is the same code on every backend.
+//!
+//! ```
+//! use hankel_dsl::{Element, Real, kernel, lit};
+//!
+//! /// A point of the curve.
+//! #[derive(Clone, Copy, Element)]
+//! #[repr(C)]
+//! pub struct Point<R> {
+//!     /// Abscissa.
+//!     pub x: R,
+//! }
+//!
+//! /// The parabola's ordinate.
+//! #[derive(Clone, Copy, Element)]
+//! #[repr(C)]
+//! pub struct Height<R> {
+//!     /// Ordinate.
+//!     pub y: R,
+//! }
+//!
+//! /// Half the square of the abscissa.
+//! #[kernel(compute, threads(64), precision(f32, f64))]
+//! pub fn parabola<R: Real>(#[element] point: Point<R>) -> Height<R> {
+//!     Height { y: lit!(0.5) * point.x * point.x }
+//! }
+//!
+//! hankel_dsl::kernels![parabola];
+//! # fn main() {
+//! assert_eq!(parabola(Point { x: 2.0_f32 }).y, 2.0);
+//! assert_eq!(entries().len(), 2);
+//! # }
+//! ```
+//!
+//! # What is refused
+//! - `unsafe`, `cfg(target_arch)` and a second version for the processor: the DSL owns them.
+//! - Writing anywhere but to one's own element: a kernel *returns* what it computes.
+//! - `core`'s `min`, `max`, `clamp` and slice indexing in kernels: they compile, but carry NaN and
+//!   bounds tests into the shader; [`Real`] and [`Buffer`] do not.
+//!
+//! # Layout of buffers
+//! `#[derive(Element)]` checks at compile time that a `repr(C)` structure lies in memory as a
+//! shader (std430) sees it, names the field that does not, and describes it for the host.
+#![no_std]
+#![cfg_attr(target_arch = "spirv", feature(asm_experimental_arch))]
+
+#[cfg(not(target_arch = "spirv"))]
+extern crate std;
+
+// So that the macros' `::hankel_dsl` paths also work in this crate's own tests.
+extern crate self as hankel_dsl;
+
+mod memory;
+#[cfg(not(target_arch = "spirv"))]
+pub mod native;
+mod real;
+mod texture;
+
+pub use glam;
+pub use hankel_macros::{Element, kernel, kernels};
+pub use memory::{Atomics, Buffer, Group};
+pub use real::{Mask, Real};
+#[cfg(target_arch = "spirv")]
+#[doc(hidden)]
+pub use spirv_std;
+pub use texture::{Sampler, Texel, Texture2d, Texture2dMultisampled, Texture3d};
+
+#[cfg(target_arch = "spirv")]
+#[doc(hidden)]
+pub use texture::image;
+
+#[cfg(not(target_arch = "spirv"))]
+#[doc(hidden)]
+pub use bytemuck;
+
+/// Keeps its tokens where they are compiled for the host only. The macros emit this instead of a
+/// `cfg`, which would have to be declared in every kernel crate.
+#[cfg(not(target_arch = "spirv"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! on_host {
+    ($($tokens:tt)*) => { $($tokens)* };
+}
+
+/// See the other one.
+#[cfg(target_arch = "spirv")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! on_host {
+    ($($tokens:tt)*) => {};
+}
+
+/// Keeps its tokens where they are compiled for SPIR-V only.
+#[cfg(not(target_arch = "spirv"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! on_spirv {
+    ($($tokens:tt)*) => {};
+}
+
+/// See the other one.
+#[cfg(target_arch = "spirv")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! on_spirv {
+    ($($tokens:tt)*) => { $($tokens)* };
+}
+
+/// What `kernels!` exports from a plug-in.
+#[cfg(not(target_arch = "spirv"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! plugin_exports {
+    ($entries:path) => {
+        use $crate::native::plugin;
+
+        static ENTRIES: plugin::OnceLock<$crate::native::Entries> = plugin::OnceLock::new();
+
+        unsafe extern "C" fn describe(sink: plugin::Sink, context: *mut plugin::c_void) {
+            // SAFETY: the loader's promise is passed on.
+            unsafe { plugin::describe(ENTRIES.get_or_init($entries), sink, context) }
+        }
+
+        unsafe extern "C" fn run(
+            call: *const plugin::RawCall,
+            sink: plugin::Sink,
+            context: *mut plugin::c_void,
+        ) -> u32 {
+            // SAFETY: the loader's promise is passed on.
+            unsafe { plugin::run(ENTRIES.get_or_init($entries), call, sink, context) }
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn hankel_plugin() -> plugin::Exports {
+            plugin::Exports {
+                abi: plugin::ABI,
+                describe,
+                run,
+            }
+        }
+    };
+}

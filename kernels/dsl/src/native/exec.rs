@@ -1,0 +1,442 @@
+//! What `#[kernel]` expands to on the host: taking a call's arguments apart, and the loops over
+//! invocations.
+
+use core::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::string::{String, ToString};
+use std::{format, vec};
+
+use bytemuck::Pod;
+use fearless_simd::{Simd, dispatch};
+use glam::{UVec2, UVec3, UVec4, Vec4};
+use rayon::prelude::*;
+
+use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef};
+use super::describe::TexelFormat;
+use super::lanes::{self, Scalar};
+use super::layout::Lane;
+use crate::{Group, Texel};
+
+/// Invocations that a thread takes at once.
+const CHUNK: usize = 4096;
+
+/// The arguments of a call, taken in order.
+pub struct Args<'a> {
+    args: vec::IntoIter<Arg<'a>>,
+    constants: vec::IntoIter<u32>,
+}
+
+impl<'a> Args<'a> {
+    /// Takes the arguments out of `call`, which must have as many as said.
+    pub fn take(call: &mut Call<'a>, args: usize, constants: usize) -> Result<Self, CallError> {
+        for (expected, got) in [(args, call.args.len()), (constants, call.constants.len())] {
+            if expected != got {
+                return Err(CallError::Count { expected, got });
+            }
+        }
+        Ok(Self {
+            args: core::mem::take(&mut call.args).into_iter(),
+            constants: core::mem::take(&mut call.constants).into_iter(),
+        })
+    }
+
+    /// A specialisation constant.
+    pub fn constant(&mut self) -> u32 {
+        self.constants.next().unwrap_or_default()
+    }
+
+    /// A read-only buffer.
+    pub fn slice<T: Pod>(&mut self, name: &'static str) -> Result<&'a [T], CallError> {
+        match self.args.next() {
+            Some(Arg::Bytes(bytes)) => cast(name, bytes),
+            Some(Arg::BytesMut(bytes)) => cast(name, bytes),
+            _ => Err(CallError::Kind {
+                name,
+                expected: "a buffer",
+            }),
+        }
+    }
+
+    /// A uniform value.
+    pub fn uniform<T: Pod>(&mut self, name: &'static str) -> Result<&'a T, CallError> {
+        match self.slice(name)? {
+            [value] => Ok(value),
+            slice => Err(CallError::Size {
+                name,
+                bytes: size_of_val(slice),
+                size: size_of::<T>(),
+            }),
+        }
+    }
+
+    /// A buffer to be written.
+    pub fn slice_mut<T: Pod>(&mut self, name: &'static str) -> Result<&'a mut [T], CallError> {
+        match self.args.next() {
+            Some(Arg::BytesMut(bytes)) => {
+                let len = bytes.len();
+                bytemuck::try_cast_slice_mut(bytes).map_err(|_| CallError::Size {
+                    name,
+                    bytes: len,
+                    size: size_of::<T>(),
+                })
+            }
+            _ => Err(CallError::Kind {
+                name,
+                expected: "a buffer that can be written",
+            }),
+        }
+    }
+
+    /// Counters.
+    pub fn atomics(
+        &mut self,
+        name: &'static str,
+    ) -> Result<&'a [core::sync::atomic::AtomicU32], CallError> {
+        match self.args.next() {
+            Some(Arg::Atomics(counters)) => Ok(counters),
+            _ => Err(CallError::Kind {
+                name,
+                expected: "counters",
+            }),
+        }
+    }
+
+    /// A texture to be read.
+    pub fn texture(
+        &mut self,
+        name: &'static str,
+        multisampled: bool,
+        flat: bool,
+    ) -> Result<TextureRef<'a>, CallError> {
+        let Some(Arg::Texture(t)) = self.args.next() else {
+            return Err(CallError::Kind {
+                name,
+                expected: "a texture",
+            });
+        };
+        if multisampled != (t.samples > 1) || t.samples == 0 || (flat && t.size[2] != 1) {
+            let problem = format!(
+                "{}x{}x{} texels with {} samples are of the wrong shape",
+                t.size[0], t.size[1], t.size[2], t.samples
+            );
+            return Err(CallError::Texture { name, problem });
+        }
+        check_size(name, t.size, t.samples, t.format, t.bytes.len())?;
+        Ok(t)
+    }
+
+    /// A texture to be written.
+    pub fn texture_mut(
+        &mut self,
+        name: &'static str,
+        format: TexelFormat,
+    ) -> Result<TextureMut<'a>, CallError> {
+        let Some(Arg::TextureMut(t)) = self.args.next() else {
+            return Err(CallError::Kind {
+                name,
+                expected: "a texture that can be written",
+            });
+        };
+        if t.format != format {
+            let problem = format!(
+                "it is {}, the kernel writes {}",
+                t.format.name(),
+                format.name()
+            );
+            return Err(CallError::Texture { name, problem });
+        }
+        check_size(name, t.size, 1, t.format, t.bytes.len())?;
+        Ok(t)
+    }
+
+    /// A sampler.
+    pub fn sampler(&mut self, name: &'static str) -> Result<Sampler, CallError> {
+        match self.args.next() {
+            Some(Arg::Sampler(s)) => Ok(s),
+            _ => Err(CallError::Kind {
+                name,
+                expected: "a sampler",
+            }),
+        }
+    }
+}
+
+fn cast<'a, T: Pod>(name: &'static str, bytes: &'a [u8]) -> Result<&'a [T], CallError> {
+    bytemuck::try_cast_slice(bytes).map_err(|_| CallError::Size {
+        name,
+        bytes: bytes.len(),
+        size: size_of::<T>(),
+    })
+}
+
+fn check_size(
+    name: &'static str,
+    size: [u32; 3],
+    samples: u32,
+    format: TexelFormat,
+    bytes: usize,
+) -> Result<(), CallError> {
+    let texels = size.iter().map(|s| u128::from(*s)).product::<u128>() * u128::from(samples);
+    let expected = texels * format.bytes() as u128;
+    if texels == 0 || expected != bytes as u128 {
+        let problem = format!("{bytes} bytes were given, its size and format need {expected}");
+        return Err(CallError::Texture { name, problem });
+    }
+    Ok(())
+}
+
+/// Fails unless a buffer has an element for every invocation.
+pub fn enough(name: &'static str, got: usize, expected: usize) -> Result<(), CallError> {
+    if got < expected {
+        Err(CallError::Length {
+            name,
+            expected,
+            got,
+        })
+    } else {
+        Ok(())
+    }
+}
+
+/// Runs the loops; a kernel's panic becomes an error.
+fn guard(f: impl FnOnce()) -> Result<(), CallError> {
+    catch_unwind(AssertUnwindSafe(f)).map_err(|payload| CallError::Panic {
+        message: message(payload.as_ref()),
+    })
+}
+
+fn message(payload: &(dyn Any + Send)) -> String {
+    payload
+        .downcast_ref::<String>()
+        .cloned()
+        .or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
+        .unwrap_or_else(|| "no message".to_string())
+}
+
+/// Calls `f` with consecutive chunks of `out` and the index of each chunk's first element.
+fn chunks<T: Send>(mode: Mode, out: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync) {
+    if mode.parallel {
+        out.par_chunks_mut(chunk)
+            .enumerate()
+            .for_each(|(i, c)| f(i * chunk, c));
+    } else {
+        out.chunks_mut(chunk)
+            .enumerate()
+            .for_each(|(i, c)| f(i * chunk, c));
+    }
+}
+
+/// A map over one dimension, invocation by invocation.
+pub fn map1<T: Send>(
+    mode: Mode,
+    out: &mut [T],
+    f: impl Fn(usize) -> T + Sync,
+) -> Result<(), CallError> {
+    guard(|| {
+        chunks(mode, out, CHUNK, |start, chunk| {
+            for (i, slot) in chunk.iter_mut().enumerate() {
+                *slot = f(start + i);
+            }
+        });
+    })
+}
+
+/// A call that returns nothing, for `count` invocations.
+pub fn for_each(mode: Mode, count: usize, f: impl Fn(usize) + Sync) -> Result<(), CallError> {
+    guard(|| {
+        if mode.parallel {
+            (0..count).into_par_iter().with_min_len(CHUNK).for_each(&f);
+        } else {
+            (0..count).for_each(&f);
+        }
+    })
+}
+
+/// The body of a map that is generic over `Real`.
+pub trait LaneBody: Sync {
+    /// The scalar type.
+    type Scalar: Scalar;
+    /// An output element.
+    type Out: Send;
+    /// Invocation `i`.
+    fn one(&self, i: usize) -> Self::Out;
+    /// Invocations from `start` on, as many as `L` has lanes, into `out`, which is that long.
+    fn many<L: Lane<Scalar = Self::Scalar>>(&self, start: usize, out: &mut [Self::Out]);
+}
+
+/// A map over one dimension, on SIMD lanes if `mode` says so.
+pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Result<(), CallError> {
+    if !mode.lanes {
+        return map1(mode, out, |i| body.one(i));
+    }
+    let level = lanes::level();
+    guard(|| {
+        chunks(mode, out, CHUNK, |start, chunk| {
+            dispatch!(level, simd => lane_chunk(simd, start, chunk, body));
+        });
+    })
+}
+
+#[inline(always)]
+fn lane_chunk<S: Simd, B: LaneBody>(_simd: S, start: usize, chunk: &mut [B::Out], body: &B) {
+    let lanes = <B::Scalar as Scalar>::Lanes::<S>::LANES;
+    let mut start = start;
+    let mut groups = chunk.chunks_exact_mut(lanes);
+    for group in &mut groups {
+        body.many::<<B::Scalar as Scalar>::Lanes<S>>(start, group);
+        start += lanes;
+    }
+    for (i, slot) in groups.into_remainder().iter_mut().enumerate() {
+        *slot = body.one(start + i);
+    }
+}
+
+/// All channels of a texel, as a texture stores them.
+pub trait Channels {
+    /// Writes them.
+    fn store(self, format: TexelFormat, bytes: &mut [u8]);
+}
+
+impl Channels for Vec4 {
+    #[inline]
+    fn store(self, format: TexelFormat, bytes: &mut [u8]) {
+        format.store(bytes, self);
+    }
+}
+
+impl Channels for UVec4 {
+    #[inline]
+    fn store(self, format: TexelFormat, bytes: &mut [u8]) {
+        format.store_uint(bytes, self);
+    }
+}
+
+/// A map over the texels of a texture, row by row.
+pub fn map_texels<T: Texel<Channels: Channels>>(
+    mode: Mode,
+    out: TextureMut<'_>,
+    f: impl Fn(UVec3) -> T + Sync,
+) -> Result<(), CallError> {
+    let TextureMut {
+        size,
+        format,
+        bytes,
+    } = out;
+    let (texel, width) = (format.bytes(), size[0] as usize);
+    guard(|| {
+        chunks(mode, bytes, width * texel, |start, row| {
+            let index = start / (width * texel);
+            let (y, z) = (index as u32 % size[1], index as u32 / size[1]);
+            for (x, bytes) in row.chunks_exact_mut(texel).enumerate() {
+                f(UVec3::new(x as u32, y, z))
+                    .channels()
+                    .store(format, bytes);
+            }
+        });
+    })
+}
+
+/// [`map_texels`] with a two-dimensional index.
+pub fn map_texels2<T: Texel<Channels: Channels>>(
+    mode: Mode,
+    out: TextureMut<'_>,
+    f: impl Fn(UVec2) -> T + Sync,
+) -> Result<(), CallError> {
+    map_texels(mode, out, |at| f(at.truncate()))
+}
+
+/// Runs workgroups of `N` invocations through `phases` phases after phase 0. `f` gets the phase,
+/// the invocation's index and the workgroup's memory as the phase before left it. The last phase's
+/// values are the output: each invocation's own, or with `per_group` the first invocation's for its
+/// group.
+pub fn phases<T: Copy + Default + Send + Sync, const N: usize>(
+    mode: Mode,
+    out: &mut [T],
+    per_group: bool,
+    phases: u32,
+    f: impl Fn(u32, usize, Group<'_, T, N>) -> T + Sync,
+) -> Result<(), CallError> {
+    let size = if per_group { 1 } else { N };
+    guard(|| {
+        chunks(mode, out, size, |start, chunk| {
+            let first = start / size * N;
+            let mut slots = [T::default(); N];
+            for phase in 0..=phases {
+                slots = core::array::from_fn(|i| f(phase, first + i, Group::new(&slots, i as u32)));
+            }
+            chunk.copy_from_slice(&slots[..chunk.len()]);
+        });
+    })
+}
+
+/// Output slices of a vertex or fragment kernel, written together.
+pub trait Slices: Send {
+    /// One value for each slice.
+    type Values;
+    /// Splits all slices at `mid`.
+    fn split(self, mid: usize) -> (Self, Self)
+    where
+        Self: Sized;
+    /// Length of the first.
+    fn count(&self) -> usize;
+    /// Stores the values of invocation `i`.
+    fn set(&mut self, i: usize, values: Self::Values);
+}
+
+macro_rules! slices {
+    ($($t:ident $i:tt),*) => {
+        impl<$($t: Send),*> Slices for ($(&mut [$t],)*) {
+            type Values = ($($t,)*);
+            fn split(self, mid: usize) -> (Self, Self) {
+                let pairs = ($(self.$i.split_at_mut(mid),)*);
+                (($(pairs.$i.0,)*), ($(pairs.$i.1,)*))
+            }
+            fn count(&self) -> usize {
+                self.0.len()
+            }
+            #[inline(always)]
+            fn set(&mut self, i: usize, values: Self::Values) {
+                $(self.$i[i] = values.$i;)*
+            }
+        }
+    };
+}
+
+slices!(A 0);
+slices!(A 0, B 1);
+slices!(A 0, B 1, C 2);
+slices!(A 0, B 1, C 2, D 3);
+slices!(A 0, B 1, C 2, D 3, E 4);
+slices!(A 0, B 1, C 2, D 3, E 4, F 5);
+slices!(A 0, B 1, C 2, D 3, E 4, F 5, G 6);
+slices!(A 0, B 1, C 2, D 3, E 4, F 5, G 6, H 7);
+
+/// A map with several outputs.
+pub fn map_tuple<S: Slices>(
+    mode: Mode,
+    out: S,
+    f: impl Fn(usize) -> S::Values + Sync,
+) -> Result<(), CallError> {
+    guard(|| tuple_range(mode.parallel, 0, out, &f))
+}
+
+fn tuple_range<S: Slices>(
+    parallel: bool,
+    start: usize,
+    mut out: S,
+    f: &(impl Fn(usize) -> S::Values + Sync),
+) {
+    let count = out.count();
+    if parallel && count > CHUNK {
+        let mid = count / 2;
+        let (low, high) = out.split(mid);
+        rayon::join(
+            || tuple_range(parallel, start, low, f),
+            || tuple_range(parallel, start + mid, high, f),
+        );
+    } else {
+        for i in 0..count {
+            out.set(i, f(start + i));
+        }
+    }
+}

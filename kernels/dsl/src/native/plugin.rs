@@ -1,0 +1,318 @@
+//! Kernel crates as native plug-ins: how `hankel` runs the native code of a crate that it was not
+//! built with. A crate compiled as a `cdylib` with `--cfg hankel_plugin` exports one C function,
+//! [`SYMBOL`], which returns [`Exports`]; [`Plugin`] loads it.
+//!
+//! Only C types cross the border, so the two sides may come from different compilers; [`ABI`]
+//! changes whenever the meaning of what crosses it does.
+
+#[doc(hidden)]
+pub use core::ffi::c_void;
+use core::sync::atomic::AtomicU32;
+use std::path::{Path, PathBuf};
+use std::string::{String, ToString};
+#[doc(hidden)]
+pub use std::sync::OnceLock;
+use std::vec::Vec;
+use std::{format, slice};
+
+use super::Entry;
+use super::call::{Address, Arg, Call, CallError, Filter, Mode, Sampler, TextureMut, TextureRef};
+use super::describe::Kernel;
+use super::texel::FORMATS;
+
+/// Version of what crosses the border.
+pub const ABI: u32 = 1;
+
+/// The exported function's name.
+pub const SYMBOL: &str = "hankel_plugin";
+
+/// Receives bytes.
+pub type Sink = unsafe extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);
+
+/// What a plug-in exports.
+#[repr(C)]
+pub struct Exports {
+    /// [`ABI`] of the plug-in.
+    pub abi: u32,
+    /// Sends the descriptions of all entry points to the sink, as JSON.
+    pub describe: unsafe extern "C" fn(sink: Sink, context: *mut c_void),
+    /// Runs an entry point; 0 on success, else the error's text is sent to the sink.
+    pub run: unsafe extern "C" fn(call: *const RawCall, sink: Sink, context: *mut c_void) -> u32,
+}
+
+/// A call as it crosses the border.
+#[repr(C)]
+pub struct RawCall {
+    kernel: u32,
+    lanes: u32,
+    parallel: u32,
+    args: *const RawArg,
+    arg_count: usize,
+    constants: *const u32,
+    constant_count: usize,
+}
+
+/// An argument as it crosses the border.
+#[repr(C)]
+struct RawArg {
+    kind: u32,
+    format: u32,
+    size: [u32; 3],
+    /// Samples of a texture; of a sampler, its filter.
+    samples: u32,
+    /// Of a sampler, what it does beyond the edge.
+    address: u32,
+    data: *mut u8,
+    len: usize,
+}
+
+const BYTES: u32 = 0;
+const BYTES_MUT: u32 = 1;
+const ATOMICS: u32 = 2;
+const TEXTURE: u32 = 3;
+const TEXTURE_MUT: u32 = 4;
+const SAMPLER: u32 = 5;
+
+impl RawArg {
+    fn new(arg: &mut Arg<'_>) -> Self {
+        let mut raw = Self {
+            kind: BYTES,
+            format: 0,
+            size: [0; 3],
+            samples: 0,
+            address: 0,
+            data: core::ptr::null_mut(),
+            len: 0,
+        };
+        let (data, len) = match arg {
+            Arg::Bytes(b) => (b.as_ptr().cast_mut(), b.len()),
+            Arg::BytesMut(b) => {
+                raw.kind = BYTES_MUT;
+                (b.as_mut_ptr(), b.len())
+            }
+            Arg::Atomics(a) => {
+                raw.kind = ATOMICS;
+                (a.as_ptr().cast_mut().cast(), a.len())
+            }
+            Arg::Texture(t) => {
+                raw.kind = TEXTURE;
+                (raw.size, raw.samples, raw.format) = (t.size, t.samples, t.format as u32);
+                (t.bytes.as_ptr().cast_mut(), t.bytes.len())
+            }
+            Arg::TextureMut(t) => {
+                raw.kind = TEXTURE_MUT;
+                (raw.size, raw.samples, raw.format) = (t.size, 1, t.format as u32);
+                (t.bytes.as_mut_ptr(), t.bytes.len())
+            }
+            Arg::Sampler(s) => {
+                raw.kind = SAMPLER;
+                (raw.samples, raw.address) = (s.filter as u32, s.address as u32);
+                (core::ptr::null_mut(), 0)
+            }
+        };
+        (raw.data, raw.len) = (data, len);
+        raw
+    }
+
+    /// # Safety
+    /// `data` and `len` are those of a slice that lives for `'a`, borrowed as `kind` says.
+    unsafe fn arg<'a>(&self) -> Option<Arg<'a>> {
+        // SAFETY: the caller's; a slice's pointer is never null.
+        let bytes = || unsafe { slice::from_raw_parts::<'a>(self.data, self.len) };
+        // SAFETY: the same, and exclusively borrowed.
+        let bytes_mut = || unsafe { slice::from_raw_parts_mut::<'a>(self.data, self.len) };
+        Some(match self.kind {
+            BYTES => Arg::Bytes(bytes()),
+            BYTES_MUT => Arg::BytesMut(bytes_mut()),
+            ATOMICS => {
+                // SAFETY: the same; `len` counts counters here.
+                Arg::Atomics(unsafe {
+                    slice::from_raw_parts(self.data.cast::<AtomicU32>(), self.len)
+                })
+            }
+            TEXTURE => Arg::Texture(TextureRef {
+                size: self.size,
+                samples: self.samples,
+                format: *FORMATS.get(self.format as usize)?,
+                bytes: bytes(),
+            }),
+            TEXTURE_MUT => Arg::TextureMut(TextureMut {
+                size: self.size,
+                format: *FORMATS.get(self.format as usize)?,
+                bytes: bytes_mut(),
+            }),
+            SAMPLER => Arg::Sampler(Sampler {
+                filter: if self.samples == 0 {
+                    Filter::Nearest
+                } else {
+                    Filter::Linear
+                },
+                address: if self.address == 0 {
+                    Address::ClampToEdge
+                } else {
+                    Address::Repeat
+                },
+            }),
+            _ => return None,
+        })
+    }
+}
+
+/// The plug-in's side of [`Exports::describe`].
+///
+/// # Safety
+/// `sink` accepts `context` and any bytes.
+pub unsafe fn describe(entries: &[Entry], sink: Sink, context: *mut c_void) {
+    let kernels: Vec<&Kernel> = entries.iter().map(|e| &e.kernel).collect();
+    // Descriptions are plain data: they always have a JSON form.
+    let json = serde_json::to_vec(&kernels).unwrap_or_default();
+    // SAFETY: the caller's.
+    unsafe { sink(context, json.as_ptr(), json.len()) }
+}
+
+/// The plug-in's side of [`Exports::run`].
+///
+/// # Safety
+/// `call` was made by [`Plugin::run`], and `sink` accepts `context` and any bytes.
+pub unsafe fn run(
+    entries: &[Entry],
+    call: *const RawCall,
+    sink: Sink,
+    context: *mut c_void,
+) -> u32 {
+    // SAFETY: the caller's; pointers and lengths come from live vectors.
+    let (call, raw, constants) = unsafe {
+        let call = &*call;
+        (
+            call,
+            slice::from_raw_parts(call.args, call.arg_count),
+            slice::from_raw_parts(call.constants, call.constant_count),
+        )
+    };
+    // SAFETY: every argument was made from a live `Arg` of the caller.
+    let args: Option<Vec<Arg<'_>>> = raw.iter().map(|a| unsafe { a.arg() }).collect();
+    let result = match (entries.get(call.kernel as usize), args) {
+        (Some(entry), Some(args)) => (entry.run)(&mut Call {
+            args,
+            constants: constants.to_vec(),
+            mode: Mode {
+                lanes: call.lanes != 0,
+                parallel: call.parallel != 0,
+            },
+        })
+        .map_err(|e| e.to_string()),
+        _ => Err("the call does not follow the plug-in interface".to_string()),
+    };
+    match result {
+        Ok(()) => 0,
+        Err(text) => {
+            // SAFETY: the caller's.
+            unsafe { sink(context, text.as_ptr(), text.len()) }
+            1
+        }
+    }
+}
+
+unsafe extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
+    // SAFETY: `context` is the vector that this module passed; the bytes are the plug-in's.
+    unsafe { (*context.cast::<Vec<u8>>()).extend_from_slice(slice::from_raw_parts(bytes, len)) }
+}
+
+/// Why a plug-in was not loaded.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", path.display())]
+pub struct PluginError {
+    /// The library.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub problem: String,
+}
+
+/// A loaded plug-in.
+pub struct Plugin {
+    exports: Exports,
+    kernels: Vec<Kernel>,
+    // Unloading would leave the pointers above dangling, and rayon's threads without code.
+    _library: core::mem::ManuallyDrop<libloading::Library>,
+}
+
+impl core::fmt::Debug for Plugin {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Plugin")
+            .field("kernels", &self.kernels.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Plugin {
+    /// Loads the library at `path`, which is trusted: its code runs in this process.
+    ///
+    /// # Errors
+    /// It cannot be opened, is no kernel crate's, or follows another version of the interface.
+    pub fn load(path: &Path) -> Result<Self, PluginError> {
+        let fail = |problem: String| PluginError {
+            path: path.to_path_buf(),
+            problem,
+        };
+        // SAFETY: loading runs the library's initialisers; a kernel crate has none of its own.
+        let library = unsafe { libloading::Library::new(path) }.map_err(|e| fail(e.to_string()))?;
+        // SAFETY: the symbol, if it is there, was exported by `kernels!` with this signature.
+        let exports = unsafe {
+            let function = library
+                .get::<unsafe extern "C" fn() -> Exports>(SYMBOL.as_bytes())
+                .map_err(|_| {
+                    fail("it exports no kernels: is `hankel_dsl::kernels![…]` at the root of the crate?".to_string())
+                })?;
+            function()
+        };
+        if exports.abi != ABI {
+            return Err(fail(format!(
+                "it follows version {} of the plug-in interface, this program version {ABI}: build both with the same release of hankel-dsl",
+                exports.abi
+            )));
+        }
+        let mut json = Vec::<u8>::new();
+        // SAFETY: `collect` takes a vector as context.
+        unsafe { (exports.describe)(collect, (&raw mut json).cast()) };
+        let kernels = serde_json::from_slice(&json)
+            .map_err(|e| fail(format!("its description cannot be read: {e}")))?;
+        Ok(Self {
+            exports,
+            kernels,
+            _library: core::mem::ManuallyDrop::new(library),
+        })
+    }
+
+    /// The entry points, in the order of their indices.
+    #[must_use]
+    pub fn kernels(&self) -> &[Kernel] {
+        &self.kernels
+    }
+
+    /// Runs entry point `index`.
+    ///
+    /// # Errors
+    /// What the entry point reports, as text.
+    pub fn run(&self, index: usize, call: &mut Call<'_>) -> Result<(), CallError> {
+        let args: Vec<RawArg> = call.args.iter_mut().map(RawArg::new).collect();
+        let raw = RawCall {
+            kernel: u32::try_from(index).unwrap_or(u32::MAX),
+            lanes: call.mode.lanes.into(),
+            parallel: call.mode.parallel.into(),
+            args: args.as_ptr(),
+            arg_count: args.len(),
+            constants: call.constants.as_ptr(),
+            constant_count: call.constants.len(),
+        };
+        let mut text = Vec::<u8>::new();
+        // SAFETY: `raw` and all it points to outlive the call; `collect` takes a vector.
+        let status = unsafe { (self.exports.run)(&raw, collect, (&raw mut text).cast()) };
+        if status == 0 {
+            Ok(())
+        } else {
+            Err(CallError::Plugin {
+                message: String::from_utf8_lossy(&text).into_owned(),
+            })
+        }
+    }
+}

@@ -1,0 +1,462 @@
+//! The host's half: the native executor and the description of each entry point.
+
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+
+use crate::kernel::{Compute, Kernel, Role, Stage, Texture, Variant};
+use crate::shader::{output_name, texture_type};
+
+impl Kernel {
+    pub fn expand_host(&self) -> TokenStream {
+        let entries = self.variants.iter().map(|v| {
+            let description = self.description(v);
+            let run = self.run(v);
+            quote! {
+                all.push({
+                    #run
+                    native::Entry { kernel: #description, run }
+                });
+            }
+        });
+        let uniforms = self.uniform_checks();
+        quote! {
+            ::hankel_dsl::on_host! {
+                /// The entry points that come from the function.
+                #[allow(clippy::all, unused_mut, unused_variables, reason = "generated")]
+                #[must_use]
+                pub fn entries() -> ::hankel_dsl::native::Entries {
+                    use ::hankel_dsl::native::{self, describe, exec, layout};
+                    #uniforms
+                    let mut all = native::Entries::new();
+                    #(#entries)*
+                    all
+                }
+            }
+        }
+    }
+
+    fn uniform_checks(&self) -> TokenStream {
+        self.params
+            .iter()
+            .filter_map(|p| match &p.role {
+                Role::Uniform(ty) => Some((&p.name, ty)),
+                _ => None,
+            })
+            .flat_map(|(name, ty)| self.variants.iter().map(move |v| (name, ty, v)))
+            .map(|(name, ty, v)| {
+                let concrete = self.concrete(ty, v);
+                let message = format!(
+                    "uniform `{name}`: an array in a uniform buffer needs elements of a multiple of 16 bytes, such as Vec4"
+                );
+                quote! {
+                    const { assert!(<#concrete as layout::Element>::UNIFORM, #message) };
+                }
+            })
+            .collect()
+    }
+
+    fn description(&self, variant: &Variant) -> TokenStream {
+        let (entry, function, summary) = (&variant.entry, self.name.to_string(), &self.summary);
+        let stage = match &self.stage {
+            Stage::Vertex => quote!(describe::Stage::Vertex),
+            Stage::Fragment => quote!(describe::Stage::Fragment),
+            Stage::Compute(c) => {
+                let mut threads = c.threads.clone();
+                threads.resize(3, 1);
+                let dimensions = c.threads.len() as u32;
+                let phases = c.phases.unwrap_or(0);
+                let bytes = self
+                    .params
+                    .iter()
+                    .find_map(|p| match &p.role {
+                        Role::Group { slot, size } => {
+                            Some(quote!(2 * #size * size_of::<#slot>() as u32))
+                        }
+                        _ => None,
+                    })
+                    .unwrap_or(quote!(0));
+                quote! {
+                    describe::Stage::Compute {
+                        threads: [#(#threads),*],
+                        dimensions: #dimensions,
+                        phases: #phases,
+                        workgroup_bytes: #bytes,
+                    }
+                }
+            }
+        };
+        let precision = match &variant.scalar {
+            Some(s) => quote!(Some(<#s as layout::HasPrecision>::PRECISION)),
+            None => quote!(None),
+        };
+        let params = self.describe_params(variant);
+        let outputs = self.describe_outputs(variant);
+        let (ulp, absolute, why) = (
+            self.tolerance.ulp,
+            self.tolerance.absolute,
+            &self.tolerance.why,
+        );
+        quote! {
+            describe::Kernel {
+                name: #entry.into(),
+                function: #function.into(),
+                summary: #summary.into(),
+                file: file!().into(),
+                line: line!(),
+                stage: #stage,
+                precision: #precision,
+                params: [#(#params),*].into(),
+                outputs: [#(#outputs),*].into(),
+                tolerance: describe::Tolerance {
+                    ulp: #ulp,
+                    absolute: #absolute,
+                    why: #why.into(),
+                },
+            }
+        }
+    }
+
+    fn describe_params(&self, variant: &Variant) -> Vec<TokenStream> {
+        let (mut binding, mut location) = (0_u32, 0_u32);
+        self.params
+            .iter()
+            .map(|p| {
+                let name = p.name.to_string();
+                let (b, l) = (binding, location);
+                binding += u32::from(p.role.is_bound());
+                location += u32::from(matches!(p.role, Role::Attribute(_) | Role::Varying(_)));
+                let layout = |ty: &syn::Type| {
+                    let ty = self.concrete(ty, variant);
+                    quote!(<#ty as layout::Element>::layout())
+                };
+                let role = match &p.role {
+                    Role::Uniform(ty) => {
+                        let layout = layout(ty);
+                        quote!(Uniform { binding: #b, layout: #layout })
+                    }
+                    Role::Element(ty) => {
+                        let layout = layout(ty);
+                        quote!(Element { binding: #b, layout: #layout })
+                    }
+                    Role::Storage(ty) => {
+                        let layout = layout(ty);
+                        quote!(Storage { binding: #b, layout: #layout })
+                    }
+                    Role::Atomic => quote!(Atomic { binding: #b }),
+                    Role::Texture(t) => {
+                        let kind = match t {
+                            Texture::Flat => quote!(Texture2d),
+                            Texture::Multisampled => quote!(Texture2dMultisampled),
+                            Texture::Volume => quote!(Texture3d),
+                        };
+                        quote!(Texture { binding: #b, texture: describe::TextureKind::#kind })
+                    }
+                    Role::Sampler => quote!(Sampler { binding: #b }),
+                    Role::Constant { id, default } => {
+                        quote!(Constant { id: #id, default: #default })
+                    }
+                    Role::Index => quote!(Index),
+                    Role::Group { .. } => quote!(Group),
+                    Role::Phase => quote!(Phase),
+                    Role::Attribute(ty) => {
+                        quote!(Attribute { location: #l, ty: <#ty as layout::Element>::ty() })
+                    }
+                    Role::Varying(ty) => {
+                        quote!(Varying { location: #l, ty: <#ty as layout::Element>::ty() })
+                    }
+                };
+                quote!(describe::Param { name: #name.into(), role: describe::Role::#role })
+            })
+            .collect()
+    }
+
+    fn describe_outputs(&self, variant: &Variant) -> Vec<TokenStream> {
+        let binding = self.params.iter().filter(|p| p.role.is_bound()).count() as u32;
+        self.outputs
+            .iter()
+            .enumerate()
+            .map(|(i, ty)| {
+                let i = i as u32;
+                match &self.stage {
+                    Stage::Vertex if i == 0 => quote!(describe::Output::Position),
+                    Stage::Vertex => {
+                        let location = i - 1;
+                        quote!(describe::Output::Varying {
+                            location: #location,
+                            ty: <#ty as layout::Element>::ty(),
+                        })
+                    }
+                    Stage::Fragment => quote!(describe::Output::Target {
+                        location: #i,
+                        ty: <#ty as layout::Element>::ty(),
+                    }),
+                    Stage::Compute(c) => match variant.format {
+                        Some(format) => {
+                            let format = format_ident!("{}", format.variant);
+                            let dimensions = self.dimensions() as u32;
+                            quote!(describe::Output::Texture {
+                                binding: #binding,
+                                format: describe::TexelFormat::#format,
+                                dimensions: #dimensions,
+                            })
+                        }
+                        None => {
+                            let ty = self.concrete(ty, variant);
+                            let per_group = c.per_group;
+                            quote!(describe::Output::Buffer {
+                                binding: #binding,
+                                layout: <#ty as layout::Element>::layout(),
+                                per_group: #per_group,
+                            })
+                        }
+                    },
+                }
+            })
+            .collect()
+    }
+
+    /// `fn run`.
+    fn run(&self, variant: &Variant) -> TokenStream {
+        let (count, constants) = (
+            self.params
+                .iter()
+                .filter(|p| {
+                    p.role.is_bound() || matches!(p.role, Role::Attribute(_) | Role::Varying(_))
+                })
+                .count()
+                + self.outputs.len(),
+            self.params
+                .iter()
+                .filter(|p| matches!(p.role, Role::Constant { .. }))
+                .count(),
+        );
+        let takes = self.params.iter().map(|p| {
+            let (name, text) = (&p.name, p.name.to_string());
+            match &p.role {
+                Role::Uniform(ty) => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(let #name = args.uniform::<#ty>(#text)?;)
+                }
+                Role::Element(ty) | Role::Storage(ty) => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(let #name = args.slice::<#ty>(#text)?;)
+                }
+                Role::Attribute(ty) | Role::Varying(ty) => {
+                    quote!(let #name = args.slice::<#ty>(#text)?;)
+                }
+                Role::Atomic => quote!(let #name = args.atomics(#text)?;),
+                Role::Texture(t) => {
+                    let (multisampled, flat) = (*t == Texture::Multisampled, *t != Texture::Volume);
+                    quote!(let #name = args.texture(#text, #multisampled, #flat)?;)
+                }
+                Role::Sampler => quote!(let #name = args.sampler(#text)?;),
+                Role::Constant { .. } => quote!(let #name = args.constant();),
+                Role::Index | Role::Group { .. } | Role::Phase => TokenStream::new(),
+            }
+        });
+        let body = match &self.stage {
+            Stage::Compute(c) => self.run_compute(c, variant),
+            _ => self.run_interface(variant),
+        };
+        quote! {
+            fn run(call: &mut native::Call<'_>) -> Result<(), native::CallError> {
+                let mode = call.mode;
+                let mut args = exec::Args::take(call, #count, #constants)?;
+                #(#takes)*
+                #body
+            }
+        }
+    }
+
+    /// The call of the kernel for invocation `i`.
+    fn host_call(&self, variant: &Variant) -> TokenStream {
+        let phased = matches!(&self.stage, Stage::Compute(c) if c.phases.is_some());
+        let name = &self.name;
+        let generics = variant.scalar.as_ref().map(|s| quote!(::<#s>));
+        let args = self.params.iter().map(|p| {
+            let name = &p.name;
+            match &p.role {
+                Role::Element(_) if phased => quote!(#name.get(i).copied()),
+                Role::Element(_) | Role::Attribute(_) | Role::Varying(_) => quote!(#name[i]),
+                Role::Uniform(_) | Role::Constant { .. } => quote!(#name),
+                Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
+                Role::Atomic => quote!(::hankel_dsl::Atomics::new(#name)),
+                Role::Texture(t) => {
+                    let ty = texture_type(*t);
+                    quote!(#ty::new(#name))
+                }
+                Role::Sampler => quote!(::hankel_dsl::Sampler::new(#name)),
+                Role::Index if self.dimensions() == 1 => quote!(i as u32),
+                Role::Index => quote!(i),
+                Role::Group { .. } => quote!(group),
+                Role::Phase => quote!(phase),
+            }
+        });
+        quote!(super::#name #generics (#(#args),*))
+    }
+
+    fn elements(&self) -> impl Iterator<Item = &crate::kernel::Param> {
+        self.params.iter().filter(|p| {
+            matches!(
+                p.role,
+                Role::Element(_) | Role::Attribute(_) | Role::Varying(_)
+            )
+        })
+    }
+
+    fn length_checks(&self) -> TokenStream {
+        self.elements()
+            .map(|p| {
+                let (name, text) = (&p.name, p.name.to_string());
+                quote!(exec::enough(#text, #name.len(), count)?;)
+            })
+            .collect()
+    }
+
+    fn run_compute(&self, c: &Compute, variant: &Variant) -> TokenStream {
+        let call = self.host_call(variant);
+        let checks = self.length_checks();
+        let Some(out) = self.outputs.first() else {
+            let extent = self.extent_param().map(|p| &p.name);
+            return quote! {
+                let count = #extent.len();
+                #checks
+                exec::for_each(mode, count, |i| #call)
+            };
+        };
+        let out = self.concrete(out, variant);
+        if let Some(format) = variant.format {
+            let format = format_ident!("{}", format.variant);
+            let (map, index) = if self.dimensions() == 2 {
+                (quote!(map_texels2), self.index_type())
+            } else {
+                (quote!(map_texels), self.index_type())
+            };
+            return quote! {
+                let output = args.texture_mut("output", describe::TexelFormat::#format)?;
+                exec::#map(mode, output, |i: #index| #call)
+            };
+        }
+        if let Some(phases) = c.phases {
+            let per_group = c.per_group;
+            return quote! {
+                let output = args.slice_mut::<#out>("output")?;
+                exec::phases(mode, output, #per_group, #phases, |phase, i, group| #call)
+            };
+        }
+        let map = if self.real.is_some() {
+            self.lane_map(variant, &call, &out)
+        } else {
+            quote!(exec::map1(mode, output, |i| #call))
+        };
+        quote! {
+            let output = args.slice_mut::<#out>("output")?;
+            let count = output.len();
+            #checks
+            #map
+        }
+    }
+
+    /// A map that is generic over `Real`: a body that the executor calls with scalars or lanes.
+    fn lane_map(&self, variant: &Variant, call: &TokenStream, out: &TokenStream) -> TokenStream {
+        let name = &self.name;
+        let scalar = variant.scalar.as_ref();
+        // Samplers and textures have no lanes; neither has an index.
+        let spreads = self.params.iter().all(|p| {
+            matches!(
+                p.role,
+                Role::Uniform(_) | Role::Element(_) | Role::Constant { .. }
+            )
+        });
+        if !spreads {
+            return quote!(exec::map1(mode, output, |i| #call));
+        }
+        let fields = self.params.iter().map(|p| {
+            let name = &p.name;
+            match &p.role {
+                Role::Uniform(ty) => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(#name: &'a #ty,)
+                }
+                Role::Element(ty) => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(#name: &'a [#ty],)
+                }
+                _ => quote!(#name: u32,),
+            }
+        });
+        let names: Vec<_> = self.params.iter().map(|p| &p.name).collect();
+        let windows = self.elements().map(|p| {
+            let name = &p.name;
+            quote!(let #name = &#name[start..start + L::LANES];)
+        });
+        let args = self.params.iter().map(|p| {
+            let name = &p.name;
+            match &p.role {
+                Role::Uniform(ty) => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(&<#ty as layout::Splat<#scalar>>::splat::<L>(*#name))
+                }
+                Role::Element(ty) => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(<#ty as layout::Lanewise<#scalar>>::gather::<L>(|i| #name[i]))
+                }
+                _ => quote!(#name),
+            }
+        });
+        quote! {
+            struct Body<'a> {
+                #(#fields)*
+                marker: core::marker::PhantomData<&'a ()>,
+            }
+            impl exec::LaneBody for Body<'_> {
+                type Scalar = #scalar;
+                type Out = #out;
+                #[inline(always)]
+                fn one(&self, i: usize) -> #out {
+                    let Self { #(#names,)* .. } = *self;
+                    #call
+                }
+                #[inline(always)]
+                fn many<L: layout::Lane<Scalar = #scalar>>(&self, start: usize, out: &mut [#out]) {
+                    let Self { #(#names,)* .. } = *self;
+                    #(#windows)*
+                    let value = super::#name::<L>(#(#args),*);
+                    for (i, slot) in out.iter_mut().enumerate().take(L::LANES) {
+                        *slot = <#out as layout::Lanewise<#scalar>>::extract::<L>(&value, i);
+                    }
+                }
+            }
+            exec::map1_lanes(mode, output, &Body { #(#names,)* marker: core::marker::PhantomData })
+        }
+    }
+
+    fn run_interface(&self, variant: &Variant) -> TokenStream {
+        let call = self.host_call(variant);
+        let checks = self.length_checks();
+        let names: Vec<_> = (0..self.outputs.len())
+            .map(|i| output_name(&self.stage, i))
+            .collect();
+        let takes = names.iter().zip(&self.outputs).map(|(name, ty)| {
+            let text = name.to_string();
+            quote!(let #name = args.slice_mut::<#ty>(#text)?;)
+        });
+        let first = &names[0];
+        let same = names.iter().skip(1).map(|name| {
+            let text = name.to_string();
+            quote!(exec::enough(#text, #name.len(), count)?;)
+        });
+        let value = if names.len() == 1 {
+            quote!((#call,))
+        } else {
+            call
+        };
+        quote! {
+            #(#takes)*
+            let count = #first.len();
+            #(#same)*
+            #checks
+            exec::map_tuple(mode, (#(#names,)*), |i| #value)
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The Hamburger problem with four moments: depths anywhere on the real line.
+
+use hankel_dsl::{Real, lit};
+
+use crate::Moments4;
+
+/// What a query point makes of four moments: the polynomial whose roots are the other two points
+/// of the distribution that attains the bound (\[MSM\], Algorithm 2 and Proposition 10), up to a
+/// positive factor, about the query point: `k2 u² + k1 u + k0` for depth `z + u`.
+///
+/// The factor is the determinant D of the Hankel matrix, so nothing is divided by it: the
+/// coefficients are those of D·B⁻¹·(1, z, z²)ᵀ. `k0` is positive. A root at infinity is `k2` = 0.
+#[derive(Clone, Copy)]
+pub(crate) struct Query<R> {
+    /// Mean depth relative to the query point.
+    pub mean: R,
+    /// Mean square of the depth relative to the query point.
+    pub square: R,
+    /// Weight of the query point itself, in [0, 1].
+    pub own: R,
+    pub k0: R,
+    pub k1: R,
+    pub k2: R,
+}
+
+impl<R: Real> Query<R> {
+    #[inline(always)]
+    pub fn new(m: Moments4<R>, z: R) -> Self {
+        let Moments4 { b1, b2, b3, b4 } = m;
+        // Minors of the Hankel matrix. What rounding or invalid moments make of the two that must
+        // be positive is lifted to a value far below any that a bias leaves.
+        let floor = R::epsilon() * R::epsilon();
+        let variance = (b2 - b1 * b1).max(floor);
+        let skew = b3 - b1 * b2;
+        let spread = b4 - b2 * b2;
+        let determinant = (spread * variance - skew * skew).max(floor);
+        let d1 = z - b1;
+        let d2 = z * z - b2;
+        let k2 = variance * d2 - skew * d1;
+        let k1 = spread * d1 - skew * d2 + z * k2 * lit!(2.0);
+        // 1 / own = 1 + d1²/D22 + (…)²/D33, a sum of squares: no cancellation, and never 0.
+        let square = variance + d1 * d1;
+        let total = square * determinant + k2 * k2;
+        Self {
+            mean: -d1,
+            square,
+            own: variance * determinant / total,
+            k0: total / variance,
+            k1,
+            k2,
+        }
+    }
+}
+
+/// The greatest lower bound, over all distributions of depths with moments `m`, of the share that
+/// lies below `z` (\[MSM\], Algorithms 2 and 3); in [0, 1].
+///
+/// Moments are clamped to [-1, 1] and `z` to [-2, 2], which costs nothing for depths in [0, 1] or
+/// [-1, 1] and keeps every intermediate value finite. Moments that no distribution has give the
+/// bound of a nearby vector.
+///
+/// The published form divides the polynomial by its leading coefficient, which is 0 when a root
+/// is at infinity. Here the query point's own weight is a quotient of sums of squares, whether
+/// both roots lie on one side follows from a sign, and otherwise the two roots enter as a distance
+/// and as the reciprocal of one, both finite; of the two weights the one without cancellation is
+/// computed.
+#[inline(always)]
+pub fn hamburger_4<R: Real>(m: Moments4<R>, z: R) -> R {
+    let query = Query::new(m.clamped(), z.clamp(lit!(-2.0), lit!(2.0)));
+    let between = query.between();
+    // Both roots below: all but the point's own weight. Both above: nothing.
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let outside = R::select(query.k1.gt(zero), one - query.own, zero);
+    R::select(query.k2.lt(zero), between, outside).saturate()
+}
+
+impl<R: Real> Query<R> {
+    /// The weight of the lower root when the query point lies between the roots (`k2` <= 0).
+    #[inline(always)]
+    pub fn between(&self) -> R {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let k2 = self.k2.abs();
+        // The nearer root is at distance `near`, the farther one at 1 / `far` on the other side.
+        let root = (self.k1 * self.k1 + k2 * self.k0 * lit!(4.0)).sqrt();
+        let s = ((self.k1.abs() + root) * lit!(0.5)).max(R::epsilon() * self.k0);
+        let near = self.k0 / s;
+        let far = k2 / s;
+        let near_is_below = self.k1.gt(zero);
+        // How far the mean lies to the nearer root's side.
+        let toward = R::select(near_is_below, -self.mean, self.mean);
+        let shared = one + near * far;
+        let mean_is_near = toward.ge(zero);
+        let first = R::select(
+            mean_is_near,
+            (self.square * far + toward) / (near * shared),
+            far * far * (self.square - toward * near) / shared,
+        );
+        let second = one - self.own - first;
+        // `first` is the nearer root's weight if the mean is on its side; wanted is the lower's.
+        let first_is_below = (mean_is_near & near_is_below) | !(mean_is_near | near_is_below);
+        R::select(first_is_below, first, second)
+    }
+}

@@ -1,0 +1,33 @@
+//! The moment problem, as moment shadow mapping needs it: from a few moments of the depths in a
+//! filter region, how much of the region is surely nearer than a receiver?
+//!
+//! Everything is generic over [`Real`](hankel_dsl::Real) and free of bindings and entry points.
+//! Functions take finite arguments of any value, valid moments or not, and return finite numbers
+//! in the stated range; none makes a NaN on the way.
+//!
+//! Depths are in [0, 1] ("unit") or [-1, 1] ("symmetric"); the j-th moment is the mean of the
+//! depth's j-th power; the zeroth is 1.
+//!
+//! # Sources
+//! - \[MSM\] C. Peters, R. Klein: *Moment Shadow Mapping* (2015), and its supplement.
+//! - \[BHS\] C. Peters, C. Münstermann, N. Wetzstein, R. Klein: *Beyond Hard Shadows: Moment Shadow
+//!   Maps for Single Scattering, Soft Shadows and Translucent Occluders* (2016), its supplement, and
+//!   the lecture on both.
+//! - \[VSM\] W. Donnelly, A. Lauritzen: *Variance Shadow Maps* (2006).
+#![no_std]
+
+mod bias;
+mod hamburger;
+mod hausdorff;
+mod moments;
+mod quantization;
+mod variance;
+
+pub use bias::{Bias, SYMMETRIC_16, SYMMETRIC_32, UNIT_16};
+pub use hamburger::hamburger_4;
+pub use hausdorff::hausdorff_4;
+pub use moments::Moments4;
+pub use quantization::{
+    Quantized4, dequantize_symmetric, dequantize_unit, quantize_symmetric, quantize_unit,
+};
+pub use variance::variance_2;

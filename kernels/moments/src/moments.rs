@@ -1,0 +1,68 @@
+//! Four power moments.
+
+use hankel_dsl::{Element, Real, lit};
+
+/// The first four power moments of a distribution of depths.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Moments4<R> {
+    /// Mean depth.
+    pub b1: R,
+    /// Mean square of the depth.
+    pub b2: R,
+    /// Mean cube of the depth.
+    pub b3: R,
+    /// Mean fourth power of the depth.
+    pub b4: R,
+}
+
+impl<R: Real> Moments4<R> {
+    /// The moments of a single depth.
+    #[inline(always)]
+    pub fn of_depth(z: R) -> Self {
+        let z2 = z * z;
+        Self {
+            b1: z,
+            b2: z2,
+            b3: z2 * z,
+            b4: z2 * z2,
+        }
+    }
+
+    /// Each moment in [-1, 1], where those of depths in [-1, 1] lie anyway.
+    #[inline(always)]
+    pub fn clamped(self) -> Self {
+        let clamp = |b: R| b.clamp(lit!(-1.0), lit!(1.0));
+        Self {
+            b1: clamp(self.b1),
+            b2: clamp(self.b2),
+            b3: clamp(self.b3),
+            b4: clamp(self.b4),
+        }
+    }
+
+    /// `self + t (other - self)`: the moments of the mixed distributions.
+    #[inline(always)]
+    pub fn lerp(self, other: Self, t: R) -> Self {
+        Self {
+            b1: self.b1.lerp(other.b1, t),
+            b2: self.b2.lerp(other.b2, t),
+            b3: self.b3.lerp(other.b3, t),
+            b4: self.b4.lerp(other.b4, t),
+        }
+    }
+
+    /// Moments of depths in [-1, 1] to those of the same depths moved to [0, 1], by expanding
+    /// the powers of (z + 1) / 2.
+    #[inline(always)]
+    pub fn symmetric_to_unit(self) -> Self {
+        let Self { b1, b2, b3, b4 } = self;
+        let one: R = lit!(1.0);
+        Self {
+            b1: (b1 + one) * lit!(0.5),
+            b2: (b2 + b1 * lit!(2.0) + one) * lit!(0.25),
+            b3: (b3 + (b2 + b1) * lit!(3.0) + one) * lit!(0.125),
+            b4: (b4 + (b3 + b1) * lit!(4.0) + b2 * lit!(6.0) + one) * lit!(0.0625),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Single functions as maps over rows: for other engines to take from the generated code, for
+//! `hankel eval`, and for parity in both precisions.
+
+use hankel_dsl::{Element, Real, kernel, lit};
+use hankel_moments::{
+    Moments4, Quantized4, dequantize_symmetric, dequantize_unit, hamburger_4, hausdorff_4,
+    quantize_symmetric, quantize_unit, variance_2,
+};
+
+/// How a bound is turned into a shadow.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Settings<R> {
+    /// The moment vector that the bias mixes in.
+    pub bias_target: Moments4<R>,
+    /// How much of it, from 0 to 1.
+    pub moment_bias: R,
+    /// What is taken off the receiver's depth.
+    pub depth_bias: R,
+    /// A shadow of 1 minus this is full (0.02 in the lecture).
+    pub light_leak: R,
+    /// The least variance of variance shadow mapping.
+    pub least_variance: R,
+}
+
+/// A receiver and the four moments at its place in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Receiver4<R> {
+    /// The filtered moments.
+    pub moments: Moments4<R>,
+    /// The receiver's depth, in the moments' range.
+    pub depth: R,
+}
+
+/// A receiver and the two moments at its place in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Receiver2<R> {
+    /// Mean depth.
+    pub b1: R,
+    /// Mean square of the depth.
+    pub b2: R,
+    /// The receiver's depth, in the moments' range.
+    pub depth: R,
+}
+
+/// A shadow.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Shadow<R> {
+    /// 0: lit, 1: in full shadow.
+    pub shadow: R,
+}
+
+#[inline(always)]
+fn biased<R: Real>(settings: &Settings<R>, receiver: Receiver4<R>) -> (Moments4<R>, R) {
+    let m = receiver
+        .moments
+        .lerp(settings.bias_target, settings.moment_bias);
+    (m, receiver.depth - settings.depth_bias)
+}
+
+#[inline(always)]
+fn cut<R: Real>(shadow: R, settings: &Settings<R>) -> Shadow<R> {
+    let one: R = lit!(1.0);
+    // A leak of 1 or more would divide by nothing.
+    Shadow {
+        shadow: (shadow / (one - settings.light_leak).max(R::epsilon())).saturate(),
+    }
+}
+
+/// Hamburger four moment shadow mapping: the least shadow that the moments allow, for depths
+/// anywhere.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn hamburger_4msm<R: Real>(
+    #[uniform] settings: &Settings<R>,
+    #[element] receiver: Receiver4<R>,
+) -> Shadow<R> {
+    let (m, z) = biased(settings, receiver);
+    cut(hamburger_4(m, z), settings)
+}
+
+/// Hausdorff four moment shadow mapping: the least shadow that the moments allow, for depths in
+/// [0, 1].
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn hausdorff_4msm<R: Real>(
+    #[uniform] settings: &Settings<R>,
+    #[element] receiver: Receiver4<R>,
+) -> Shadow<R> {
+    let (m, z) = biased(settings, receiver);
+    cut(hausdorff_4(m, z), settings)
+}
+
+/// Variance shadow mapping: the least shadow that two moments allow.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn vsm<R: Real>(
+    #[uniform] settings: &Settings<R>,
+    #[element] receiver: Receiver2<R>,
+) -> Shadow<R> {
+    let z = receiver.depth - settings.depth_bias;
+    cut(
+        variance_2(receiver.b1, receiver.b2, z, settings.least_variance),
+        settings,
+    )
+}
+
+/// Four moments of depths in [0, 1] to the basis optimised for 16 bits.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn quantize_4_unit<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
+    quantize_unit(moments)
+}
+
+/// The basis optimised for 16 bits to four moments of depths in [0, 1].
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn dequantize_4_unit<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
+    dequantize_unit(quantized)
+}
+
+/// Four moments of depths in [-1, 1] to the basis optimised for 16 bits.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn quantize_4_symmetric<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
+    quantize_symmetric(moments)
+}
+
+/// The basis optimised for 16 bits to four moments of depths in [-1, 1].
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn dequantize_4_symmetric<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
+    dequantize_symmetric(quantized)
+}

@@ -1,0 +1,37 @@
+//! Entry points of moment shadow mapping: the passes of a frame, and the single functions from
+//! them as maps over rows of data.
+//!
+//! | pass | kernel |
+//! | --- | --- |
+//! | depth from the light, 4x multisampled | [`light_depth`](depth::light_depth) |
+//! | resolve to four moments, quantised | [`resolve_unit`](resolve::resolve_unit), [`resolve_symmetric`](resolve::resolve_symmetric), [`resolve_plain`](resolve::resolve_plain) |
+//! | separable filter, twice | [`blur`](blur::blur) |
+//! | geometry from the camera | [`surface`](shade::surface) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf) |
+#![no_std]
+
+pub mod blur;
+pub mod bounds;
+pub mod depth;
+pub mod resolve;
+pub mod shade;
+
+hankel_dsl::kernels![
+    depth::light_depth,
+    resolve::resolve_unit,
+    resolve::resolve_symmetric,
+    resolve::resolve_plain,
+    blur::blur,
+    shade::surface,
+    shade::shade_hamburger,
+    shade::shade_hausdorff,
+    shade::shade_variance,
+    shade::shade_pcf,
+    bounds::hamburger_4msm,
+    bounds::hausdorff_4msm,
+    bounds::vsm,
+    bounds::quantize_4_unit,
+    bounds::dequantize_4_unit,
+    bounds::quantize_4_symmetric,
+    bounds::dequantize_4_symmetric,
+];

@@ -1,0 +1,89 @@
+//! From multisampled depth to filterable moments: each sample's depth gives a moment vector, the
+//! texel stores their mean (\[BHS\], lecture, "Generate a moment shadow map", step 2).
+
+use hankel_dsl::glam::{UVec2, Vec4};
+use hankel_dsl::{Texture2dMultisampled, kernel};
+use hankel_moments::{Moments4, Quantized4, quantize_symmetric, quantize_unit};
+
+/// The mean of what the samples of a texel give.
+#[inline(always)]
+fn mean(
+    depth: Texture2dMultisampled<'_>,
+    at: UVec2,
+    samples: u32,
+    moments: impl Fn(f32) -> Vec4,
+) -> Vec4 {
+    let mut sum = moments(depth.load(at, 0).x);
+    let mut i = 1;
+    while i < samples {
+        sum += moments(depth.load(at, i).x);
+        i += 1;
+    }
+    sum / samples as f32
+}
+
+#[inline(always)]
+fn quantized(q: Quantized4<f32>) -> Vec4 {
+    Vec4::new(q.r, q.g, q.b, q.a)
+}
+
+/// Depth in [0, 1] as a depth in [-1, 1].
+#[inline(always)]
+fn symmetric(z: f32) -> Moments4<f32> {
+    Moments4::of_depth(2.0 * z - 1.0)
+}
+
+/// Mean of a texel's moments, depths in [0, 1], in the basis optimised for 16 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16unorm),
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn resolve_unit(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)] samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    mean(depth, at, samples, |z| {
+        quantized(quantize_unit(Moments4::of_depth(z)))
+    })
+}
+
+/// Mean of a texel's moments, depths moved to [-1, 1], in the basis optimised for 16 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16unorm),
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn resolve_symmetric(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)] samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    mean(depth, at, samples, |z| {
+        quantized(quantize_symmetric(symmetric(z)))
+    })
+}
+
+/// Mean of a texel's moments, depths moved to [-1, 1], as they are, for a 32-bit map.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn resolve_plain(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)] samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    mean(depth, at, samples, |z| {
+        let m = symmetric(z);
+        Vec4::new(m.b1, m.b2, m.b3, m.b4)
+    })
+}

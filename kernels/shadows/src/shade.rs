@@ -1,0 +1,301 @@
+//! Forward shading with a shadow map: each technique is a fragment kernel over the same varyings,
+//! uniforms and map.
+
+use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
+use hankel_moments::{
+    Moments4, Quantized4, dequantize_symmetric, dequantize_unit, hamburger_4, hausdorff_4,
+    variance_2,
+};
+
+use crate::depth::{Transform, row_times_point};
+
+/// How the map holds moments: values of the specialisation constant `encoding`.
+pub mod encoding {
+    /// As they are, depths in [-1, 1].
+    pub const PLAIN: u32 = 0;
+    /// Optimised basis, depths in [0, 1].
+    pub const UNIT: u32 = 1;
+    /// Optimised basis, depths in [-1, 1].
+    pub const SYMMETRIC: u32 = 2;
+}
+
+/// A directional light and how its shadow map is read.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Light {
+    /// Row that takes a world-space point to the map's horizontal coordinate, 0 to 1.
+    pub row_u: Vec4,
+    /// Row that takes a world-space point to the map's vertical coordinate, 0 (first row) to 1.
+    pub row_v: Vec4,
+    /// Row that takes a world-space point to its depth in the map, 0 to 1.
+    pub row_depth: Vec4,
+    /// Unit vector towards the light (x, y, z); w: the light's irradiance.
+    pub toward: Vec4,
+    /// Colour and strength of the ambient light.
+    pub ambient: Vec4,
+    /// The moment vector that the bias mixes in.
+    pub bias_target: Vec4,
+    /// How much of it, from 0 to 1.
+    pub moment_bias: f32,
+    /// What is taken off a receiver's depth, in the map's range of 0 to 1.
+    pub depth_bias: f32,
+    /// The share of shadow that is taken for full shadow is 1 minus this (0.02 in the lecture).
+    pub light_leak: f32,
+    /// Texels of the percentage-closer filter to each side of the receiver's own.
+    pub filter_radius: u32,
+}
+
+/// A vertex as the camera sees it: position, world-space position, normal and colour.
+#[kernel(vertex)]
+pub fn surface(
+    #[attribute] position: Vec3,
+    #[attribute] normal: Vec3,
+    #[attribute] colour: Vec3,
+    #[uniform] camera: &Transform,
+) -> (Vec4, Vec3, Vec3, Vec3) {
+    (camera.apply(position), position, normal, colour)
+}
+
+#[inline(always)]
+fn dot(a: Vec3, b: Vec3) -> f32 {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}
+
+/// Lambert's law with a shadow from 0 (lit) to 1, plus ambient light.
+#[inline(always)]
+fn lit(light: &Light, normal: Vec3, colour: Vec3, shadow: f32) -> Vec4 {
+    let toward = Vec3::new(light.toward.x, light.toward.y, light.toward.z);
+    // A normal interpolated to nothing has no direction; the floor keeps it finite.
+    let length = dot(normal, normal).sqrt().max_of(1e-20);
+    let cosine = (dot(normal, toward) / length).max_of(0.0);
+    let direct = cosine * light.toward.w * (1.0 - shadow);
+    let shade = |colour: f32, ambient: f32| colour * (direct + ambient);
+    Vec4::new(
+        shade(colour.x, light.ambient.x),
+        shade(colour.y, light.ambient.y),
+        shade(colour.z, light.ambient.z),
+        1.0,
+    )
+}
+
+/// `Real`'s maximum under another name: `f32` has one of its own, which tests for NaN.
+trait MaxOf {
+    fn max_of(self, other: Self) -> Self;
+}
+
+impl MaxOf for f32 {
+    #[inline(always)]
+    fn max_of(self, other: Self) -> Self {
+        Real::max(self, other)
+    }
+}
+
+/// A receiver in the map: coordinates and biased depth, from 0 to 1 inside.
+#[inline(always)]
+fn receiver(light: &Light, world: Vec3) -> (Vec2, f32) {
+    let uv = Vec2::new(
+        row_times_point(light.row_u, world),
+        row_times_point(light.row_v, world),
+    );
+    (
+        uv,
+        row_times_point(light.row_depth, world) - light.depth_bias,
+    )
+}
+
+/// Moments from a map's texel.
+#[inline(always)]
+fn decode(texel: Vec4, how: u32) -> Moments4<f32> {
+    let q = Quantized4 {
+        r: texel.x,
+        g: texel.y,
+        b: texel.z,
+        a: texel.w,
+    };
+    if how == encoding::UNIT {
+        dequantize_unit(q)
+    } else if how == encoding::SYMMETRIC {
+        dequantize_symmetric(q)
+    } else {
+        Moments4 {
+            b1: q.r,
+            b2: q.g,
+            b3: q.b,
+            b4: q.a,
+        }
+    }
+}
+
+/// The map's depth range: [0, 1] or [-1, 1].
+#[inline(always)]
+fn in_range(z: f32, how: u32) -> f32 {
+    if how == encoding::UNIT {
+        z
+    } else {
+        2.0 * z - 1.0
+    }
+}
+
+/// Biased moments at a receiver, and its depth in the map's range.
+#[inline(always)]
+fn look_up(
+    light: &Light,
+    map: Texture2d<'_>,
+    sampler: Sampler,
+    how: u32,
+    world: Vec3,
+) -> (Moments4<f32>, f32) {
+    let (uv, z) = receiver(light, world);
+    let t = light.bias_target;
+    let target = Moments4 {
+        b1: t.x,
+        b2: t.y,
+        b3: t.z,
+        b4: t.w,
+    };
+    let m = decode(map.sample(sampler, uv), how).lerp(target, light.moment_bias);
+    (m, in_range(z, how))
+}
+
+/// The cut that ends weak light leaking: shadow from `1 - leak` on is full (lecture).
+#[inline(always)]
+fn cut(shadow: f32, leak: f32) -> f32 {
+    Real::saturate(shadow / (1.0 - leak))
+}
+
+/// Shading with Hamburger four moment shadow mapping.
+#[kernel(
+    fragment,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "a sampler's interpolation weights may be rounded to 8 bits, and the bound amplifies that near silhouettes: one step of an 8-bit target"
+    )
+)]
+pub fn shade_hamburger(
+    #[varying] world: Vec3,
+    #[varying] normal: Vec3,
+    #[varying] colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)] encoding: u32,
+) -> Vec4 {
+    let (m, z) = look_up(light, map, sampler, encoding, world);
+    lit(
+        light,
+        normal,
+        colour,
+        cut(hamburger_4(m, z), light.light_leak),
+    )
+}
+
+/// Shading with Hausdorff four moment shadow mapping.
+#[kernel(
+    fragment,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "a sampler's interpolation weights may be rounded to 8 bits, and the bound amplifies that near silhouettes: one step of an 8-bit target"
+    )
+)]
+pub fn shade_hausdorff(
+    #[varying] world: Vec3,
+    #[varying] normal: Vec3,
+    #[varying] colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)] encoding: u32,
+) -> Vec4 {
+    let (m, z) = look_up(light, map, sampler, encoding, world);
+    let shadow = if encoding == encoding::UNIT {
+        hausdorff_4(m, z)
+    } else {
+        hausdorff_4(m.symmetric_to_unit(), 0.5 * z + 0.5)
+    };
+    lit(light, normal, colour, cut(shadow, light.light_leak))
+}
+
+/// Shading with variance shadow mapping, from the first two of four moments.
+#[kernel(
+    fragment,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "a sampler's interpolation weights may be rounded to 8 bits, and the bound amplifies that near silhouettes: one step of an 8-bit target"
+    )
+)]
+pub fn shade_variance(
+    #[varying] world: Vec3,
+    #[varying] normal: Vec3,
+    #[varying] colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)] encoding: u32,
+) -> Vec4 {
+    let (m, z) = look_up(light, map, sampler, encoding, world);
+    lit(
+        light,
+        normal,
+        colour,
+        cut(
+            variance_2(m.b1, m.b2, z, light.moment_bias),
+            light.light_leak,
+        ),
+    )
+}
+
+/// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
+/// the receiver, the first sample of each texel. The reference for the others.
+#[kernel(fragment)]
+pub fn shade_pcf(
+    #[varying] world: Vec3,
+    #[varying] normal: Vec3,
+    #[varying] colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] depth: hankel_dsl::Texture2dMultisampled<'_>,
+) -> Vec4 {
+    let (uv, z) = receiver(light, world);
+    let size = depth.size();
+    let nearest = |t: f32, size: u32| {
+        let last = (size - 1) as f32;
+        Real::clamp((t * size as f32).floor_of(), 0.0, last) as i32
+    };
+    let (x, y) = (nearest(uv.x, size.x), nearest(uv.y, size.y));
+    let radius = light.filter_radius as i32;
+    let mut shadowed = 0.0;
+    let mut dy = -radius;
+    while dy <= radius {
+        let mut dx = -radius;
+        while dx <= radius {
+            let at = UVec2::new(within(x + dx, size.x), within(y + dy, size.y));
+            shadowed += if depth.load(at, 0).x < z { 1.0 } else { 0.0 };
+            dx += 1;
+        }
+        dy += 1;
+    }
+    let width = (2 * radius + 1) as f32;
+    lit(light, normal, colour, shadowed / (width * width))
+}
+
+trait FloorOf {
+    fn floor_of(self) -> Self;
+}
+
+impl FloorOf for f32 {
+    #[inline(always)]
+    fn floor_of(self) -> Self {
+        Real::floor(self)
+    }
+}
+
+/// `i` moved to the nearest of 0 to `size - 1`.
+#[inline(always)]
+fn within(i: i32, size: u32) -> u32 {
+    let last = size as i32 - 1;
+    let i = if i < 0 { 0 } else { i };
+    (if i > last { last } else { i }) as u32
+}
