@@ -218,7 +218,7 @@ impl NativeDevice {
                     Use::Element(_) | Use::Attribute(..) | Use::Varying(..)
                 );
                 match slot.role.element_bytes() {
-                    Some(size) if own => Arg::Bytes(&bytes[..count * size]),
+                    Some(size) if own => Arg::Bytes(&bytes[..bytes.len().min(count * size)]),
                     _ => Arg::Bytes(bytes),
                 }
             }

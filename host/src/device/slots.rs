@@ -396,8 +396,8 @@ fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result
 
 /// How many invocations run along x, y, z: as many as the first output has elements or texels
 /// (times the workgroup where it gets one element for each group); without outputs, as many as
-/// the first element buffer, else the first texture, has. Element buffers must have at least as
-/// many elements, and every other output the same size.
+/// the first buffer that is read has. Element buffers must have at least as many elements, except
+/// in kernels with phases, and every other output the same size.
 ///
 /// # Errors
 /// [`DeviceError::Argument`] for a buffer that is too short or an output of another size;
@@ -461,24 +461,23 @@ pub fn extent(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given]) -> Result<[u
     let extent = match extent {
         Some((size, _)) => size,
         None => {
-            let first = |wanted: fn(&Use<'_>) -> bool| slots.iter().position(|s| wanted(&s.role));
-            if let Some(i) = first(|u| matches!(u, Use::Element(_))) {
-                [elements(i)?, 1, 1]
-            } else if let Some(i) = first(|u| matches!(u, Use::Texture(_)))
-                && let Given::Texture { shape, .. } = given[i]
-            {
-                shape.size
-            } else {
+            let counted = |s: &Slot<'_>| matches!(s.role, Use::Element(_) | Use::Storage(_));
+            let Some(i) = slots.iter().position(counted) else {
                 return Err(DeviceError::Stage {
                     kernel: kernel.name.clone(),
                     stage: "compute",
-                    problem: "nothing says how many invocations it runs: give it an output, an \
-                              element parameter or a texture"
+                    problem: "nothing says how many invocations it runs: give it an output, or a \
+                              parameter that is a buffer"
                         .into(),
                 });
-            }
+            };
+            [elements(i)?, 1, 1]
         }
     };
+    if matches!(kernel.stage, Stage::Compute { phases: 1.., .. }) {
+        // A workgroup's last invocations may have no element of their own; they are told so.
+        return Ok(extent);
+    }
     let invocations = extent[0];
     for (i, slot) in slots.iter().enumerate() {
         let own = matches!(

@@ -52,6 +52,11 @@ pub struct Atomics<'a>(
 );
 
 #[cfg(target_arch = "spirv")]
+#[allow(
+    missing_docs,
+    invalid_reference_casting,
+    reason = "documented on the host's side; the slice comes from a `&mut` of the entry point, and SPIR-V atomics take a pointer"
+)]
 mod spirv {
     use super::{Atomics, IndexUnchecked};
     use spirv_std::memory::{Scope, Semantics};

@@ -7,6 +7,7 @@ use glam::{UVec2, UVec3, Vec2, Vec4};
 use crate::native;
 
 #[cfg(target_arch = "spirv")]
+#[allow(missing_docs, reason = "named by the macros only")]
 pub mod image {
     use spirv_std::Image;
     pub type Sampled2d = Image!(2D, type=f32, sampled);
@@ -61,6 +62,7 @@ pub struct Sampler(
 );
 
 #[cfg(target_arch = "spirv")]
+#[allow(missing_docs, reason = "documented on the host's side")]
 mod spirv {
     use super::*;
     use spirv_std::image::{ImageWithMethods, sample_with};
