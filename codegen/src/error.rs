@@ -1,0 +1,390 @@
+//! What can go wrong, with the kernel and the construct where they are known, and what to do.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Result with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// A step from source to text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Step {
+    /// rust-gpu: Rust to SPIR-V.
+    Compile,
+    /// Reading the binary.
+    Read,
+    /// spirv-val.
+    Validate,
+    /// spirv-opt.
+    Optimise,
+    /// Comparing the module with the kernel's description.
+    Describe,
+    /// naga's SPIR-V reader.
+    Parse,
+    /// naga's validator.
+    Check,
+    /// naga's writer for a language.
+    Write(crate::Language),
+    /// Reading back what was written.
+    Reread(crate::Language),
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Compile => f.write_str("rust-gpu"),
+            Self::Read => f.write_str("reading SPIR-V"),
+            Self::Validate => f.write_str("spirv-val"),
+            Self::Optimise => f.write_str("spirv-opt"),
+            Self::Describe => f.write_str("comparing SPIR-V with the kernel's description"),
+            Self::Parse => f.write_str("naga's SPIR-V reader"),
+            Self::Check => f.write_str("naga's validator"),
+            Self::Write(language) => write!(f, "naga's {language} writer"),
+            Self::Reread(language) => write!(f, "reading the generated {language}"),
+        }
+    }
+}
+
+/// A step that failed on one kernel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// The entry point's name.
+    pub kernel: String,
+    /// Which step.
+    pub step: Step,
+    /// The instruction, expression or variable that it stumbled over, where it says so.
+    pub construct: Option<String>,
+    /// What the tool said.
+    pub message: String,
+    /// The tool panicked.
+    pub panicked: bool,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let how = if self.panicked { "panicked" } else { "failed" };
+        write!(f, "kernel `{}`: {} {how}", self.kernel, self.step)?;
+        if let Some(construct) = &self.construct {
+            write!(f, " at {construct}")?;
+        }
+        write!(f, ": {}", self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// A failure of this crate.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or folder could not be read or written.
+    #[error("cannot {action} {}", path.display())]
+    Io {
+        /// What was being done.
+        action: &'static str,
+        /// To what.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A program did not start.
+    #[error("cannot run `{}`", program.display())]
+    Run {
+        /// The program.
+        program: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A Cargo.toml that is no kernel crate's.
+    #[error("{}: {problem}", path.display())]
+    Manifest {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// rust-gpu or rustc rejected the kernel crate.
+    #[error("{} does not compile to SPIR-V{}{}\n{output}", manifest.display(),
+        kernel.as_ref().map(|name| format!(" (kernel `{name}`)")).unwrap_or_default(),
+        if *panicked { ": rust-gpu panicked" } else { "" })]
+    Compile {
+        /// The crate's Cargo.toml.
+        manifest: PathBuf,
+        /// The entry point that the diagnostics name.
+        kernel: Option<String>,
+        /// rust-gpu panicked, as opposed to reporting an error.
+        panicked: bool,
+        /// What rustc printed.
+        output: String,
+    },
+    /// The compiler made no module for a kernel of the description.
+    #[error("{} has no SPIR-V entry point `{kernel}`; it has: {}", manifest.display(), list(found))]
+    NoEntryPoint {
+        /// The crate's Cargo.toml.
+        manifest: PathBuf,
+        /// The kernel.
+        kernel: String,
+        /// The entry points that there are.
+        found: Vec<String>,
+    },
+    /// A step failed on one kernel.
+    #[error(transparent)]
+    Kernel(#[from] Failure),
+    /// Several kernels failed.
+    #[error("{} kernels failed\n{}", .0.len(),
+        .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Kernels(Vec<Failure>),
+    /// SPIR-V that was not made from the present sources.
+    #[error("the committed SPIR-V is not made from the present sources: {reason}")]
+    Stale {
+        /// What does not match.
+        reason: String,
+    },
+    /// The committed SPIR-V cannot be read.
+    #[error("{}: {problem}", path.display())]
+    Bundle {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// No kernel matches.
+    #[error("no kernel is named `{name}`; there are: {}", list(known))]
+    UnknownKernel {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// No such language.
+    #[error("no target is named `{name}`; there are: {}", list(known))]
+    UnknownTarget {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// No such specialisation constant.
+    #[error("no kernel that is built has a constant `{name}`; there are: {}", list(known))]
+    UnknownConstant {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// A value of an option that does not exist.
+    #[error("{option} `{value}` is not known: {expected}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        value: String,
+        /// What may be given.
+        expected: &'static str,
+    },
+    /// A file that hankel did not write is where one must go.
+    #[error("{} is in the way: hankel did not write it, or it was edited since", path.display())]
+    InTheWay {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Two kernels with one name.
+    #[error("two kernels are named `{name}`")]
+    DuplicateKernel {
+        /// The name.
+        name: String,
+    },
+    /// Structures of one name and different layouts in one header.
+    #[error("kernels use two structures named `{name}` with different layouts")]
+    DuplicateLayout {
+        /// The name.
+        name: String,
+    },
+    /// hankel.toml is wrong.
+    #[error("{}: {problem}", path.display())]
+    Budget {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A crate cannot be made there.
+    #[error("cannot make a kernel crate in {}: {problem}", path.display())]
+    Scaffold {
+        /// The folder.
+        path: PathBuf,
+        /// Why not.
+        problem: String,
+    },
+}
+
+impl Error {
+    /// What the user can do about it, as a sentence or two.
+    pub fn advice(&self) -> Option<String> {
+        Some(match self {
+            Self::Kernel(failure) => failure.advice(),
+            Self::Kernels(failures) => failures.first()?.advice(),
+            Self::Compile { panicked: true, .. } => {
+                "rust-gpu met something it has no rule for: undo the last edit, or write the \
+                 construct in plainer terms (no trait objects, no slices of arrays, no i128)."
+                    .into()
+            }
+            Self::Compile { .. } => "Correct the kernel where the compiler points.".into(),
+            Self::NoEntryPoint { .. } => {
+                "List the function in the crate's `hankel_dsl::kernels!` and give it `#[kernel]`."
+                    .into()
+            }
+            Self::Stale { .. } => {
+                "Install rust-gpu's compiler (`hankel toolchain install`): then the SPIR-V is made \
+                 from the sources. Or undo the edit of the kernels."
+                    .into()
+            }
+            Self::Bundle { .. } => {
+                "Take the folder from version control again, or write it anew with rust-gpu's \
+                 compiler installed."
+                    .into()
+            }
+            Self::UnknownKernel { .. } => {
+                "Name one of these, or part of a name with `*`; `hankel list` shows them.".into()
+            }
+            Self::InTheWay { .. } => {
+                "Move it away or choose another output folder; with `--force` it is overwritten."
+                    .into()
+            }
+            Self::DuplicateKernel { .. } | Self::DuplicateLayout { .. } => {
+                "Rename one of them.".into()
+            }
+            Self::Manifest { .. } => "Give the path of a kernel crate's Cargo.toml.".into(),
+            Self::Run { .. } => {
+                "`hankel toolchain status` says which compiler is used and what is missing.".into()
+            }
+            Self::UnknownConstant { .. } => "Give the constant's name in the kernel.".into(),
+            Self::Io { .. }
+            | Self::UnknownTarget { .. }
+            | Self::Option { .. }
+            | Self::Budget { .. }
+            | Self::Scaffold { .. } => return None,
+        })
+    }
+}
+
+impl Failure {
+    /// What the user can do about it.
+    pub fn advice(&self) -> String {
+        match self.step {
+            Step::Compile => "Correct the kernel where the compiler points.",
+            Step::Read => "The file is damaged or no SPIR-V: make it again.",
+            Step::Validate if self.message.contains("capability") => {
+                "The module uses something whose capability rust-gpu was not told of; keep to what \
+                 the DSL offers."
+            }
+            Step::Validate | Step::Optimise => {
+                "rust-gpu made SPIR-V that breaks the rules: write the construct in plainer terms, \
+                 and report it to rust-gpu."
+            }
+            Step::Describe => {
+                "Description and SPIR-V come from different sources, or a field's type has another \
+                 layout on the GPU: rebuild, or use f32, u32, i32 and glam vectors."
+            }
+            Step::Parse | Step::Check => {
+                "naga does not read this construct: NaN and infinity literals, 64-bit atomics and \
+                 `switch` fall-through are the usual ones. Write it differently, or build only \
+                 `--target spirv`."
+            }
+            Step::Write(_) | Step::Reread(_) => {
+                "Leave this language out with `--target`, or avoid the construct."
+            }
+        }
+        .into()
+    }
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+/// Adds what was being done, and to which file, to an I/O error.
+pub(crate) trait During<T> {
+    fn during(self, action: &'static str, path: &Path) -> Result<T>;
+}
+
+impl<T> During<T> for io::Result<T> {
+    fn during(self, action: &'static str, path: &Path) -> Result<T> {
+        self.map_err(|source| Error::Io { action, path: path.to_owned(), source })
+    }
+}
+
+/// Runs a tool that may panic; a panic's message becomes the error. Nothing is printed.
+pub(crate) fn guarded<T>(
+    tool: impl FnOnce() -> Result<T, Failure>,
+    kernel: &str,
+    step: Step,
+) -> Result<T, Failure> {
+    quiet_panics();
+    QUIET.with(|quiet| quiet.set(quiet.get() + 1));
+    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(tool));
+    QUIET.with(|quiet| quiet.set(quiet.get() - 1));
+    result.unwrap_or_else(|payload| {
+        let message = payload
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
+            .unwrap_or_else(|| "no message".into());
+        let at = PANICKED_AT.with(|at| at.take());
+        Err(Failure { kernel: kernel.into(), step, construct: at, message, panicked: true })
+    })
+}
+
+thread_local! {
+    static QUIET: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
+    static PANICKED_AT: std::cell::Cell<Option<String>> = const { std::cell::Cell::new(None) };
+}
+
+/// Panics inside [`guarded`] are reported as errors, so the hook keeps silent about them.
+fn quiet_panics() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            if QUIET.with(|quiet| quiet.get()) == 0 {
+                return before(info);
+            }
+            // The file's name without the folders: those are the build machine's.
+            let at = info.location().map(|place| {
+                let file = place.file().rsplit(['/', '\\']).next().unwrap_or_default();
+                format!("{file}:{}", place.line())
+            });
+            PANICKED_AT.with(|slot| slot.set(at));
+        }));
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_an_error_that_names_kernel_and_step() {
+        let error = guarded::<()>(|| panic!("index out of range"), "shade", Step::Parse).unwrap_err();
+        assert!(error.panicked);
+        let text = error.to_string();
+        assert!(text.contains("kernel `shade`: naga's SPIR-V reader panicked at error.rs:"), "{text}");
+        assert!(text.ends_with("index out of range"), "{text}");
+    }
+
+    #[test]
+    fn every_step_gives_advice() {
+        for step in [Step::Compile, Step::Read, Step::Validate, Step::Describe, Step::Parse] {
+            let failure = Failure {
+                kernel: "k".into(),
+                step,
+                construct: None,
+                message: "m".into(),
+                panicked: false,
+            };
+            assert!(failure.advice().ends_with(['.', '`']), "{step}");
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! From rust-gpu's SPIR-V to the final: validated, optimised, asking for no more than it uses,
+//! with the names of the source. The same bytes on every machine: the tools are compiled in.
+
+use hankel_dsl::native::describe::Kernel;
+use spirv_tools::TargetEnv;
+use spirv_tools::opt::{Optimizer, Passes};
+use spirv_tools::val::Validator;
+
+use crate::cost::{self, Cost};
+use crate::error::{Failure, Step, guarded};
+use crate::spirv::{self, exact, names, trim};
+
+/// What the modules are for.
+const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
+
+/// A finished module.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finished {
+    /// The binary, little end first.
+    pub spirv: Vec<u8>,
+    /// What it costs.
+    pub cost: Cost,
+}
+
+/// Finishes the module of `kernel`: one entry point, as rust-gpu writes it.
+///
+/// # Errors
+///
+/// The binary is damaged or invalid, a tool fails, or the module is not what `kernel` describes.
+pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
+    let name = kernel.name.as_str();
+    let words = optimise(&spirv::words(raw, name)?, name)?;
+    let mut module = spirv::load(&words, name)?;
+    trim::debug(&mut module);
+    trim::capabilities(&mut module);
+    trim::memory_model(&mut module);
+    trim::write_only_textures(&mut module);
+    names::apply(&mut module, kernel)?;
+    let words = spirv::store(&module);
+    validate(&words, name)?;
+    Ok(Finished { spirv: spirv::bytes(&words), cost: cost::of_module(&module) })
+}
+
+/// The cost of anybody's module after the same optimisation, to compare a listing with a kernel.
+///
+/// # Errors
+///
+/// The binary is damaged or invalid; `name` is what the error calls it.
+pub fn cost_after_optimisation(raw: &[u8], name: &str) -> Result<Cost, Failure> {
+    let words = optimise(&spirv::words(raw, name)?, name)?;
+    Ok(cost::of_module(&spirv::load(&words, name)?))
+}
+
+/// Validates, and runs spirv-opt with floating-point arithmetic held as it is written.
+///
+/// # Errors
+///
+/// The module is invalid, or the optimiser fails.
+pub fn optimise(words: &[u32], name: &str) -> Result<Vec<u32>, Failure> {
+    validate(words, name)?;
+    let mut module = spirv::load(words, name)?;
+    exact::fold(&mut module);
+    exact::pin(&mut module);
+    let words = run_passes(&spirv::store(&module), name, |passes| {
+        passes
+            .register_pass(Passes::StripDebugInfo)
+            .register_performance_passes()
+            .register_pass(Passes::IfConversion)
+            .register_pass(Passes::LocalRedundancyElimination)
+            .register_pass(Passes::RedundancyElimination)
+            .register_pass(Passes::CombineAccessChains)
+            .register_pass(Passes::Simplification)
+            .register_pass(Passes::VectorDCE)
+            .register_pass(Passes::AggressiveDCE)
+            .register_pass(Passes::DeadBranchElim)
+            .register_pass(Passes::BlockMerge)
+            .register_pass(Passes::CFGCleanup)
+            .register_pass(Passes::AggressiveDCE);
+    })?;
+    // Inlining and unrolling may have brought constants together.
+    let mut module = spirv::load(&words, name)?;
+    exact::fold(&mut module);
+    let words = run_passes(&spirv::store(&module), name, |passes| {
+        passes
+            .register_pass(Passes::LocalRedundancyElimination)
+            .register_pass(Passes::AggressiveDCE)
+            .register_pass(Passes::UnifyConstant)
+            .register_pass(Passes::RemoveDuplicates)
+            .register_pass(Passes::EliminateDeadConstant)
+            .register_pass(Passes::RemoveUnusedInterfaceVariables)
+            .register_pass(Passes::CompactIds);
+    })?;
+    let mut module = spirv::load(&words, name)?;
+    exact::unpin(&mut module);
+    Ok(spirv::store(&module))
+}
+
+fn run_passes(
+    words: &[u32],
+    name: &str,
+    register: impl FnOnce(&mut spirv_tools::opt::compiled::CompiledOptimizer),
+) -> Result<Vec<u32>, Failure> {
+    let mut optimizer = spirv_tools::opt::compiled::CompiledOptimizer::with_env(ENVIRONMENT);
+    register(&mut optimizer);
+    let mut said = Vec::new();
+    let result = optimizer.optimize(
+        words,
+        &mut |message: spirv_tools::error::Message| said.push(message.message),
+        Some(spirv_tools::opt::Options { preserve_spec_constants: true, ..Default::default() }),
+    );
+    match result {
+        Ok(binary) => Ok(binary.as_words().to_vec()),
+        Err(error) => Err(Failure {
+            kernel: name.into(),
+            step: Step::Optimise,
+            construct: None,
+            message: if said.is_empty() { error.to_string() } else { said.join("; ") },
+            panicked: false,
+        }),
+    }
+}
+
+/// spirv-val for Vulkan 1.2.
+///
+/// # Errors
+///
+/// The module is invalid.
+pub fn validate(words: &[u32], name: &str) -> Result<(), Failure> {
+    let validator = spirv_tools::val::create(Some(ENVIRONMENT));
+    guarded(
+        || {
+            validator.validate(words, None).map_err(|error| {
+                let (message, construct) = match error.diagnostic {
+                    Some(told) => {
+                        // Where spirv-val quotes the instruction, it does so on a line of its own.
+                        let mut lines = told.message.trim().splitn(2, '\n');
+                        let message = lines.next().unwrap_or_default().trim().to_owned();
+                        let quoted = [lines.next().unwrap_or_default(), told.notes.as_str()]
+                            .into_iter()
+                            .map(str::trim)
+                            .find(|text| !text.is_empty())
+                            .map(|text| format!("`{text}`"));
+                        (message, quoted)
+                    }
+                    None => (error.inner.to_string(), None),
+                };
+                Failure {
+                    kernel: name.into(),
+                    step: Step::Validate,
+                    construct,
+                    message,
+                    panicked: false,
+                }
+            })
+        },
+        name,
+        Step::Validate,
+    )
+}

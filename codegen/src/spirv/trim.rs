@@ -1,0 +1,200 @@
+//! Takes away what a module declares and does not use, so that it asks as little as possible of
+//! the device that runs it.
+
+use std::collections::HashSet;
+
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{
+    AddressingModel, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel, MemorySemantics,
+    Op, StorageClass, Word,
+};
+
+use super::{global, id, literal, op};
+
+/// Removes capabilities that nothing in the module needs.
+///
+/// Knows those that Hankel enables for a whole crate; others stay. spirv-val, which runs
+/// afterwards, would tell of one too few.
+pub fn capabilities(module: &mut Module) {
+    let used: HashSet<Capability> = module
+        .all_inst_iter()
+        .filter_map(|instruction| needs(instruction))
+        .collect();
+    module.capabilities.retain(|instruction| match instruction.operands.first() {
+        Some(Operand::Capability(capability)) if ENABLED.contains(capability) => {
+            used.contains(capability)
+        }
+        _ => true,
+    });
+}
+
+/// Capabilities that are enabled for every kernel crate, used or not.
+pub const ENABLED: [Capability; 4] = [
+    Capability::Float64,
+    Capability::Int64,
+    Capability::ImageQuery,
+    Capability::StorageImageExtendedFormats,
+];
+
+fn needs(instruction: &Instruction) -> Option<Capability> {
+    match op(instruction) {
+        Op::TypeFloat if literal(instruction, 0) == Some(64) => Some(Capability::Float64),
+        Op::TypeInt if literal(instruction, 0) == Some(64) => Some(Capability::Int64),
+        Op::ImageQuerySize
+        | Op::ImageQuerySizeLod
+        | Op::ImageQueryLod
+        | Op::ImageQueryLevels
+        | Op::ImageQuerySamples => Some(Capability::ImageQuery),
+        Op::TypeImage => match instruction.operands.get(6) {
+            Some(Operand::ImageFormat(format)) => (!is_core(*format)).then_some(Capability::StorageImageExtendedFormats),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// Formats that every device with storage images has.
+fn is_core(format: ImageFormat) -> bool {
+    matches!(
+        format,
+        ImageFormat::Unknown
+            | ImageFormat::Rgba32f
+            | ImageFormat::Rgba16f
+            | ImageFormat::R32f
+            | ImageFormat::Rgba8
+            | ImageFormat::Rgba8Snorm
+            | ImageFormat::Rgba32i
+            | ImageFormat::Rgba16i
+            | ImageFormat::Rgba8i
+            | ImageFormat::R32i
+            | ImageFormat::Rgba32ui
+            | ImageFormat::Rgba16ui
+            | ImageFormat::Rgba8ui
+            | ImageFormat::R32ui
+    )
+}
+
+/// Replaces the Vulkan memory model by GLSL's, where no access says more than GLSL's can.
+///
+/// rust-gpu declares Vulkan's for every module, but marks no access as shared with other
+/// invocations. Under Vulkan's model an unmarked access is private: what one invocation puts into
+/// workgroup memory need not reach another, barrier or not. Under GLSL's every access is shared,
+/// which is what the kernels mean; and devices need not know the newer model.
+pub fn memory_model(module: &mut Module) {
+    let vulkan = Operand::MemoryModel(MemoryModel::Vulkan);
+    if module.memory_model.as_ref().and_then(|model| model.operands.get(1)) != Some(&vulkan) {
+        return;
+    }
+    let plain = MemoryAccess::VOLATILE | MemoryAccess::ALIGNED | MemoryAccess::NONTEMPORAL;
+    let semantics: HashSet<Word> = module
+        .functions
+        .iter()
+        .flat_map(|function| function.all_inst_iter())
+        .flat_map(|instruction| &instruction.operands)
+        .filter_map(|operand| match operand {
+            Operand::IdMemorySemantics(id) => Some(*id),
+            _ => None,
+        })
+        .collect();
+    let beyond = MemorySemantics::OUTPUT_MEMORY
+        | MemorySemantics::MAKE_AVAILABLE
+        | MemorySemantics::MAKE_VISIBLE
+        | MemorySemantics::VOLATILE;
+    let says_more = module.all_inst_iter().any(|instruction| {
+        let constant = op(instruction) == Op::Constant
+            && instruction.result_id.is_some_and(|id| semantics.contains(&id))
+            && literal(instruction, 0)
+                .is_none_or(|bits| MemorySemantics::from_bits_truncate(bits).intersects(beyond));
+        constant
+            || instruction.operands.iter().any(|operand| match operand {
+                Operand::MemoryAccess(access) => !plain.contains(*access),
+                Operand::ImageOperands(operands) => operands.bits() & !0xff != 0,
+                _ => false,
+            })
+    });
+    if says_more {
+        return;
+    }
+    module.memory_model = Some(Instruction::new(
+        Op::MemoryModel,
+        None,
+        None,
+        vec![
+            Operand::AddressingModel(AddressingModel::Logical),
+            Operand::MemoryModel(MemoryModel::GLSL450),
+        ],
+    ));
+    let needed = Operand::Capability(Capability::VulkanMemoryModel);
+    module.capabilities.retain(|instruction| instruction.operands.first() != Some(&needed));
+    module.extensions.retain(|instruction| {
+        instruction.operands.first()
+            != Some(&Operand::LiteralString("SPV_KHR_vulkan_memory_model".into()))
+    });
+}
+
+/// Says of storage textures that are never read that they are not: WGSL, GLSL ES and Metal ask
+/// for less then.
+pub fn write_only_textures(module: &mut Module) {
+    let textures: Vec<Word> = module
+        .types_global_values
+        .iter()
+        .filter(|variable| {
+            op(variable) == Op::Variable
+                && variable.operands.first() == Some(&Operand::StorageClass(StorageClass::UniformConstant))
+                && is_storage_image(module, variable).unwrap_or(false)
+        })
+        .filter_map(|variable| variable.result_id)
+        .filter(|variable| !is_read(module, *variable))
+        .collect();
+    for texture in textures {
+        let non_readable = Operand::Decoration(Decoration::NonReadable);
+        let there = module.annotations.iter().any(|note| {
+            op(note) == Op::Decorate
+                && id(note, 0) == Some(texture)
+                && note.operands.get(1) == Some(&non_readable)
+        });
+        if !there {
+            let operands = vec![Operand::IdRef(texture), non_readable];
+            module.annotations.push(Instruction::new(Op::Decorate, None, None, operands));
+        }
+    }
+}
+
+fn is_storage_image(module: &Module, variable: &Instruction) -> Option<bool> {
+    let pointer = global(module, variable.result_type?)?;
+    let image = global(module, id(pointer, 1)?)?;
+    Some(op(image) == Op::TypeImage && literal(image, 5) == Some(2))
+}
+
+/// Whether anything but `OpImageWrite` and queries of the size uses the variable.
+fn is_read(module: &Module, variable: Word) -> bool {
+    let body = || module.functions.iter().flat_map(|function| function.all_inst_iter());
+    let mut loaded = HashSet::new();
+    for instruction in body() {
+        let mentions = instruction.operands.contains(&Operand::IdRef(variable));
+        if mentions && op(instruction) == Op::Load {
+            loaded.extend(instruction.result_id);
+        } else if mentions {
+            return true;
+        }
+    }
+    body().any(|instruction| {
+        let harmless = matches!(op(instruction), Op::ImageWrite | Op::ImageQuerySize);
+        instruction.operands.iter().enumerate().any(|(place, operand)| {
+            matches!(operand, Operand::IdRef(id) if loaded.contains(id)) && !(harmless && place == 0)
+        })
+    })
+}
+
+/// Drops source lines and names; the names are written anew from the kernel's description.
+pub fn debug(module: &mut Module) {
+    module.debug_string_source.clear();
+    module.debug_module_processed.clear();
+    module.debug_names.clear();
+    for function in &mut module.functions {
+        for block in &mut function.blocks {
+            block.instructions.retain(|instruction| !matches!(op(instruction), Op::Line | Op::NoLine));
+        }
+    }
+    module.types_global_values.retain(|instruction| !matches!(op(instruction), Op::Line | Op::NoLine));
+}

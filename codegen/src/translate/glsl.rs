@@ -1,0 +1,136 @@
+//! GLSL, desktop and ES. Names of buffers begin with `b_`, those of uniforms, textures and images
+//! with `u_`: no keyword does.
+
+use std::collections::BTreeMap;
+
+use naga::back::glsl::{Error, Options, PipelineOptions, Version, Writer, WriterFlags};
+use naga::{ResourceBinding, ShaderStage};
+
+use super::{Bound, Job, Kind, Place, Text, Written, text};
+use crate::Language;
+use crate::error::Failure;
+use crate::spirv::names::camel_case;
+
+pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
+    let (module, info) = job.frozen()?;
+    let bound = job.bound();
+    let entry = &module.entry_points[0];
+    let version = match job.language {
+        Language::Essl310 => Version::new_gles(310),
+        Language::Essl300 => Version::new_gles(300),
+        _ => Version::Desktop(450),
+    };
+    let mut options = Options {
+        version,
+        writer_flags: WriterFlags::empty(),
+        binding_map: Default::default(),
+        zero_initialize_workgroup_memory: false,
+    };
+    let mut next = BTreeMap::new();
+    let mut numbers = BTreeMap::new();
+    for it in bound.iter().filter(|it| it.kind != Kind::Sampler) {
+        let counter = next.entry(class(it.kind)).or_insert(0u8);
+        let number = match job.language {
+            Language::Glsl => u8::try_from(it.binding).unwrap_or(u8::MAX),
+            _ => *counter,
+        };
+        *counter += 1;
+        options.binding_map.insert(ResourceBinding { group: it.group, binding: it.binding }, number);
+        numbers.insert(it.binding, u32::from(number));
+    }
+    let pipeline = PipelineOptions {
+        shader_stage: entry.stage,
+        entry_point: entry.name.clone(),
+        multiview: None,
+    };
+    let mut source = String::new();
+    let written = Writer::new(&mut source, &module, &info, &options, &pipeline, job.options.policies())
+        .and_then(|mut writer| writer.write());
+    let reflection = match written {
+        Ok(reflection) => reflection,
+        Err(error @ (Error::MissingFeatures(_) | Error::ImageMultipleSamplers | Error::UnsupportedScalar(_))) => {
+            return Ok(Written::Unsupported(format!("{}: {error}", job.language)));
+        }
+        Err(error) => return Err(job.failure(&error)),
+    };
+    // Which samplers each texture is combined with; a map, so that the order is the bindings'.
+    let of_handle = |handle| bound.iter().find(|it| it.handle == handle);
+    let mut combined: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for mapping in reflection.texture_mapping.values() {
+        if let (Some(texture), Some(sampler)) =
+            (of_handle(mapping.texture), mapping.sampler.and_then(of_handle))
+        {
+            combined.entry(sampler.binding).or_default().push(texture.binding);
+        }
+    }
+    combined.values_mut().for_each(|textures| textures.sort_unstable());
+    let mut places = BTreeMap::new();
+    for it in &bound {
+        let mut place = Place {
+            name: None,
+            class: class(it.kind).into(),
+            index: None,
+            space: None,
+            block: None,
+            combined_with: Vec::new(),
+        };
+        if it.kind == Kind::Sampler {
+            place.combined_with = combined.remove(&it.binding).unwrap_or_default();
+        } else {
+            place.index = numbers.get(&it.binding).copied().filter(|_| job.language != Language::Essl300);
+            place.name = Some(rename_variable(&mut source, it, entry.stage));
+            place.block = reflection
+                .uniforms
+                .get(&it.handle)
+                .filter(|_| matches!(it.kind, Kind::Uniform | Kind::Buffer { .. }))
+                .map(|block| rename_block(&mut source, block, it));
+        }
+        places.insert(it.binding, place);
+    }
+    Ok(Written::Text(Text {
+        source,
+        entry_point: "main".into(),
+        places,
+        sizes_slot: None,
+        sized: Vec::new(),
+        requires: Vec::new(),
+    }))
+}
+
+fn class(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Uniform => "uniform",
+        Kind::Buffer { .. } => "buffer",
+        Kind::Texture => "texture",
+        Kind::Image => "image",
+        Kind::Sampler => "sampler",
+    }
+}
+
+/// naga's name of a bound global says where it is bound; the kernel's says what it is.
+fn rename_variable(source: &mut String, it: &Bound, stage: ShaderStage) -> String {
+    let stage = match stage {
+        ShaderStage::Vertex => "vs",
+        ShaderStage::Fragment => "fs",
+        _ => "cs",
+    };
+    let given = format!("_group_{}_binding_{}_{stage}", it.group, it.binding);
+    let prefix = if matches!(it.kind, Kind::Buffer { .. }) { "b" } else { "u" };
+    // Two underscores in a row are reserved.
+    let wanted = format!("{prefix}_{}", it.name.trim_matches('_').replace("__", "_"));
+    replace(source, given, wanted)
+}
+
+fn rename_block(source: &mut String, given: &str, it: &Bound) -> String {
+    let suffix = if it.kind == Kind::Uniform { "Uniform" } else { "Buffer" };
+    replace(source, given.to_owned(), format!("{}{suffix}", camel_case(&it.name)))
+}
+
+/// Renames where the new name is free; gives the name that stands.
+fn replace(source: &mut String, given: String, wanted: String) -> String {
+    if text::has_name(source, &wanted) {
+        return given;
+    }
+    *source = text::rename(source, &given, &wanted);
+    wanted
+}

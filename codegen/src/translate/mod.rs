@@ -1,0 +1,614 @@
+//! From final SPIR-V to text, by way of naga.
+//!
+//! Decisions:
+//!
+//! - One module has one entry point, so slots are counted for each kernel by itself: HLSL
+//!   registers for each class (t, u, b, s) and MSL slots for each kind from 0 in the order of the
+//!   bindings, all in `space0`; GLSL 4.50 keeps SPIR-V's binding numbers; GLSL ES counts for each
+//!   kind, because devices have few; WGSL keeps group and binding.
+//! - The kernel's own guard is the only bounds check unless the options ask for more. WGSL's and
+//!   SPIR-V's implementations have checks of their own.
+//! - Specialisation constants stay overridable in SPIR-V and WGSL; the other writers cannot
+//!   express them and get the default, or the value that the options freeze.
+//! - What a language cannot express is [`Unsupported`], with the reason; what goes wrong is an
+//!   error.
+
+mod cleanup;
+mod glsl;
+mod hlsl;
+mod msl;
+mod text;
+mod wgsl;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+
+use hankel_dsl::native::describe::{Kernel, Output, Role, Stage};
+use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{AddressSpace, Expression, ImageClass, ImageDimension, Literal, Module, Scalar, ScalarKind, StorageAccess, StorageFormat, TypeInner};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Failure, Step, guarded};
+use crate::{Error, Language, VERSION};
+
+/// What to do about an index that is out of range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum BoundsChecks {
+    /// Nothing: the kernel's guard is enough.
+    #[default]
+    Unchecked,
+    /// Use the last valid index.
+    Restrict,
+    /// Read zero, skip the write. HLSL has no such writer: it restricts.
+    ReadZeroWrite,
+}
+
+impl FromStr for BoundsChecks {
+    type Err = Error;
+
+    fn from_str(value: &str) -> Result<Self, Error> {
+        Ok(match value {
+            "unchecked" => Self::Unchecked,
+            "restrict" => Self::Restrict,
+            "readzwrite" | "readzerowrite" => Self::ReadZeroWrite,
+            _ => {
+                return Err(Error::Option {
+                    option: "bounds checks",
+                    value: value.into(),
+                    expected: "unchecked, restrict or readzwrite",
+                });
+            }
+        })
+    }
+}
+
+/// HLSL's shader model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ShaderModel(naga::back::hlsl::ShaderModel);
+
+impl Default for ShaderModel {
+    fn default() -> Self {
+        Self(naga::back::hlsl::ShaderModel::V6_0)
+    }
+}
+
+const SHADER_MODELS: [(&str, naga::back::hlsl::ShaderModel); 11] = {
+    use naga::back::hlsl::ShaderModel::*;
+    [
+        ("5.1", V5_1),
+        ("6.0", V6_0),
+        ("6.1", V6_1),
+        ("6.2", V6_2),
+        ("6.3", V6_3),
+        ("6.4", V6_4),
+        ("6.5", V6_5),
+        ("6.6", V6_6),
+        ("6.7", V6_7),
+        ("6.8", V6_8),
+        ("6.9", V6_9),
+    ]
+};
+
+impl FromStr for ShaderModel {
+    type Err = Error;
+
+    fn from_str(value: &str) -> Result<Self, Error> {
+        let wanted = value.replace('_', ".");
+        SHADER_MODELS.iter().find(|(name, _)| *name == wanted).map(|(_, model)| Self(*model)).ok_or(
+            Error::Option {
+                option: "shader model",
+                value: value.into(),
+                expected: "5.1, or 6.0 to 6.9",
+            },
+        )
+    }
+}
+
+impl fmt::Display for ShaderModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let known = SHADER_MODELS.iter().find(|(_, model)| *model == self.0);
+        f.write_str(known.map_or("5.1", |(name, _)| name))
+    }
+}
+
+/// Metal's language version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MslVersion {
+    /// Before the dot.
+    pub major: u8,
+    /// After it.
+    pub minor: u8,
+}
+
+impl Default for MslVersion {
+    fn default() -> Self {
+        Self { major: 2, minor: 4 }
+    }
+}
+
+impl FromStr for MslVersion {
+    type Err = Error;
+
+    fn from_str(value: &str) -> Result<Self, Error> {
+        let bad = || Error::Option {
+            option: "MSL version",
+            value: value.into(),
+            expected: "1.0 to 1.2, 2.0 to 2.4, 3.0 to 3.2, or 4.0",
+        };
+        let (major, minor) = value.split_once('.').ok_or_else(bad)?;
+        let version = Self {
+            major: major.parse().map_err(|_| bad())?,
+            minor: minor.parse().map_err(|_| bad())?,
+        };
+        match (version.major, version.minor) {
+            (1 | 3, 0..=2) | (2, 0..=4) | (4, 0) => Ok(version),
+            _ => Err(bad()),
+        }
+    }
+}
+
+impl fmt::Display for MslVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.major, self.minor)
+    }
+}
+
+/// Choices for what is written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Bounds checks in HLSL, MSL and GLSL.
+    pub bounds_checks: BoundsChecks,
+    /// HLSL's shader model.
+    pub shader_model: ShaderModel,
+    /// Metal's version.
+    pub msl_version: MslVersion,
+    /// Specialisation constants that get a fixed value, by name, in every language.
+    pub constants: BTreeMap<String, u32>,
+}
+
+impl Options {
+    fn policies(&self) -> BoundsCheckPolicies {
+        let policy = match self.bounds_checks {
+            BoundsChecks::Unchecked => BoundsCheckPolicy::Unchecked,
+            BoundsChecks::Restrict => BoundsCheckPolicy::Restrict,
+            BoundsChecks::ReadZeroWrite => BoundsCheckPolicy::ReadZeroSkipWrite,
+        };
+        BoundsCheckPolicies {
+            index: policy,
+            buffer: policy,
+            image_load: policy,
+            binding_array: policy,
+        }
+    }
+}
+
+/// Where a binding is in a language.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Place {
+    /// The variable's name in the text.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub name: Option<String>,
+    /// What numbers it: `binding` (WGSL), `t`, `u`, `b`, `s` (HLSL register), `buffer`, `texture`,
+    /// `sampler` (MSL, GLSL), `uniform`, `image` (GLSL).
+    pub class: String,
+    /// The number; none where the language has none in the text (GLSL ES 3.00).
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub index: Option<u32>,
+    /// WGSL's group, HLSL's space.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub space: Option<u32>,
+    /// GLSL: name of the block around a buffer.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub block: Option<String>,
+    /// GLSL: bindings of the textures that this sampler has become one with.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub combined_with: Vec<u32>,
+}
+
+/// A kernel in a language.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text {
+    /// The text.
+    pub source: String,
+    /// The entry point's name in it.
+    pub entry_point: String,
+    /// Where each binding is, by its number in set 0. What the kernel does not use is not there.
+    pub places: BTreeMap<u32, Place>,
+    /// MSL: slot of the buffer that holds the sizes of the others in bytes, one `u32` for each
+    /// that [`Self::sized`] lists.
+    pub sizes_slot: Option<u32>,
+    /// MSL: bindings whose sizes that buffer holds, in order.
+    pub sized: Vec<u32>,
+    /// Extensions or device features beyond the language's core that the text needs.
+    pub requires: Vec<String>,
+}
+
+/// What came of a language.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Written {
+    /// The text.
+    Text(Text),
+    /// The language cannot express the kernel.
+    Unsupported(String),
+}
+
+/// A kernel in naga's representation, cleaned up and validated.
+#[derive(Debug)]
+pub struct Ir {
+    module: Module,
+    info: ModuleInfo,
+    kernel: String,
+    /// The clean-up applied in full.
+    clean: bool,
+}
+
+impl Ir {
+    /// Reads a final module.
+    ///
+    /// # Errors
+    ///
+    /// naga cannot read it, or its validator rejects it.
+    pub fn read(spirv: &[u8], kernel: &Kernel) -> Result<Self, Failure> {
+        let name = kernel.name.as_str();
+        let module = guarded(|| parse(spirv, name), name, Step::Parse)?;
+        let info = guarded(|| validate(&module, name), name, Step::Check)?;
+        let raw = Self { module, info, kernel: name.into(), clean: false };
+        // Where the clean-up does not apply, what naga read is still right.
+        Ok(raw.cleaned(kernel).unwrap_or(raw))
+    }
+
+    /// Whether the text will read as by hand: no private globals, no inner function, no blocks
+    /// around buffers. Shapes that Hankel's DSL does not make may stay as naga reads them.
+    pub fn is_clean(&self) -> bool {
+        self.clean
+    }
+
+    fn cleaned(&self, kernel: &Kernel) -> Option<Self> {
+        let name = kernel.name.as_str();
+        let step = || -> Result<Self, Failure> {
+            let mut module = self.module.clone();
+            let folded = cleanup::fold_entry_point(&mut module);
+            cleanup::unwrap_blocks(&mut module);
+            cleanup::drop_last_return(&mut module);
+            let members: Vec<String> = (0..kernel.outputs.len())
+                .map(|index| crate::spirv::names::output_name(kernel, index))
+                .collect();
+            let result = format!("{}Output", crate::spirv::names::camel_case(name));
+            cleanup::name_result(&mut module, &result, &members);
+            validate(&module, name)?;
+            naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
+            let info = validate(&module, name)?;
+            cleanup::name_loads(&mut module, &info);
+            let info = validate(&module, name)?;
+            Ok(Self { module, info, kernel: name.into(), clean: folded })
+        };
+        guarded(step, name, Step::Check).ok()
+    }
+
+    /// Writes `language`. SPIR-V is what it was read from and not written again.
+    ///
+    /// # Errors
+    ///
+    /// The writer fails, or WGSL cannot be read back.
+    pub fn write(
+        &self,
+        language: Language,
+        kernel: &Kernel,
+        options: &Options,
+    ) -> Result<Written, Failure> {
+        if let Some(reason) = self.unsupported(language, &kernel.stage) {
+            return Ok(Written::Unsupported(reason));
+        }
+        let job = Job { ir: self, kernel, options, language };
+        let step = Step::Write(language);
+        let mut written = guarded(
+            || match language {
+                Language::Spirv => Ok(Written::Unsupported("SPIR-V is not written again".into())),
+                Language::Wgsl => wgsl::write(&job),
+                Language::Hlsl => hlsl::write(&job),
+                Language::Msl => msl::write(&job),
+                Language::Glsl | Language::Essl310 | Language::Essl300 => glsl::write(&job),
+            },
+            &self.kernel,
+            step,
+        )?;
+        if let Written::Text(text) = &mut written {
+            text.source = head(language, kernel, &text.source);
+        }
+        Ok(written)
+    }
+
+    /// Why a language cannot express the kernel, where that can be told without trying.
+    fn unsupported(&self, language: Language, stage: &Stage) -> Option<String> {
+        let es = matches!(language, Language::Essl310 | Language::Essl300);
+        if self.has_wide(ScalarKind::Float) && (es || matches!(language, Language::Wgsl | Language::Msl)) {
+            return Some(format!("{language} has no 64-bit floating-point numbers"));
+        }
+        let wide_integers = self.has_wide(ScalarKind::Uint) || self.has_wide(ScalarKind::Sint);
+        if wide_integers && (es || language == Language::Wgsl) {
+            return Some(format!("{language} has no 64-bit integers"));
+        }
+        if language == Language::Essl300 {
+            if matches!(stage, Stage::Compute { .. }) {
+                return Some(format!("{language} has no compute shaders"));
+            }
+            if self.globals().any(|(global, _)| matches!(global.space, AddressSpace::Storage { .. })) {
+                return Some(format!("{language} has no storage buffers"));
+            }
+        }
+        for (_, inner) in self.globals() {
+            let TypeInner::Image { dim, class, .. } = *inner else { continue };
+            match class {
+                ImageClass::Storage { .. } if language == Language::Essl300 => {
+                    return Some(format!("{language} has no storage textures"));
+                }
+                ImageClass::Storage { format, .. } if language == Language::Essl310 && !in_es(format) => {
+                    return Some(format!("{language} has no {format:?} storage textures"));
+                }
+                ImageClass::Storage { format, access }
+                    if language == Language::Essl310
+                        && access.contains(StorageAccess::LOAD | StorageAccess::STORE)
+                        && !matches!(format, StorageFormat::R32Float | StorageFormat::R32Uint | StorageFormat::R32Sint) =>
+                {
+                    return Some(format!("{language} cannot both read and write {format:?} textures"));
+                }
+                ImageClass::Sampled { multi: true, .. } if language == Language::Essl300 => {
+                    return Some(format!("{language} has no multisampled textures"));
+                }
+                ImageClass::Storage { .. } | ImageClass::Sampled { .. } if es && dim == ImageDimension::D1 => {
+                    return Some(format!("{language} has no one-dimensional textures"));
+                }
+                _ => {}
+            }
+        }
+        None
+    }
+
+    fn globals(&self) -> impl Iterator<Item = (&naga::GlobalVariable, &TypeInner)> {
+        self.module
+            .global_variables
+            .iter()
+            .map(|(_, global)| (global, &self.module.types[global.ty].inner))
+    }
+
+    /// Whether any type, literal or conversion is of a 64-bit scalar.
+    fn has_wide(&self, kind: ScalarKind) -> bool {
+        let is = |scalar: Scalar| scalar.kind == kind && scalar.width == 8;
+        let literal = |expression: &Expression| match *expression {
+            Expression::Literal(Literal::F64(_)) => kind == ScalarKind::Float,
+            Expression::Literal(Literal::I64(_)) => kind == ScalarKind::Sint,
+            Expression::Literal(Literal::U64(_)) => kind == ScalarKind::Uint,
+            Expression::As { kind: to, convert: Some(8), .. } => to == kind,
+            _ => false,
+        };
+        let functions = self.module.functions.iter().map(|(_, function)| function);
+        let mut functions = functions.chain(self.module.entry_points.iter().map(|entry| &entry.function));
+        self.module.types.iter().any(|(_, ty)| match ty.inner {
+            TypeInner::Scalar(scalar)
+            | TypeInner::Vector { scalar, .. }
+            | TypeInner::Matrix { scalar, .. }
+            | TypeInner::ValuePointer { scalar, .. } => is(scalar),
+            _ => false,
+        }) || functions.any(|function| function.expressions.iter().any(|(_, it)| literal(it)))
+    }
+}
+
+/// Formats of GLSL ES 3.10's images.
+fn in_es(format: StorageFormat) -> bool {
+    use StorageFormat::*;
+    matches!(
+        format,
+        Rgba32Float | Rgba16Float | R32Float | Rgba8Unorm | Rgba8Snorm | Rgba32Sint | Rgba16Sint
+            | Rgba8Sint | R32Sint | Rgba32Uint | Rgba16Uint | Rgba8Uint | R32Uint
+    )
+}
+
+/// What a writer works on.
+struct Job<'a> {
+    ir: &'a Ir,
+    kernel: &'a Kernel,
+    options: &'a Options,
+    language: Language,
+}
+
+/// The kinds of things that are bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Uniform,
+    /// Storage buffer; written or only read.
+    Buffer { written: bool },
+    Texture,
+    /// Storage texture.
+    Image,
+    Sampler,
+}
+
+/// A global that is bound: its place in SPIR-V, what it is, its name in the kernel.
+struct Bound {
+    group: u32,
+    binding: u32,
+    kind: Kind,
+    name: String,
+    handle: naga::Handle<naga::GlobalVariable>,
+    /// Ends in an array without a length.
+    unsized_: bool,
+}
+
+impl Job<'_> {
+    /// The bound globals in the order of their bindings.
+    fn bound(&self) -> Vec<Bound> {
+        let module = &self.ir.module;
+        let mut bound: Vec<Bound> = module
+            .global_variables
+            .iter()
+            .filter_map(|(handle, global)| {
+                let place = global.binding?;
+                let inner = &module.types[global.ty].inner;
+                let kind = match (global.space, inner) {
+                    (AddressSpace::Uniform, _) => Kind::Uniform,
+                    (AddressSpace::Storage { access }, _) => {
+                        Kind::Buffer { written: access.contains(StorageAccess::STORE) }
+                    }
+                    (_, TypeInner::Sampler { .. }) => Kind::Sampler,
+                    (_, TypeInner::Image { class: ImageClass::Storage { .. }, .. }) => Kind::Image,
+                    _ => Kind::Texture,
+                };
+                let name = global.name.clone().unwrap_or_else(|| format!("binding{}", place.binding));
+                let unsized_ = inner.is_dynamically_sized(&module.types);
+                Some(Bound { group: place.group, binding: place.binding, kind, name, handle, unsized_ })
+            })
+            .collect();
+        bound.sort_by_key(|it| (it.group, it.binding));
+        bound
+    }
+
+    /// The module with every specialisation constant replaced by its value.
+    fn frozen(&self) -> Result<(std::borrow::Cow<'_, Module>, std::borrow::Cow<'_, ModuleInfo>), Failure> {
+        naga::back::pipeline_constants::process_overrides(
+            &self.ir.module,
+            &self.ir.info,
+            None,
+            &naga::back::PipelineConstants::default(),
+        )
+        .map_err(|error| self.failure(&error))
+    }
+
+    fn failure(&self, error: &dyn std::error::Error) -> Failure {
+        Failure {
+            kernel: self.kernel.name.clone(),
+            step: Step::Write(self.language),
+            construct: None,
+            message: chain(error),
+            panicked: false,
+        }
+    }
+}
+
+/// An error and its causes in one line.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let more = inner.to_string();
+        if !text.ends_with(&more) {
+            text = format!("{}: {more}", text.trim_end_matches([':', ' ']));
+        }
+        cause = inner.source();
+    }
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn parse(spirv: &[u8], name: &str) -> Result<Module, Failure> {
+    let options = naga::front::spv::Options {
+        adjust_coordinate_space: false,
+        strict_capabilities: false,
+        block_ctx_dump_prefix: None,
+    };
+    naga::front::spv::parse_u8_slice(spirv, &options).map_err(|error| Failure {
+        kernel: name.into(),
+        step: Step::Parse,
+        construct: None,
+        message: chain(&error),
+        panicked: false,
+    })
+}
+
+fn validate(module: &Module, name: &str) -> Result<ModuleInfo, Failure> {
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+    validator
+        .subgroup_stages(naga::valid::ShaderStages::all())
+        .subgroup_operations(naga::valid::SubgroupOperationSet::all())
+        .validate(module)
+        .map_err(|error| Failure {
+            kernel: name.into(),
+            step: Step::Check,
+            construct: error.spans().next().map(|(_, what)| what.clone()),
+            message: chain(error.as_inner()),
+            panicked: false,
+        })
+}
+
+/// Puts the comment on top that says where a text comes from. GLSL's `#version` stays first:
+/// WebGL insists.
+fn head(language: Language, kernel: &Kernel, source: &str) -> String {
+    let place = format!("{}:{}", file_name(&kernel.file), kernel.line);
+    let comment = format!(
+        "// Generated by hankel {VERSION} from `{}` ({place}). Do not edit.\n// {}\n",
+        kernel.function,
+        first_line(&kernel.summary),
+    );
+    let source = format!("{}\n", source.trim_end());
+    match (language, source.split_once('\n')) {
+        (Language::Glsl | Language::Essl310 | Language::Essl300, Some((version, rest))) => {
+            format!("{version}\n{comment}{rest}")
+        }
+        _ => format!("{comment}{source}"),
+    }
+}
+
+fn first_line(summary: &str) -> String {
+    let text = summary.split_whitespace().collect::<Vec<_>>().join(" ");
+    if text.is_empty() { "No description.".into() } else { text }
+}
+
+/// The path within the crate: what the compiler saw may begin with folders of the machine.
+pub(crate) fn file_name(file: &str) -> String {
+    let file = file.replace('\\', "/");
+    match file.rfind("/src/") {
+        Some(place) => file[place + 1..].to_owned(),
+        None => file.trim_start_matches("./").rsplit_once("/").map_or(file.clone(), |(folder, name)| {
+            if folder == "src" || folder.starts_with("src/") { format!("{folder}/{name}") } else { name.to_owned() }
+        }),
+    }
+}
+
+/// The binding of a parameter.
+pub(crate) fn param_binding(role: &Role) -> Option<u32> {
+    match role {
+        Role::Uniform { binding, .. }
+        | Role::Element { binding, .. }
+        | Role::Storage { binding, .. }
+        | Role::Atomic { binding }
+        | Role::Texture { binding, .. }
+        | Role::Sampler { binding } => Some(*binding),
+        _ => None,
+    }
+}
+
+/// The binding of an output.
+pub(crate) fn output_binding(output: &Output) -> Option<u32> {
+    match output {
+        Output::Buffer { binding, .. } | Output::Texture { binding, .. } => Some(*binding),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_read_and_shown() {
+        assert_eq!("6.5".parse::<ShaderModel>().unwrap().to_string(), "6.5");
+        assert_eq!("5_1".parse::<ShaderModel>().unwrap().to_string(), "5.1");
+        assert!("4.0".parse::<ShaderModel>().is_err());
+        assert_eq!("2.1".parse::<MslVersion>().unwrap(), MslVersion { major: 2, minor: 1 });
+        assert!("2.9".parse::<MslVersion>().is_err());
+        assert!("two".parse::<MslVersion>().is_err());
+        assert_eq!("restrict".parse::<BoundsChecks>().unwrap(), BoundsChecks::Restrict);
+        assert!("some".parse::<BoundsChecks>().is_err());
+    }
+
+    #[test]
+    fn file_names_lose_the_machine() {
+        assert_eq!(file_name("/home/me/hankel/kernels/shadows/src/shade.rs"), "src/shade.rs");
+        assert_eq!(file_name("kernels/shadows/src/a/b.rs"), "src/a/b.rs");
+        assert_eq!(file_name("src/lib.rs"), "src/lib.rs");
+        assert_eq!(file_name("C:\\x\\src\\lib.rs"), "src/lib.rs");
+        assert_eq!(file_name("lib.rs"), "lib.rs");
+    }
+}

@@ -1,0 +1,101 @@
+//! MSL.
+
+use std::collections::BTreeMap;
+
+use naga::ResourceBinding;
+use naga::back::msl::{self, BindSamplerTarget, BindTarget, EntryPointResources, Error, Options, PipelineOptions};
+
+use super::{Job, Kind, Place, Text, Written, text};
+use crate::error::Failure;
+
+pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
+    let (module, info) = job.frozen()?;
+    let bound = job.bound();
+    let (mut buffers, mut textures, mut samplers) = (0u8, 0u8, 0u8);
+    let mut resources = EntryPointResources::default();
+    let mut slots = BTreeMap::new();
+    let mut take = |next: &mut u8, class: &'static str, binding: u32| {
+        let slot = *next;
+        *next += 1;
+        slots.insert(binding, (class, slot));
+        slot
+    };
+    for it in &bound {
+        let mut target = BindTarget::default();
+        match it.kind {
+            Kind::Uniform | Kind::Buffer { .. } => {
+                target.buffer = Some(take(&mut buffers, "buffer", it.binding));
+                target.mutable = it.kind == (Kind::Buffer { written: true });
+            }
+            Kind::Texture | Kind::Image => {
+                target.texture = Some(take(&mut textures, "texture", it.binding));
+                target.mutable = it.kind == Kind::Image;
+            }
+            Kind::Sampler => {
+                let slot = take(&mut samplers, "sampler", it.binding);
+                target.sampler = Some(BindSamplerTarget::Resource(slot));
+            }
+        }
+        resources.resources.insert(ResourceBinding { group: it.group, binding: it.binding }, target);
+    }
+    // The sizes come after the other buffers; in the order of the globals, as naga lists them.
+    resources.sizes_buffer = Some(buffers);
+    let mut sized: Vec<_> = bound.iter().filter(|it| it.unsized_).collect();
+    sized.sort_by_key(|it| it.handle);
+    let sized: Vec<u32> = sized.into_iter().map(|it| it.binding).collect();
+    let version = job.options.msl_version;
+    let options = Options {
+        lang_version: (version.major, version.minor),
+        per_entry_point_map: [(job.kernel.name.clone(), resources)].into(),
+        fake_missing_bindings: false,
+        bounds_check_policies: job.options.policies(),
+        zero_initialize_workgroup_memory: false,
+        force_loop_bounding: false,
+        emit_int_div_checks: false,
+        ..Options::default()
+    };
+    let (source, written) =
+        match msl::write_string(&module, &info, &options, &PipelineOptions::default()) {
+            Ok(written) => written,
+            Err(error @ (Error::UnsupportedAttribute(_)
+                | Error::UnsupportedFunction(_)
+                | Error::UnsupportedWritableStorageBuffer
+                | Error::UnsupportedWritableStorageTexture(_)
+                | Error::UnsupportedRWStorageTexture
+                | Error::UnsupportedArrayOf(_)
+                | Error::UnsupportedBuiltIn(_)
+                | Error::CapabilityNotSupported(_))) => {
+                return Ok(Written::Unsupported(format!("MSL {version}: {error}")));
+            }
+            Err(error) => return Err(job.failure(&error)),
+        };
+    let entry_point = match written.entry_point_names.into_iter().next() {
+        Some(Ok(name)) => name,
+        Some(Err(error)) => return Err(job.failure(&error)),
+        None => job.kernel.name.clone(),
+    };
+    let sizes_slot = source.contains("_mslBufferSizes& ").then_some(u32::from(buffers));
+    let places = bound
+        .iter()
+        .map(|it| {
+            let (class, slot) = slots[&it.binding];
+            let place = Place {
+                name: text::name_before(&source, &format!(" [[{class}({slot})]]")),
+                class: class.into(),
+                index: Some(slot.into()),
+                space: None,
+                block: None,
+                combined_with: Vec::new(),
+            };
+            (it.binding, place)
+        })
+        .collect();
+    Ok(Written::Text(Text {
+        source,
+        entry_point,
+        places,
+        sizes_slot,
+        sized: if sizes_slot.is_some() { sized } else { Vec::new() },
+        requires: Vec::new(),
+    }))
+}

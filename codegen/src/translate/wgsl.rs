@@ -1,0 +1,92 @@
+//! WGSL, which is read back and validated.
+
+use std::collections::BTreeMap;
+
+use naga::back::wgsl;
+use naga::{ImageClass, StorageFormat, TypeInner};
+
+use super::{Job, Place, Text, Written, text, validate};
+use crate::Language;
+use crate::error::{Failure, Step};
+
+/// WebGPU's feature for storage textures of more formats.
+const MORE_FORMATS: &str = "texture-formats-tier1";
+
+pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
+    let ir = job.ir;
+    let source = wgsl::write_string(&ir.module, &ir.info, wgsl::WriterFlags::empty())
+        .map_err(|error| job.failure(&error))?;
+    read_back(&source, &job.kernel.name)?;
+    let places = job
+        .bound()
+        .iter()
+        .map(|bound| {
+            let place = Place {
+                name: declared(&source, bound.group, bound.binding),
+                class: "binding".into(),
+                index: Some(bound.binding),
+                space: Some(bound.group),
+                block: None,
+                combined_with: Vec::new(),
+            };
+            (bound.binding, place)
+        })
+        .collect::<BTreeMap<_, _>>();
+    let mut requires = Vec::new();
+    if ir.globals().any(|(_, inner)| needs_more_formats(inner)) {
+        requires.push(MORE_FORMATS.to_owned());
+    }
+    let entry_point = text::name_before(&source_after_stage(&source), "(")
+        .unwrap_or_else(|| job.kernel.name.clone());
+    Ok(Written::Text(Text {
+        source,
+        entry_point,
+        places,
+        sizes_slot: None,
+        sized: Vec::new(),
+        requires,
+    }))
+}
+
+/// Formats of WGSL's core.
+fn needs_more_formats(inner: &TypeInner) -> bool {
+    use StorageFormat::*;
+    match inner {
+        TypeInner::Image { class: ImageClass::Storage { format, .. }, .. } => !matches!(
+            format,
+            Rgba8Unorm | Rgba8Snorm | Rgba8Uint | Rgba8Sint | Rgba16Uint | Rgba16Sint | Rgba16Float
+                | R32Uint | R32Sint | R32Float | Rg32Uint | Rg32Sint | Rg32Float | Rgba32Uint
+                | Rgba32Sint | Rgba32Float | Bgra8Unorm
+        ),
+        _ => false,
+    }
+}
+
+/// The name that the declaration after `@group(g) @binding(b)` gives.
+fn declared(source: &str, group: u32, binding: u32) -> Option<String> {
+    let mark = format!("@group({group}) @binding({binding})");
+    let after = &source[source.find(&mark)? + mark.len()..];
+    text::name_before(&after[..after.find(';')?], ":")
+}
+
+/// The text from the entry point's `fn` on.
+fn source_after_stage(source: &str) -> String {
+    let stage = ["\n@compute", "\n@vertex", "\n@fragment"].iter().find_map(|mark| source.find(mark));
+    let rest = &source[stage.unwrap_or(0)..];
+    rest.find("fn ").map_or_else(String::new, |place| rest[place..].to_owned())
+}
+
+fn read_back(source: &str, name: &str) -> Result<(), Failure> {
+    let step = Step::Reread(Language::Wgsl);
+    let module = naga::front::wgsl::parse_str(source).map_err(|error| Failure {
+        kernel: name.into(),
+        step,
+        construct: error
+            .location(source)
+            .and_then(|place| source.lines().nth(place.line_number as usize - 1))
+            .map(|line| format!("`{}`", line.trim())),
+        message: error.message().to_owned(),
+        panicked: false,
+    })?;
+    validate(&module, name).map(drop).map_err(|failure| Failure { step, ..failure })
+}
