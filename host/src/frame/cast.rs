@@ -1,0 +1,315 @@
+//! Ray casting: what a rasteriser would find, found another way.
+//!
+//! The tree's boxes are tested in single precision and are a little larger than needed. A corner
+//! of a triangle is projected along the ray, alike for every triangle that has it, and rounded to
+//! single precision; products of such numbers are exact in double precision, and so are the signs
+//! that tell on which side of an edge the ray passes. A ray cannot slip through a closed surface,
+//! not even through a corner of it (the idea of Woop, Benthin, Wald: Watertight Ray/Triangle
+//! Intersection, 2013).
+//!
+//! The tree's crate has its own series of `glam`; points cross over as arrays.
+
+use hankel_dsl::glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ray::{Ray, RayHit};
+use rayon::prelude::*;
+
+use crate::scene::Mesh;
+
+/// Where the samples of a pixel lie, as Vulkan's standard locations have it for four.
+pub const SAMPLES: [[f64; 2]; 4] = [
+    [0.375, 0.125],
+    [0.875, 0.375],
+    [0.125, 0.625],
+    [0.625, 0.875],
+];
+
+/// Triangles that rays can be cast at.
+pub struct Caster<'a> {
+    mesh: &'a Mesh,
+    tree: Bvh2,
+}
+
+/// What a ray met first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// How far along the ray, in units of its direction.
+    pub t: f64,
+    /// Which triangle.
+    pub triangle: u32,
+}
+
+/// A ray from `t` = 0 to 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    origin: DVec3,
+    direction: DVec3,
+    /// At right angles to the direction and to each other.
+    across: [DVec3; 2],
+}
+
+impl Segment {
+    /// From a point on, as far as `direction` is long; it must not be zero.
+    #[must_use]
+    pub fn new(origin: DVec3, direction: DVec3) -> Self {
+        let (u, v) = direction.normalize_or(DVec3::Z).any_orthonormal_pair();
+        Self {
+            origin,
+            direction,
+            across: [u, v],
+        }
+    }
+
+    /// The point at `t`.
+    #[must_use]
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.origin + self.direction * t
+    }
+
+    /// Corners as seen along the segment, which itself is the point (0, 0).
+    fn seen(&self, corners: [Vec3; 3]) -> [[f64; 2]; 3] {
+        corners.map(|p| self.across.map(|axis| axis.dot(p.as_dvec3() - self.origin)))
+    }
+
+    /// The weights of a triangle's corners where the segment's line meets the triangle's plane,
+    /// also beyond the triangle; `None` for a line along the plane.
+    #[must_use]
+    pub fn weights(&self, corners: [Vec3; 3]) -> Option<[f64; 3]> {
+        let areas = areas(self.seen(corners));
+        let sum: f64 = areas.iter().sum();
+        let weights = areas.map(|a| a / sum);
+        weights.iter().all(|w| w.is_finite()).then_some(weights)
+    }
+
+    /// Where the segment meets a triangle.
+    #[must_use]
+    pub fn meet(&self, corners: [Vec3; 3]) -> Option<f64> {
+        let areas = areas(self.seen(corners).map(|p| p.map(|x| f64::from(x as f32))));
+        if !(areas.iter().all(|&a| a >= 0.0) || areas.iter().all(|&a| a <= 0.0)) {
+            return None;
+        }
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let normal = (b - a).cross(c - a);
+        let t = normal.dot(a - self.origin) / normal.dot(self.direction);
+        // A ray along the plane sees none of it: not a number, or infinite.
+        (0.0..=1.0).contains(&t).then_some(t)
+    }
+}
+
+/// Twice the signed areas of the triangles that (0, 0) makes with the edges.
+fn areas([a, b, c]: [[f64; 2]; 3]) -> [f64; 3] {
+    let area = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+    [area(b, c), area(c, a), area(a, b)]
+}
+
+/// The segments through a clip space: one for each sample of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Lens {
+    world_from_clip: DMat4,
+    step: [f64; 2],
+}
+
+impl Lens {
+    /// For pictures of the given size that show what `clip_from_world` does.
+    #[must_use]
+    pub fn new(clip_from_world: Mat4, width: u32, height: u32) -> Self {
+        Self {
+            world_from_clip: clip_from_world.as_dmat4().inverse(),
+            step: [2.0 / f64::from(width), 2.0 / f64::from(height)],
+        }
+    }
+
+    /// From the near plane to the far plane through a point of a pixel, (0, 0) its upper left
+    /// corner and (1, 1) its lower right one.
+    #[must_use]
+    pub fn segment(&self, pixel: [u32; 2], [x, y]: [f64; 2]) -> Segment {
+        let x = (f64::from(pixel[0]) + x) * self.step[0] - 1.0;
+        let y = 1.0 - (f64::from(pixel[1]) + y) * self.step[1];
+        let near = self.world_from_clip.project_point3(DVec3::new(x, y, 0.0));
+        let far = self.world_from_clip.project_point3(DVec3::new(x, y, 1.0));
+        Segment::new(near, far - near)
+    }
+}
+
+impl<'a> Caster<'a> {
+    /// Builds the tree.
+    #[must_use]
+    pub fn new(mesh: &'a Mesh) -> Self {
+        let slack = mesh.bounds().map_or(0.0, |b| {
+            4e-6 * (b.low.abs().max(b.high.abs()).max_element())
+        });
+        let boxes: Vec<Aabb> = (0..mesh.triangles.len())
+            .map(|i| {
+                let [a, b, c] = mesh.corners(i);
+                let (low, high) = (a.min(b).min(c) - slack, a.max(b).max(c) + slack);
+                Aabb::new(low.to_array().into(), high.to_array().into())
+            })
+            .collect();
+        let mut time = std::time::Duration::ZERO;
+        let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut time);
+        Self { mesh, tree }
+    }
+
+    /// The first triangle that a segment meets.
+    #[must_use]
+    pub fn first(&self, segment: &Segment) -> Option<Hit> {
+        let length = segment.direction.length();
+        let direction = segment.direction / length;
+        let ray = Ray::new(
+            segment.origin.as_vec3().to_array().into(),
+            direction.as_vec3().to_array().into(),
+            0.0,
+            (length * 1.0001) as f32,
+        );
+        let mut best: Option<Hit> = None;
+        let mut near = RayHit::none();
+        near.t = ray.tmax;
+        self.tree.ray_traverse(ray, &mut near, |_, slot| {
+            let triangle = self.tree.primitive_indices[slot];
+            let Some(t) = segment.meet(self.mesh.corners(triangle as usize)) else {
+                return f32::INFINITY;
+            };
+            if best.is_some_and(|b| b.t < t || (b.t == t && b.triangle < triangle)) {
+                return f32::INFINITY;
+            }
+            best = Some(Hit { t, triangle });
+            // Whatever may still be nearer must not be pruned away by rounding.
+            ((t * length) as f32).next_up()
+        });
+        best
+    }
+
+    /// The depth in every sample of a map: 1 where nothing is. `clip` is where the vertices go in
+    /// clip space (w is 1: no perspective), `lens` the same transform; `advance` is told the share
+    /// that is done.
+    #[must_use]
+    pub fn depths(
+        &self,
+        lens: &Lens,
+        clip: &[Vec4],
+        size: u32,
+        advance: &mut dyn FnMut(f32),
+    ) -> Vec<f32> {
+        let row_len = size as usize * SAMPLES.len();
+        let mut depths = vec![1.0; row_len * size as usize];
+        in_bands(&mut depths, row_len, advance, |y, row: &mut [f32]| {
+            for (x, texel) in row.chunks_mut(SAMPLES.len()).enumerate() {
+                for (depth, at) in texel.iter_mut().zip(SAMPLES) {
+                    let segment = lens.segment([x as u32, y as u32], at);
+                    if let Some(hit) = self.first(&segment) {
+                        *depth = self.depth(&segment, hit, clip);
+                    }
+                }
+            }
+        });
+        depths
+    }
+
+    fn depth(&self, segment: &Segment, hit: Hit, clip: &[Vec4]) -> f32 {
+        let corners = self.mesh.triangles[hit.triangle as usize];
+        match segment.weights(self.mesh.corners(hit.triangle as usize)) {
+            Some(w) => (0..3)
+                .map(|k| w[k] * f64::from(clip[corners[k] as usize].z))
+                .sum::<f64>() as f32,
+            None => hit.t as f32,
+        }
+    }
+}
+
+/// Rows in parallel, some at a time, so that progress can be told in between.
+pub(super) fn in_bands<T: Send>(
+    all: &mut [T],
+    row_len: usize,
+    advance: &mut dyn FnMut(f32),
+    work: impl Fn(usize, &mut [T]) + Sync,
+) {
+    let rows = all.len() / row_len.max(1);
+    let band = rows.div_ceil(32).max(1);
+    for (i, part) in all.chunks_mut(band * row_len).enumerate() {
+        part.par_chunks_mut(row_len)
+            .enumerate()
+            .for_each(|(y, row)| work(i * band + y, row));
+        advance(((i + 1) * band).min(rows) as f32 / rows as f32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hankel_dsl::glam::camera::rh::proj::directx::{orthographic, perspective};
+    use hankel_dsl::glam::camera::rh::view::look_at_mat4;
+
+    use super::*;
+    use crate::scene::Procedural;
+
+    #[test]
+    fn a_closed_surface_has_no_gaps() {
+        let mut mesh = Mesh::default();
+        mesh.sphere(Vec3::ZERO, 1.0, 40);
+        mesh.drop_degenerate();
+        let caster = Caster::new(&mesh);
+        // Towards every vertex and the middle of every edge: where gaps would be.
+        for t in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(t);
+            for target in [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5] {
+                let origin = target.as_dvec3() * 3.0;
+                let hit = caster.first(&Segment::new(origin, -origin)).unwrap();
+                assert!((hit.t - 2.0 / 3.0).abs() < 1e-2, "{hit:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_tree_finds_what_trying_all_finds() {
+        let mesh = Procedural::Yard.mesh();
+        let caster = Caster::new(&mesh);
+        let view = perspective(0.8, 1.0, 0.1, 200.0)
+            * look_at_mat4(Vec3::new(9.0, 5.0, 8.0), Vec3::ZERO, Vec3::Y);
+        let lens = Lens::new(view, 16, 16);
+        let mut hits = 0;
+        for i in 0..256 {
+            let segment = lens.segment([i % 16, i / 16], SAMPLES[0]);
+            let all = (0..mesh.triangles.len())
+                .filter_map(|i| segment.meet(mesh.corners(i)))
+                .min_by(f64::total_cmp);
+            assert_eq!(caster.first(&segment).map(|h| h.t), all);
+            hits += usize::from(all.is_some());
+        }
+        assert!(hits > 100);
+    }
+
+    #[test]
+    fn a_sloping_plane_has_its_analytic_depth() {
+        let mut mesh = Mesh::default();
+        mesh.quad(
+            [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]
+                .map(|[x, z]| Vec3::new(x, 0.5 * x, z)),
+        );
+        let view = orthographic(-1.0, 1.0, -1.0, 1.0, 0.0, 4.0)
+            * look_at_mat4(Vec3::Y * 2.0, Vec3::ZERO, Vec3::NEG_Z);
+        let clip: Vec<Vec4> = mesh
+            .positions
+            .iter()
+            .map(|p| view * p.extend(1.0))
+            .collect();
+        let mut done = 0.0;
+        let mut advance = |share: f32| {
+            assert!(share > done);
+            done = share;
+        };
+        let depths = Caster::new(&mesh).depths(&Lens::new(view, 8, 8), &clip, 8, &mut advance);
+        assert_eq!(done, 1.0);
+        for (i, texel) in depths.chunks(4).enumerate() {
+            for (depth, at) in texel.iter().zip(SAMPLES) {
+                let x = ((i % 8) as f64 + at[0]) / 4.0 - 1.0;
+                let expected = (2.0 - 0.5 * x) / 4.0;
+                assert!(
+                    (f64::from(*depth) - expected).abs() < 1e-6,
+                    "{depth} {expected}"
+                );
+            }
+        }
+    }
+}

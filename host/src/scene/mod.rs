@@ -1,0 +1,270 @@
+//! What there is to see and how: scene files.
+//!
+//! A scene file is TOML. Only geometry, camera and light must be given:
+//!
+//! ```toml
+//! [geometry]
+//! model = "../models/brain.glb"   # beside the scene file; or: procedural = "yard"
+//! ground = 4.0                    # a square under the model, in model widths; 0: none
+//!
+//! [camera]
+//! eye = [0.2, 0.25, 0.3]
+//! target = [0.0, 0.07, 0.0]
+//! up = [0.0, 1.0, 0.0]            # default
+//! fov = 40.0                      # vertical, degrees, default
+//!
+//! [light]
+//! direction = [-0.5, -0.8, -0.3]  # the way the light goes
+//!
+//! [shadow]
+//! technique = "hamburger"         # hausdorff | vsm | pcf
+//! size = 1024                     # texels along an edge of the map
+//! format = "rgba16unorm"          # or "rgba32float"
+//! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1], for rgba16unorm
+//! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
+//! moment_bias = 6e-5
+//! depth_bias = 0.0
+//! leak_cut = 0.02
+//!
+//! [output]
+//! width = 960
+//! height = 540
+//! ```
+//!
+//! Everything is checked when the file is read; an error names file, line, column, the field and
+//! what it may be. The frame does not fail on a scene that was read.
+
+mod error;
+mod mesh;
+mod model;
+mod procedural;
+mod text;
+mod view;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use hankel_dsl::glam::Vec3;
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_moments::{Bias, SYMMETRIC_16, SYMMETRIC_32, UNIT_16};
+use serde::Deserialize;
+
+pub use error::{Place, Result, SceneError};
+pub use mesh::{Bounds, Mesh};
+pub use model::MAX_TRIANGLES;
+pub use procedural::Procedural;
+pub use view::{CameraView, LightView};
+
+/// A scene whose values are all in range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// What there is.
+    pub geometry: Geometry,
+    /// Who looks.
+    pub camera: Camera,
+    /// The way the light goes; unit length.
+    pub light: Vec3,
+    /// How shadows are made.
+    pub shadow: Shadow,
+    /// The picture's width in pixels, 1 to [`Scene::MAX_OUTPUT`].
+    pub width: u32,
+    /// The picture's height in pixels, 1 to [`Scene::MAX_OUTPUT`].
+    pub height: u32,
+}
+
+/// Where triangles come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// A glTF file.
+    Model {
+        /// The file; a relative path in a scene file counts from that file's folder.
+        file: PathBuf,
+        /// Edge of a square of ground under the model, in units of the model's larger horizontal
+        /// extent; 0 for none.
+        ground: f32,
+    },
+    /// A built-in scene.
+    Procedural(Procedural),
+}
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where it is.
+    pub eye: Vec3,
+    /// What it looks at; not `eye`.
+    pub target: Vec3,
+    /// What is up in the picture; not along the view.
+    pub up: Vec3,
+    /// Vertical field of view in degrees, 1 to 170.
+    pub fov: f32,
+}
+
+/// A way to turn depths into shadows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Technique {
+    /// Four moments, Hamburger problem: depths anywhere on the line.
+    Hamburger,
+    /// Four moments, Hausdorff problem: depths within the map's range. Leaks less.
+    Hausdorff,
+    /// Two moments: variance shadow mapping.
+    Vsm,
+    /// Percentage-closer filtering of the depth map itself, the reference.
+    Pcf,
+}
+
+impl fmt::Display for Technique {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hamburger => "hamburger",
+            Self::Hausdorff => "hausdorff",
+            Self::Vsm => "vsm",
+            Self::Pcf => "pcf",
+        })
+    }
+}
+
+/// The interval that depths are mapped to before moments are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DepthRange {
+    /// `[0, 1]`.
+    Unit,
+    /// `[-1, 1]`.
+    Symmetric,
+}
+
+/// What the moment map's texels are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapFormat {
+    /// 16 bits for each moment.
+    Rgba16unorm,
+    /// 32 bits for each moment.
+    Rgba32float,
+}
+
+impl MapFormat {
+    /// As a kernel names it.
+    #[must_use]
+    pub const fn texel(self) -> TexelFormat {
+        match self {
+            Self::Rgba16unorm => TexelFormat::Rgba16Unorm,
+            Self::Rgba32float => TexelFormat::Rgba32Float,
+        }
+    }
+}
+
+/// How shadows are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shadow {
+    /// From depths to shadow.
+    pub technique: Technique,
+    /// Texels along an edge of the map, 16 to [`Scene::MAX_MAP`].
+    pub size: u32,
+    /// Interval of depths; [`DepthRange::Symmetric`] with [`MapFormat::Rgba32float`]. PCF takes no
+    /// notice.
+    pub depth_range: DepthRange,
+    /// The map's texels. PCF takes no notice.
+    pub format: MapFormat,
+    /// Taps of the Gaussian along an axis: odd, 1 (no filter) to [`Scene::MAX_FILTER`].
+    pub filter: u32,
+    /// How far moments are pulled towards those of a harmless distribution so that rounding
+    /// cannot make them impossible, 0 to 0.1.
+    pub moment_bias: f32,
+    /// Subtracted from the receiver's depth, in units of the map's whole depth, 0 to 0.1.
+    pub depth_bias: f32,
+    /// Shadow below this much is light: the rest is stretched. 0 to 0.9.
+    pub leak_cut: f32,
+}
+
+impl Shadow {
+    /// The published moment bias for a map: see [`hankel_moments::Bias`].
+    #[must_use]
+    pub const fn recommended_bias(depth_range: DepthRange, format: MapFormat) -> f32 {
+        Self::published(depth_range, format).strength
+    }
+
+    /// The published bias for a map.
+    pub(crate) const fn published(depth_range: DepthRange, format: MapFormat) -> Bias {
+        match (format, depth_range) {
+            (MapFormat::Rgba16unorm, DepthRange::Unit) => UNIT_16,
+            (MapFormat::Rgba16unorm, DepthRange::Symmetric) => SYMMETRIC_16,
+            (MapFormat::Rgba32float, _) => SYMMETRIC_32,
+        }
+    }
+}
+
+impl Default for Shadow {
+    fn default() -> Self {
+        let (depth_range, format) = (DepthRange::Symmetric, MapFormat::Rgba16unorm);
+        Self {
+            technique: Technique::Hamburger,
+            size: 1024,
+            depth_range,
+            format,
+            filter: 7,
+            moment_bias: Self::recommended_bias(depth_range, format),
+            depth_bias: 0.0,
+            leak_cut: 0.02,
+        }
+    }
+}
+
+impl Scene {
+    /// Most pixels along an edge of the picture.
+    pub const MAX_OUTPUT: u32 = 8192;
+    /// Most texels along an edge of the map.
+    pub const MAX_MAP: u32 = 8192;
+    /// Most taps of the filter along an axis.
+    pub const MAX_FILTER: u32 = 31;
+    /// Width and height of a picture unless given.
+    pub const DEFAULT_OUTPUT: [u32; 2] = [960, 540];
+
+    /// Reads a scene file.
+    ///
+    /// # Errors
+    /// [`SceneError::Read`], [`SceneError::Syntax`], [`SceneError::Value`]. The model is not read
+    /// yet.
+    pub fn read(file: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(file).map_err(|source| SceneError::Read {
+            file: file.to_path_buf(),
+            source,
+        })?;
+        Self::parse(&text, file)
+    }
+
+    /// Reads a scene from text; `file` is for messages and where relative paths count from.
+    ///
+    /// # Errors
+    /// As for [`Scene::read`].
+    pub fn parse(text: &str, file: &Path) -> Result<Self> {
+        text::parse(text, file)
+    }
+
+    /// Loads or makes the scene's triangles; at least one, none without area.
+    ///
+    /// # Errors
+    /// [`SceneError::Read`], [`SceneError::Model`], [`SceneError::Empty`].
+    pub fn mesh(&self) -> Result<Mesh> {
+        match &self.geometry {
+            Geometry::Procedural(p) => Ok(p.mesh()),
+            Geometry::Model { file, ground } => {
+                let mut mesh = model::load(file)?;
+                if let Some(bounds) = mesh.bounds().filter(|_| *ground > 0.0) {
+                    let size = bounds.size();
+                    let half = size.x.max(size.z).max(size.y * 0.1) * ground * 0.5;
+                    let low = bounds.low.y;
+                    let c = Vec3::new(bounds.centre().x, low, bounds.centre().z);
+                    mesh.quad(
+                        [[-half, half], [half, half], [half, -half], [-half, -half]]
+                            .map(|[x, z]| c + Vec3::new(x, 0.0, z)),
+                    );
+                    mesh.paint(Vec3::new(0.42, 0.4, 0.38));
+                }
+                Ok(mesh)
+            }
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! glTF models: the triangles of the default scene, in world space, in their materials' base colour.
+//! Textures, skins, cameras and animations are passed over.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use base64::Engine;
+use gltf::accessor::{DataType, Dimensions};
+use gltf::mesh::Mode;
+use gltf::{Accessor, Gltf, Semantic};
+use hankel_dsl::glam::{Affine3A, Mat4, Vec3};
+
+use super::error::{Result, SceneError};
+use super::mesh::Mesh;
+
+/// Most triangles of a model: more would not fit the index buffers of a common device.
+pub const MAX_TRIANGLES: usize = 10_000_000;
+
+/// Loads the default scene (else the first) of a `.gltf` or `.glb` file. Normals that are missing
+/// are computed, smooth over shared vertices.
+///
+/// # Errors
+/// [`SceneError::Read`] and [`SceneError::Model`]; [`SceneError::Empty`] for a model without
+/// triangles.
+pub fn load(file: &Path) -> Result<Mesh> {
+    let bytes = fs::read(file).map_err(|source| SceneError::Read {
+        file: file.to_path_buf(),
+        source,
+    })?;
+    Loader {
+        file,
+        mesh: Mesh::default(),
+    }
+    .load(&bytes)
+}
+
+struct Loader<'a> {
+    file: &'a Path,
+    mesh: Mesh,
+}
+
+impl Loader<'_> {
+    fn fail<T>(&self, problem: impl Into<String>) -> Result<T> {
+        Err(SceneError::Model {
+            file: self.file.to_path_buf(),
+            problem: problem.into(),
+        })
+    }
+
+    fn load(mut self, bytes: &[u8]) -> Result<Mesh> {
+        // The reader subtracts the header's size from this length.
+        if bytes.starts_with(b"glTF") {
+            let length = bytes
+                .get(8..12)
+                .and_then(|b| b.try_into().ok())
+                .map_or(0, u32::from_le_bytes);
+            if length < 12 || length as usize > bytes.len() {
+                return self.fail(format!(
+                    "the header announces {length} bytes, the file has {}: it is truncated or damaged",
+                    bytes.len()
+                ));
+            }
+        }
+        let Gltf { document, mut blob } = match Gltf::from_slice(bytes) {
+            Ok(gltf) => gltf,
+            Err(e) => return self.fail(format!("no valid glTF 2.0: {e}")),
+        };
+        let buffers = document
+            .buffers()
+            .map(|b| self.buffer(&b, &mut blob))
+            .collect::<Result<Vec<_>>>()?;
+        let scene = document
+            .default_scene()
+            .or_else(|| document.scenes().next());
+        let mut open: Vec<_> = match scene {
+            Some(scene) => scene.nodes().map(|n| (n, Mat4::IDENTITY, 0)).collect(),
+            None => return self.fail("it has no scene"),
+        };
+        while let Some((node, parent, depth)) = open.pop() {
+            if depth > document.nodes().count() {
+                return self.fail(format!("node {} is its own ancestor", node.index()));
+            }
+            let matrix = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+            if !matrix.is_finite() {
+                return self.fail(format!(
+                    "node {}: its transform is not finite",
+                    node.index()
+                ));
+            }
+            if let Some(mesh) = node.mesh() {
+                for primitive in mesh.primitives() {
+                    let place = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
+                    let mut part = self.primitive(&primitive, &buffers, &place)?;
+                    part.transform(&Affine3A::from_mat4(matrix));
+                    self.mesh.append(&part);
+                    if self.mesh.triangles.len() > MAX_TRIANGLES {
+                        return self.fail(format!("it has more than {MAX_TRIANGLES} triangles"));
+                    }
+                }
+            }
+            open.extend(node.children().map(|n| (n, matrix, depth + 1)));
+        }
+        self.mesh.drop_degenerate();
+        if self.mesh.triangles.is_empty() {
+            return Err(SceneError::Empty {
+                what: self.file.display().to_string(),
+            });
+        }
+        Ok(self.mesh)
+    }
+
+    fn buffer(&self, buffer: &gltf::Buffer<'_>, blob: &mut Option<Vec<u8>>) -> Result<Vec<u8>> {
+        let index = buffer.index();
+        let data = match buffer.source() {
+            gltf::buffer::Source::Bin => match blob.take() {
+                Some(blob) => blob,
+                None => return self.fail(format!("buffer {index} is missing: no binary chunk")),
+            },
+            gltf::buffer::Source::Uri(uri) => self.uri(uri, index)?,
+        };
+        if data.len() < buffer.length() {
+            return self.fail(format!(
+                "buffer {index} has {} bytes, {} were announced",
+                data.len(),
+                buffer.length()
+            ));
+        }
+        Ok(data)
+    }
+
+    fn uri(&self, uri: &str, index: usize) -> Result<Vec<u8>> {
+        if let Some(data) = uri.strip_prefix("data:") {
+            let Some((_, text)) = data.split_once(";base64,") else {
+                return self.fail(format!("buffer {index}: a data URI must be base64"));
+            };
+            return base64::engine::general_purpose::STANDARD
+                .decode(text)
+                .or_else(|e| self.fail(format!("buffer {index}: bad base64: {e}")));
+        }
+        if uri.contains("://") {
+            return self.fail(format!("buffer {index} lies at {uri}: only files are read"));
+        }
+        let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+        let path: PathBuf = self
+            .file
+            .parent()
+            .unwrap_or(Path::new(""))
+            .join(name.as_ref());
+        fs::read(&path).or_else(|e| self.fail(format!("buffer {index}: {}: {e}", path.display())))
+    }
+
+    fn primitive(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        buffers: &[Vec<u8>],
+        place: &str,
+    ) -> Result<Mesh> {
+        let mode = primitive.mode();
+        if !matches!(
+            mode,
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+        ) {
+            return Ok(Mesh::default());
+        }
+        let Some(accessor) = primitive.get(&Semantic::Positions) else {
+            return self.fail(format!("{place}: it has no positions"));
+        };
+        let positions = self.vectors(&accessor, buffers, &format!("{place}, positions"))?;
+        let indices = match primitive.indices() {
+            Some(accessor) => self.indices(&accessor, buffers, &format!("{place}, indices"))?,
+            None => (0..positions.len() as u32).collect(),
+        };
+        if let Some(bad) = indices.iter().find(|&&i| i as usize >= positions.len()) {
+            return self.fail(format!(
+                "{place}: index {bad} is out of range, there are {} vertices",
+                positions.len()
+            ));
+        }
+        let triangles = match mode {
+            Mode::TriangleStrip => indices
+                .windows(3)
+                .enumerate()
+                .map(|(i, w)| {
+                    if i % 2 == 0 {
+                        [w[0], w[1], w[2]]
+                    } else {
+                        [w[1], w[0], w[2]]
+                    }
+                })
+                .collect(),
+            Mode::TriangleFan => indices
+                .windows(2)
+                .skip(1)
+                .map(|w| [indices[0], w[0], w[1]])
+                .collect(),
+            _ if indices.len() % 3 != 0 => {
+                return self.fail(format!(
+                    "{place}: {} indices are no triangles",
+                    indices.len()
+                ));
+            }
+            _ => indices
+                .chunks_exact(3)
+                .map(|c| [c[0], c[1], c[2]])
+                .collect(),
+        };
+        let mut mesh = Mesh {
+            positions,
+            triangles,
+            ..Mesh::default()
+        };
+        let [r, g, b, _] = primitive
+            .material()
+            .pbr_metallic_roughness()
+            .base_color_factor();
+        mesh.paint(Vec3::new(r, g, b));
+        match primitive.get(&Semantic::Normals) {
+            Some(accessor) => {
+                mesh.normals = self.vectors(&accessor, buffers, &format!("{place}, normals"))?;
+                if mesh.normals.len() != mesh.positions.len() {
+                    return self.fail(format!(
+                        "{place}: {} positions, but {} normals",
+                        mesh.positions.len(),
+                        mesh.normals.len()
+                    ));
+                }
+                for n in &mut mesh.normals {
+                    *n = n.try_normalize().unwrap_or(Vec3::Y);
+                }
+            }
+            None => mesh.compute_normals(),
+        }
+        Ok(mesh)
+    }
+
+    fn vectors(
+        &self,
+        accessor: &Accessor<'_>,
+        buffers: &[Vec<u8>],
+        place: &str,
+    ) -> Result<Vec<Vec3>> {
+        if accessor.data_type() != DataType::F32 || accessor.dimensions() != Dimensions::Vec3 {
+            return self.fail(format!("{place}: three 32-bit floats each are expected"));
+        }
+        let mut bad = None;
+        let vectors = self
+            .elements::<12>(accessor, buffers, place)?
+            .enumerate()
+            .map(|(i, b)| {
+                let f = |k: usize| f32::from_le_bytes([b[k], b[k + 1], b[k + 2], b[k + 3]]);
+                let v = Vec3::new(f(0), f(4), f(8));
+                if !v.is_finite() {
+                    bad.get_or_insert(i);
+                }
+                v
+            })
+            .collect();
+        match bad {
+            Some(i) => self.fail(format!("{place}: element {i} is not finite")),
+            None => Ok(vectors),
+        }
+    }
+
+    fn indices(
+        &self,
+        accessor: &Accessor<'_>,
+        buffers: &[Vec<u8>],
+        place: &str,
+    ) -> Result<Vec<u32>> {
+        if accessor.dimensions() != Dimensions::Scalar {
+            return self.fail(format!("{place}: scalars are expected"));
+        }
+        Ok(match accessor.data_type() {
+            DataType::U8 => self
+                .elements::<1>(accessor, buffers, place)?
+                .map(|b| b[0].into())
+                .collect(),
+            DataType::U16 => self
+                .elements::<2>(accessor, buffers, place)?
+                .map(|b| u16::from_le_bytes(b).into())
+                .collect(),
+            DataType::U32 => self
+                .elements::<4>(accessor, buffers, place)?
+                .map(u32::from_le_bytes)
+                .collect(),
+            _ => return self.fail(format!("{place}: unsigned integers are expected")),
+        })
+    }
+
+    /// The bytes of an accessor's elements, `N` each.
+    fn elements<'b, const N: usize>(
+        &self,
+        accessor: &Accessor<'_>,
+        buffers: &'b [Vec<u8>],
+        place: &str,
+    ) -> Result<impl Iterator<Item = [u8; N]> + use<'b, N>> {
+        if accessor.sparse().is_some() {
+            return self.fail(format!("{place}: sparse accessors are not read"));
+        }
+        let Some(view) = accessor.view() else {
+            return self.fail(format!(
+                "{place}: there is no data (compressed models are not read)"
+            ));
+        };
+        let stride = view.stride().unwrap_or(N);
+        let count = accessor.count();
+        let data = (|| {
+            let view_end = view.offset().checked_add(view.length())?;
+            let data = buffers
+                .get(view.buffer().index())?
+                .get(view.offset()..view_end)?;
+            let last = stride.checked_mul(count.checked_sub(1)?)?;
+            let end = accessor.offset().checked_add(last)?.checked_add(N)?;
+            data.get(accessor.offset()..end)
+        })();
+        match data {
+            Some(data) if stride >= N => {
+                // The last stride may be cut short after the element.
+                Ok(data.chunks(stride).filter_map(|c| c.first_chunk().copied()))
+            }
+            _ => self.fail(format!(
+                "{place}: {count} elements {stride} bytes apart do not fit buffer view {}",
+                view.index()
+            )),
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! From TOML to a checked scene.
+
+use std::fmt::Display;
+use std::ops::{Range, RangeInclusive};
+use std::path::{Path, PathBuf};
+
+use hankel_dsl::glam::Vec3;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::error::{Place, Result, SceneError};
+use super::{Camera, DepthRange, Geometry, MapFormat, Procedural, Scene, Shadow, Technique};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    geometry: Spanned<GeometryText>,
+    camera: CameraText,
+    light: LightText,
+    #[serde(default)]
+    shadow: ShadowText,
+    #[serde(default)]
+    output: OutputText,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GeometryText {
+    model: Option<Spanned<PathBuf>>,
+    procedural: Option<Procedural>,
+    ground: Option<Spanned<f32>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraText {
+    eye: Spanned<[f32; 3]>,
+    target: Spanned<[f32; 3]>,
+    up: Option<Spanned<[f32; 3]>>,
+    fov: Option<Spanned<f32>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LightText {
+    direction: Spanned<[f32; 3]>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ShadowText {
+    technique: Option<Technique>,
+    size: Option<Spanned<i64>>,
+    depth_range: Option<Spanned<DepthRange>>,
+    format: Option<MapFormat>,
+    filter: Option<Spanned<i64>>,
+    moment_bias: Option<Spanned<f32>>,
+    depth_bias: Option<Spanned<f32>>,
+    leak_cut: Option<Spanned<f32>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OutputText {
+    width: Option<Spanned<i64>>,
+    height: Option<Spanned<i64>>,
+}
+
+/// Coordinates beyond this lose the precision that depths need.
+const FAR_OFF: f32 = 1e6;
+
+pub(super) fn parse(text: &str, file: &Path) -> Result<Scene> {
+    let reader = Reader { text, file };
+    let f: File = toml::from_str(text).map_err(|e| SceneError::Syntax {
+        place: reader.place(e.span().unwrap_or(0..0)),
+        problem: reader.problem(&e),
+    })?;
+    reader.scene(f)
+}
+
+struct Reader<'a> {
+    text: &'a str,
+    file: &'a Path,
+}
+
+impl Reader<'_> {
+    fn place(&self, span: Range<usize>) -> Place {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Place {
+            file: self.file.to_path_buf(),
+            line: before.matches('\n').count() + 1,
+            column: before[line_start..].chars().count() + 1,
+        }
+    }
+
+    /// The message of a TOML error, with the field that its place belongs to.
+    fn problem(&self, e: &toml::de::Error) -> String {
+        let message = e.message().trim().replace('\n', ", ");
+        let Some(span) = e.span().filter(|s| s.start < self.text.len()) else {
+            return message;
+        };
+        let before = &self.text[..span.start];
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        let line = self.text[line_start..].lines().next().unwrap_or("");
+        let table = self.text[..line_start]
+            .lines()
+            .rev()
+            .find_map(|l| l.trim().strip_prefix('[')?.split(']').next());
+        match (table, line.split_once('=')) {
+            (Some(table), Some((key, _))) => format!("`{table}.{}`: {message}", key.trim()),
+            (None, Some((key, _))) => format!("`{}`: {message}", key.trim()),
+            (_, None) => message,
+        }
+    }
+
+    fn refuse<T>(
+        &self,
+        span: Range<usize>,
+        field: &str,
+        value: impl Display,
+        allowed: impl Into<String>,
+    ) -> Result<T> {
+        Err(SceneError::Value {
+            place: self.place(span),
+            field: field.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
+        })
+    }
+
+    fn integer(
+        &self,
+        field: &str,
+        given: Option<Spanned<i64>>,
+        default: u32,
+        range: RangeInclusive<u32>,
+    ) -> Result<u32> {
+        let Some(given) = given else {
+            return Ok(default);
+        };
+        match u32::try_from(*given.get_ref()) {
+            Ok(n) if range.contains(&n) => Ok(n),
+            _ => self.refuse(
+                given.span(),
+                field,
+                given.get_ref(),
+                format!("a whole number from {} to {}", range.start(), range.end()),
+            ),
+        }
+    }
+
+    fn number(
+        &self,
+        field: &str,
+        given: Option<Spanned<f32>>,
+        default: f32,
+        range: RangeInclusive<f32>,
+    ) -> Result<f32> {
+        let Some(given) = given else {
+            return Ok(default);
+        };
+        let x = *given.get_ref();
+        if range.contains(&x) {
+            return Ok(x);
+        }
+        self.refuse(
+            given.span(),
+            field,
+            x,
+            format!("a number from {} to {}", range.start(), range.end()),
+        )
+    }
+
+    fn point(&self, field: &str, given: &Spanned<[f32; 3]>) -> Result<Vec3> {
+        let p = Vec3::from_array(*given.get_ref());
+        if p.is_finite() && p.abs().max_element() <= FAR_OFF {
+            return Ok(p);
+        }
+        self.refuse(
+            given.span(),
+            field,
+            p,
+            format!("three finite numbers from -{FAR_OFF} to {FAR_OFF}"),
+        )
+    }
+
+    fn direction(&self, field: &str, given: &Spanned<[f32; 3]>) -> Result<Vec3> {
+        let d = self.point(field, given)?.try_normalize();
+        d.map_or_else(
+            || {
+                self.refuse(
+                    given.span(),
+                    field,
+                    Vec3::from_array(*given.get_ref()),
+                    "a direction: not all three may be zero",
+                )
+            },
+            Ok,
+        )
+    }
+
+    fn camera(&self, c: &CameraText, fov: Option<Spanned<f32>>) -> Result<Camera> {
+        let camera = Camera {
+            eye: self.point("camera.eye", &c.eye)?,
+            target: self.point("camera.target", &c.target)?,
+            up: match &c.up {
+                Some(up) => self.direction("camera.up", up)?,
+                None => Vec3::Y,
+            },
+            fov: self.number("camera.fov", fov, 40.0, 1.0..=170.0)?,
+        };
+        let Some(forward) = (camera.target - camera.eye).try_normalize() else {
+            return self.refuse(
+                c.target.span(),
+                "camera.target",
+                camera.target,
+                "another point than `camera.eye`",
+            );
+        };
+        if forward.cross(camera.up).length() < 1e-3 {
+            return self.refuse(
+                c.up.as_ref().unwrap_or(&c.target).span(),
+                "camera.up",
+                camera.up,
+                "a direction that is not along the view (from `camera.eye` to `camera.target`)",
+            );
+        }
+        Ok(camera)
+    }
+
+    fn geometry(&self, given: Spanned<GeometryText>) -> Result<Geometry> {
+        let span = given.span();
+        let g = given.into_inner();
+        match (g.model, g.procedural) {
+            (Some(model), None) => {
+                if model.get_ref().as_os_str().is_empty() {
+                    return self.refuse(model.span(), "geometry.model", "empty", "a glTF file");
+                }
+                Ok(Geometry::Model {
+                    file: self
+                        .file
+                        .parent()
+                        .unwrap_or(Path::new(""))
+                        .join(model.get_ref()),
+                    ground: self.number("geometry.ground", g.ground, 0.0, 0.0..=1000.0)?,
+                })
+            }
+            (None, Some(procedural)) => match g.ground {
+                Some(ground) => self.refuse(
+                    ground.span(),
+                    "geometry.ground",
+                    ground.get_ref(),
+                    "left out: a procedural scene has its own ground",
+                ),
+                None => Ok(Geometry::Procedural(procedural)),
+            },
+            (model, _) => self.refuse(
+                span,
+                "geometry",
+                if model.is_some() {
+                    "both a model and procedural"
+                } else {
+                    "neither"
+                },
+                "either `model = \"FILE.glb\"` or `procedural = \"yard\"` (or \"box\")",
+            ),
+        }
+    }
+
+    fn shadow(&self, s: ShadowText) -> Result<Shadow> {
+        let d = Shadow::default();
+        let format = s.format.unwrap_or(d.format);
+        let depth_range = s
+            .depth_range
+            .as_ref()
+            .map_or(d.depth_range, |r| *r.get_ref());
+        if let (Some(r), MapFormat::Rgba32float, DepthRange::Unit) =
+            (&s.depth_range, format, depth_range)
+        {
+            return self.refuse(
+                r.span(),
+                "shadow.depth_range",
+                "unit",
+                "symmetric: a map of rgba32float holds the moments of depths in [-1, 1]",
+            );
+        }
+        let filter_span = s.filter.as_ref().map_or(0..0, Spanned::span);
+        let filter = self.integer("shadow.filter", s.filter, d.filter, 1..=Scene::MAX_FILTER)?;
+        if filter.is_multiple_of(2) {
+            return self.refuse(filter_span, "shadow.filter", filter, "odd");
+        }
+        let bias = Shadow::recommended_bias(depth_range, format);
+        Ok(Shadow {
+            technique: s.technique.unwrap_or(d.technique),
+            size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,
+            depth_range,
+            format,
+            filter,
+            moment_bias: self.number("shadow.moment_bias", s.moment_bias, bias, 0.0..=0.1)?,
+            depth_bias: self.number("shadow.depth_bias", s.depth_bias, d.depth_bias, 0.0..=0.1)?,
+            leak_cut: self.number("shadow.leak_cut", s.leak_cut, d.leak_cut, 0.0..=0.9)?,
+        })
+    }
+
+    fn scene(&self, mut f: File) -> Result<Scene> {
+        let fov = f.camera.fov.take();
+        let [width, height] = Scene::DEFAULT_OUTPUT;
+        let pixels = 1..=Scene::MAX_OUTPUT;
+        Ok(Scene {
+            geometry: self.geometry(f.geometry)?,
+            camera: self.camera(&f.camera, fov)?,
+            light: self.direction("light.direction", &f.light.direction)?,
+            shadow: self.shadow(f.shadow)?,
+            width: self.integer("output.width", f.output.width, width, pixels.clone())?,
+            height: self.integer("output.height", f.output.height, height, pixels)?,
+        })
+    }
+}
