@@ -20,9 +20,7 @@ use crate::error::Failure;
 use crate::spirv::{self, global, literal, op};
 
 /// Counts of a module's instructions.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Cost {
     /// Instructions that compute.
     pub arithmetic: u32,
@@ -55,7 +53,10 @@ pub fn of_spirv(bytes: &[u8], name: &str) -> Result<Cost, Failure> {
 /// Counts a module's instructions.
 pub fn of_module(module: &Module) -> Cost {
     let mut cost = Cost::default();
-    let body = module.functions.iter().flat_map(|function| &function.blocks);
+    let body = module
+        .functions
+        .iter()
+        .flat_map(|function| &function.blocks);
     for instruction in body.flat_map(|block| &block.instructions) {
         let which = op(instruction);
         match which {
@@ -88,25 +89,94 @@ fn computes(which: Op) -> bool {
     matches!(
         which,
         ExtInst
-            | FAdd | FSub | FMul | FDiv | FRem | FMod | FNegate
-            | IAdd | ISub | IMul | SDiv | UDiv | SRem | SMod | UMod | SNegate
-            | IAddCarry | ISubBorrow | UMulExtended | SMulExtended
-            | VectorTimesScalar | MatrixTimesScalar | VectorTimesMatrix | MatrixTimesVector
-            | MatrixTimesMatrix | OuterProduct | Dot | Transpose
-            | ShiftLeftLogical | ShiftRightLogical | ShiftRightArithmetic
-            | BitwiseAnd | BitwiseOr | BitwiseXor | Not
-            | BitFieldInsert | BitFieldSExtract | BitFieldUExtract | BitReverse | BitCount
-            | ConvertFToU | ConvertFToS | ConvertSToF | ConvertUToF | UConvert | SConvert | FConvert
-            | Any | All | IsNan | IsInf
-            | LogicalEqual | LogicalNotEqual | LogicalOr | LogicalAnd | LogicalNot | Select
-            | IEqual | INotEqual
-            | UGreaterThan | SGreaterThan | UGreaterThanEqual | SGreaterThanEqual
-            | ULessThan | SLessThan | ULessThanEqual | SLessThanEqual
-            | FOrdEqual | FUnordEqual | FOrdNotEqual | FUnordNotEqual
-            | FOrdLessThan | FUnordLessThan | FOrdGreaterThan | FUnordGreaterThan
-            | FOrdLessThanEqual | FUnordLessThanEqual | FOrdGreaterThanEqual | FUnordGreaterThanEqual
-            | DPdx | DPdy | Fwidth | DPdxFine | DPdyFine | FwidthFine
-            | DPdxCoarse | DPdyCoarse | FwidthCoarse
+            | FAdd
+            | FSub
+            | FMul
+            | FDiv
+            | FRem
+            | FMod
+            | FNegate
+            | IAdd
+            | ISub
+            | IMul
+            | SDiv
+            | UDiv
+            | SRem
+            | SMod
+            | UMod
+            | SNegate
+            | IAddCarry
+            | ISubBorrow
+            | UMulExtended
+            | SMulExtended
+            | VectorTimesScalar
+            | MatrixTimesScalar
+            | VectorTimesMatrix
+            | MatrixTimesVector
+            | MatrixTimesMatrix
+            | OuterProduct
+            | Dot
+            | Transpose
+            | ShiftLeftLogical
+            | ShiftRightLogical
+            | ShiftRightArithmetic
+            | BitwiseAnd
+            | BitwiseOr
+            | BitwiseXor
+            | Not
+            | BitFieldInsert
+            | BitFieldSExtract
+            | BitFieldUExtract
+            | BitReverse
+            | BitCount
+            | ConvertFToU
+            | ConvertFToS
+            | ConvertSToF
+            | ConvertUToF
+            | UConvert
+            | SConvert
+            | FConvert
+            | Any
+            | All
+            | IsNan
+            | IsInf
+            | LogicalEqual
+            | LogicalNotEqual
+            | LogicalOr
+            | LogicalAnd
+            | LogicalNot
+            | Select
+            | IEqual
+            | INotEqual
+            | UGreaterThan
+            | SGreaterThan
+            | UGreaterThanEqual
+            | SGreaterThanEqual
+            | ULessThan
+            | SLessThan
+            | ULessThanEqual
+            | SLessThanEqual
+            | FOrdEqual
+            | FUnordEqual
+            | FOrdNotEqual
+            | FUnordNotEqual
+            | FOrdLessThan
+            | FUnordLessThan
+            | FOrdGreaterThan
+            | FUnordGreaterThan
+            | FOrdLessThanEqual
+            | FUnordLessThanEqual
+            | FOrdGreaterThanEqual
+            | FUnordGreaterThanEqual
+            | DPdx
+            | DPdy
+            | Fwidth
+            | DPdxFine
+            | DPdyFine
+            | FwidthFine
+            | DPdxCoarse
+            | DPdyCoarse
+            | FwidthCoarse
     )
 }
 
@@ -115,8 +185,7 @@ const FMA: u32 = 50;
 
 fn weight(instruction: &Instruction) -> u32 {
     let fused = op(instruction) == Op::ExtInst
-        && instruction.operands.get(1)
-            == Some(&rspirv::dr::Operand::LiteralExtInstInteger(FMA));
+        && instruction.operands.get(1) == Some(&rspirv::dr::Operand::LiteralExtInstInteger(FMA));
     if fused { 2 } else { 1 }
 }
 
@@ -125,9 +194,14 @@ fn components(module: &Module, instruction: &Instruction) -> u32 {
     // A dot product has a scalar result, but works on vectors.
     let ty = match op(instruction) {
         Op::Dot => spirv::id(instruction, 0).and_then(|operand| {
-            module.all_inst_iter().find(|it| it.result_id == Some(operand))?.result_type
+            module
+                .all_inst_iter()
+                .find(|it| it.result_id == Some(operand))?
+                .result_type
         }),
         _ => instruction.result_type,
     };
-    ty.and_then(vector).and_then(|ty| literal(ty, 1)).unwrap_or(1)
+    ty.and_then(vector)
+        .and_then(|ty| literal(ty, 1))
+        .unwrap_or(1)
 }

@@ -167,7 +167,10 @@ pub enum Error {
         known: Vec<String>,
     },
     /// No such specialisation constant.
-    #[error("no kernel that is built has a constant `{name}`; there are: {}", list(known))]
+    #[error(
+        "no kernel that is built has a constant `{name}`; there are: {}",
+        list(known)
+    )]
     UnknownConstant {
         /// What was asked for.
         name: String,
@@ -302,7 +305,11 @@ impl Failure {
 }
 
 fn list(names: &[String]) -> String {
-    if names.is_empty() { "none".into() } else { names.join(", ") }
+    if names.is_empty() {
+        "none".into()
+    } else {
+        names.join(", ")
+    }
 }
 
 /// Adds what was being done, and to which file, to an I/O error.
@@ -312,7 +319,11 @@ pub(crate) trait During<T> {
 
 impl<T> During<T> for io::Result<T> {
     fn during(self, action: &'static str, path: &Path) -> Result<T> {
-        self.map_err(|source| Error::Io { action, path: path.to_owned(), source })
+        self.map_err(|source| Error::Io {
+            action,
+            path: path.to_owned(),
+            source,
+        })
     }
 }
 
@@ -333,7 +344,13 @@ pub(crate) fn guarded<T>(
             .or_else(|| payload.downcast_ref::<&str>().map(ToString::to_string))
             .unwrap_or_else(|| "no message".into());
         let at = PANICKED_AT.with(|at| at.take());
-        Err(Failure { kernel: kernel.into(), step, construct: at, message, panicked: true })
+        Err(Failure {
+            kernel: kernel.into(),
+            step,
+            construct: at,
+            message,
+            panicked: true,
+        })
     })
 }
 
@@ -367,16 +384,26 @@ mod tests {
 
     #[test]
     fn a_panic_becomes_an_error_that_names_kernel_and_step() {
-        let error = guarded::<()>(|| panic!("index out of range"), "shade", Step::Parse).unwrap_err();
+        let error =
+            guarded::<()>(|| panic!("index out of range"), "shade", Step::Parse).unwrap_err();
         assert!(error.panicked);
         let text = error.to_string();
-        assert!(text.contains("kernel `shade`: naga's SPIR-V reader panicked at error.rs:"), "{text}");
+        assert!(
+            text.contains("kernel `shade`: naga's SPIR-V reader panicked at error.rs:"),
+            "{text}"
+        );
         assert!(text.ends_with("index out of range"), "{text}");
     }
 
     #[test]
     fn every_step_gives_advice() {
-        for step in [Step::Compile, Step::Read, Step::Validate, Step::Describe, Step::Parse] {
+        for step in [
+            Step::Compile,
+            Step::Read,
+            Step::Validate,
+            Step::Describe,
+            Step::Parse,
+        ] {
             let failure = Failure {
                 kernel: "k".into(),
                 step,

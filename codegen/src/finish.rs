@@ -1,7 +1,9 @@
 //! From rust-gpu's SPIR-V to the final: validated, optimised, asking for no more than it uses,
 //! with the names of the source. The same bytes on every machine: the tools are compiled in.
 
-use hankel_dsl::native::describe::Kernel;
+use std::collections::BTreeMap;
+
+use hankel_dsl::native::describe::{Kernel, Role};
 use spirv_tools::TargetEnv;
 use spirv_tools::opt::{Optimizer, Passes};
 use spirv_tools::val::Validator;
@@ -12,6 +14,10 @@ use crate::spirv::{self, exact, names, trim};
 
 /// What the modules are for.
 const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
+
+/// Number of what this module does to SPIR-V. To be raised with every change that gives other
+/// bytes: committed SPIR-V of another number counts as stale.
+pub const PIPELINE: u32 = 1;
 
 /// A finished module.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +44,32 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     names::apply(&mut module, kernel)?;
     let words = spirv::store(&module);
     validate(&words, name)?;
-    Ok(Finished { spirv: spirv::bytes(&words), cost: cost::of_module(&module) })
+    Ok(Finished {
+        spirv: spirv::bytes(&words),
+        cost: cost::of_module(&module),
+    })
+}
+
+/// Finishes a module again with specialisation constants replaced by values, by their names.
+/// Branches that only other values take are gone afterwards. Names that the kernel does not have
+/// are ignored.
+///
+/// # Errors
+///
+/// As for [`finish`].
+pub fn freeze(
+    spirv: &[u8],
+    kernel: &Kernel,
+    values: &BTreeMap<String, u32>,
+) -> Result<Finished, Failure> {
+    let name = kernel.name.as_str();
+    let mut module = spirv::load(&spirv::words(spirv, name)?, name)?;
+    for param in &kernel.params {
+        if let (Role::Constant { id, .. }, Some(value)) = (&param.role, values.get(&param.name)) {
+            spirv::freeze_constant(&mut module, *id, *value);
+        }
+    }
+    finish(&spirv::bytes(&spirv::store(&module)), kernel)
 }
 
 /// The cost of anybody's module after the same optimisation, to compare a listing with a kernel.
@@ -106,7 +137,10 @@ fn run_passes(
     let result = optimizer.optimize(
         words,
         &mut |message: spirv_tools::error::Message| said.push(message.message),
-        Some(spirv_tools::opt::Options { preserve_spec_constants: true, ..Default::default() }),
+        Some(spirv_tools::opt::Options {
+            preserve_spec_constants: true,
+            ..Default::default()
+        }),
     );
     match result {
         Ok(binary) => Ok(binary.as_words().to_vec()),
@@ -114,7 +148,11 @@ fn run_passes(
             kernel: name.into(),
             step: Step::Optimise,
             construct: None,
-            message: if said.is_empty() { error.to_string() } else { said.join("; ") },
+            message: if said.is_empty() {
+                error.to_string()
+            } else {
+                said.join("; ")
+            },
             panicked: false,
         }),
     }

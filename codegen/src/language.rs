@@ -89,12 +89,16 @@ impl FromStr for Language {
 
     fn from_str(name: &str) -> Result<Self> {
         let wanted = name.to_ascii_lowercase();
-        Self::ALL.into_iter().find(|language| language.name() == wanted).ok_or_else(|| {
-            Error::UnknownTarget {
+        Self::ALL
+            .into_iter()
+            .find(|language| language.name() == wanted)
+            .ok_or_else(|| Error::UnknownTarget {
                 name: name.into(),
-                known: Self::ALL.iter().map(|language| language.name().into()).collect(),
-            }
-        })
+                known: Self::ALL
+                    .iter()
+                    .map(|language| language.name().into())
+                    .collect(),
+            })
     }
 }
 
@@ -109,6 +113,12 @@ mod tests {
             let json = serde_json::to_string(&language).unwrap();
             assert_eq!(json, format!("\"{}\"", language.name()));
         }
-        assert!("cuda".parse::<Language>().unwrap_err().to_string().contains("spirv, wgsl"));
+        assert!(
+            "cuda"
+                .parse::<Language>()
+                .unwrap_err()
+                .to_string()
+                .contains("spirv, wgsl")
+        );
     }
 }

@@ -2,17 +2,30 @@
 //!
 //! ```text
 //! kernel crate --compile--> SPIR-V --finish--> final SPIR-V --translate--> WGSL HLSL MSL GLSL
-//!                             bundle (committed)     |                         |
-//!                                                    +------> build <----------+--> manifest, headers
+//!                                                |      |                      |
+//!                                             bundle    +-------> build <------+--> manifest, headers
+//!                                           (committed)             |
+//!                                                                 check
 //! ```
 //!
 //! Kernels are known by their descriptions ([`hankel_dsl::native::describe`]) and their SPIR-V
 //! alone; which kernels there are, the caller says.
+//!
+//! [`build::build`] is the way in for whoever wants files, [`build::generate`] for whoever wants
+//! them in memory; the modules before those are usable by themselves.
 
+pub mod build;
+pub mod bundle;
+pub mod check;
+pub mod compile;
 pub mod cost;
 mod error;
+pub mod files;
 pub mod finish;
+pub mod headers;
 mod language;
+pub mod manifest;
+pub mod source_hash;
 pub mod spirv;
 pub mod translate;
 
@@ -21,3 +34,12 @@ pub use language::Language;
 
 /// This crate's version, which the generated files name.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+impl From<source_hash::HashError> for Error {
+    fn from(error: source_hash::HashError) -> Self {
+        Self::Manifest {
+            path: error.path,
+            problem: error.problem,
+        }
+    }
+}

@@ -5,7 +5,8 @@ mod support;
 #[test]
 fn show() {
     for kernel in support::all() {
-        let finished = hankel_codegen::finish::finish(&support::spirv(&kernel.name), &kernel).unwrap();
+        let finished =
+            hankel_codegen::finish::finish(&support::spirv(&kernel.name), &kernel).unwrap();
         println!("{:?}", finished.cost);
         let ir = hankel_codegen::translate::Ir::read(&finished.spirv, &kernel).unwrap();
         println!("clean {}", ir.is_clean());
@@ -13,7 +14,10 @@ fn show() {
             match ir.write(language, &kernel, &Default::default()).unwrap() {
                 hankel_codegen::translate::Written::Text(text) => {
                     println!("======= {language}\n{}", text.source);
-                    println!("{:?} {:?} {:?} {:?} {:?}", text.entry_point, text.places, text.sizes_slot, text.sized, text.requires);
+                    println!(
+                        "{:?} {:?} {:?} {:?} {:?}",
+                        text.entry_point, text.places, text.sizes_slot, text.sized, text.requires
+                    );
                 }
                 it => println!("{it:?}"),
             }

@@ -39,8 +39,12 @@ fn contracts(op: Op) -> bool {
 
 /// Decorates every floating-point operation.
 pub fn pin(module: &mut Module) {
-    let decorated: std::collections::HashSet<Word> =
-        module.annotations.iter().filter(|note| is_pin(note)).filter_map(|note| id(note, 0)).collect();
+    let decorated: std::collections::HashSet<Word> = module
+        .annotations
+        .iter()
+        .filter(|note| is_pin(note))
+        .filter_map(|note| id(note, 0))
+        .collect();
     let results: Vec<Word> = module
         .functions
         .iter()
@@ -50,8 +54,10 @@ pub fn pin(module: &mut Module) {
         .filter(|result| !decorated.contains(result))
         .collect();
     module.annotations.extend(results.into_iter().map(|result| {
-        let operands =
-            vec![Operand::IdRef(result), Operand::Decoration(Decoration::NoContraction)];
+        let operands = vec![
+            Operand::IdRef(result),
+            Operand::Decoration(Decoration::NoContraction),
+        ];
         Instruction::new(Op::Decorate, None, None, operands)
     }));
 }
@@ -158,11 +164,17 @@ pub fn fold(module: &mut Module) {
                     }
                 }
             }
-            block.instructions.retain(|instruction| !folder.replace(instruction));
+            block
+                .instructions
+                .retain(|instruction| !folder.replace(instruction));
         }
     }
     // Loops: a phi may name a result that was replaced further down.
-    for instruction in module.functions.iter_mut().flat_map(|function| function.all_inst_iter_mut()) {
+    for instruction in module
+        .functions
+        .iter_mut()
+        .flat_map(|function| function.all_inst_iter_mut())
+    {
         for operand in &mut instruction.operands {
             if let Operand::IdRef(id) = operand {
                 *id = folder.resolve(*id);
@@ -170,8 +182,12 @@ pub fn fold(module: &mut Module) {
         }
     }
     let gone = folder.replaced;
-    module.annotations.retain(|note| id(note, 0).is_none_or(|target| !gone.contains_key(&target)));
-    module.debug_names.retain(|name| id(name, 0).is_none_or(|target| !gone.contains_key(&target)));
+    module
+        .annotations
+        .retain(|note| id(note, 0).is_none_or(|target| !gone.contains_key(&target)));
+    module
+        .debug_names
+        .retain(|name| id(name, 0).is_none_or(|target| !gone.contains_key(&target)));
     module.types_global_values.extend(folder.made);
     if let Some(header) = &mut module.header {
         header.bound = folder.next;
@@ -199,7 +215,9 @@ impl Folder {
             next: module.header.as_ref().map_or(0, |header| header.bound),
         };
         for instruction in &module.types_global_values {
-            let Some(result) = instruction.result_id else { continue };
+            let Some(result) = instruction.result_id else {
+                continue;
+            };
             match (op(instruction), instruction.operands.first()) {
                 (Op::TypeFloat, Some(Operand::LiteralBit32(width))) => {
                     let ty = match width {
@@ -210,7 +228,9 @@ impl Folder {
                     folder.types.insert(result, ty);
                 }
                 (Op::Constant, Some(operand)) => {
-                    let Some(ty) = instruction.result_type else { continue };
+                    let Some(ty) = instruction.result_type else {
+                        continue;
+                    };
                     let bits = match operand {
                         Operand::LiteralBit32(bits) => u64::from(*bits),
                         Operand::LiteralBit64(bits) => *bits,
@@ -238,7 +258,9 @@ impl Folder {
         let (Some(ty), Some(result)) = (instruction.result_type, instruction.result_id) else {
             return false;
         };
-        let Some(by) = self.value(instruction, ty) else { return false };
+        let Some(by) = self.value(instruction, ty) else {
+            return false;
+        };
         self.replaced.insert(result, by);
         true
     }
@@ -257,10 +279,13 @@ impl Folder {
                 Float::Single(value) => Float::Single(-value),
                 Float::Double(value) => Float::Double(-value),
             },
-            which @ (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv) => match (constant(a), constant(b)) {
+            which @ (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv) => match (constant(a), constant(b))
+            {
                 (Some(a), Some(b)) => Float::binary(which, a, b)?,
                 (Some(one), None) if which == Op::FMul && one.is(1.0) => return b,
-                (None, Some(one)) if matches!(which, Op::FMul | Op::FDiv) && one.is(1.0) => return a,
+                (None, Some(one)) if matches!(which, Op::FMul | Op::FDiv) && one.is(1.0) => {
+                    return a;
+                }
                 (None, Some(zero)) if which == Op::FSub && zero.is(0.0) => return a,
                 _ => return None,
             },
@@ -274,7 +299,12 @@ impl Folder {
             let id = self.next;
             self.next += 1;
             self.values.insert(id, value);
-            self.made.push(Instruction::new(Op::Constant, Some(ty), Some(id), vec![value.operand()]));
+            self.made.push(Instruction::new(
+                Op::Constant,
+                Some(ty),
+                Some(id),
+                vec![value.operand()],
+            ));
             id
         })
     }

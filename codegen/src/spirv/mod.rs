@@ -26,7 +26,10 @@ pub fn words(bytes: &[u8], kernel: &str) -> Result<Vec<u32>, Failure> {
         return Err(fail(format!("{} bytes are no SPIR-V module", bytes.len())));
     }
     let read = |from: fn([u8; 4]) -> u32| -> Vec<u32> {
-        bytes.chunks_exact(4).map(|word| from([word[0], word[1], word[2], word[3]])).collect()
+        bytes
+            .chunks_exact(4)
+            .map(|word| from([word[0], word[1], word[2], word[3]]))
+            .collect()
     };
     for words in [read(u32::from_le_bytes), read(u32::from_be_bytes)] {
         if words[0] == MAGIC {
@@ -63,6 +66,31 @@ pub fn store(module: &Module) -> Vec<u32> {
     module.assemble()
 }
 
+/// Makes a specialisation constant a plain one.
+pub(crate) fn freeze_constant(module: &mut Module, spec_id: u32, value: u32) {
+    let is_spec_id = |note: &Instruction| {
+        op(note) == Op::Decorate
+            && note.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId))
+            && literal(note, 2) == Some(spec_id)
+    };
+    let Some(target) = module
+        .annotations
+        .iter()
+        .find(|note| is_spec_id(note))
+        .and_then(|note| id(note, 0))
+    else {
+        return;
+    };
+    module.annotations.retain(|note| !is_spec_id(note));
+    for instruction in &mut module.types_global_values {
+        if instruction.result_id == Some(target) && op(instruction) == Op::SpecConstant {
+            let operands = vec![Operand::LiteralBit32(value)];
+            let ty = instruction.result_type;
+            *instruction = Instruction::new(Op::Constant, ty, Some(target), operands);
+        }
+    }
+}
+
 /// The opcode.
 pub(crate) fn op(instruction: &Instruction) -> Op {
     instruction.class.opcode
@@ -97,7 +125,10 @@ pub(crate) fn decoration(module: &Module, target: Word, which: Decoration) -> Op
 
 /// The instruction outside of functions that makes an id.
 pub(crate) fn global(module: &Module, wanted: Word) -> Option<&Instruction> {
-    module.types_global_values.iter().find(|instruction| instruction.result_id == Some(wanted))
+    module
+        .types_global_values
+        .iter()
+        .find(|instruction| instruction.result_id == Some(wanted))
 }
 
 #[cfg(test)]
@@ -106,8 +137,14 @@ mod tests {
 
     #[test]
     fn both_byte_orders_are_read() {
-        let little: Vec<u8> = [MAGIC, 0x0001_0500, 0, 1, 0].iter().flat_map(|w: &u32| w.to_le_bytes()).collect();
-        let big: Vec<u8> = [MAGIC, 0x0001_0500, 0, 1, 0].iter().flat_map(|w: &u32| w.to_be_bytes()).collect();
+        let little: Vec<u8> = [MAGIC, 0x0001_0500, 0, 1, 0]
+            .iter()
+            .flat_map(|w: &u32| w.to_le_bytes())
+            .collect();
+        let big: Vec<u8> = [MAGIC, 0x0001_0500, 0, 1, 0]
+            .iter()
+            .flat_map(|w: &u32| w.to_be_bytes())
+            .collect();
         assert_eq!(words(&little, "k").unwrap(), words(&big, "k").unwrap());
         assert_eq!(bytes(&words(&big, "k").unwrap()), little);
     }

@@ -17,7 +17,11 @@ use crate::error::{Failure, Step};
 /// The module is not the one that the description describes.
 pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
     entry_point(module, kernel)?;
-    let mut names = Names { kernel: &kernel.name, names: Vec::new(), taken: HashMap::new() };
+    let mut names = Names {
+        kernel: &kernel.name,
+        names: Vec::new(),
+        taken: HashMap::new(),
+    };
     for param in &kernel.params {
         match &param.role {
             Role::Uniform { binding, layout } => {
@@ -27,7 +31,12 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                 names.buffer(module, *binding, &param.name, layout, "Buffer", "elements")?;
             }
             Role::Atomic { binding } => {
-                let plain = Layout { name: "Counter".into(), size: 4, align: 4, fields: Vec::new() };
+                let plain = Layout {
+                    name: "Counter".into(),
+                    size: 4,
+                    align: 4,
+                    fields: Vec::new(),
+                };
                 names.buffer(module, *binding, &param.name, &plain, "Buffer", "elements")?;
             }
             Role::Texture { binding, .. } | Role::Sampler { binding } => {
@@ -37,8 +46,11 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
             }
             Role::Constant { id, .. } => {
                 let constant = module.annotations.iter().find_map(|note| {
-                    let wanted = note.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId));
-                    (wanted && literal(note, 2) == Some(*id)).then(|| super::id(note, 0)).flatten()
+                    let wanted =
+                        note.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId));
+                    (wanted && literal(note, 2) == Some(*id))
+                        .then(|| super::id(note, 0))
+                        .flatten()
                 });
                 if let Some(constant) = constant {
                     names.set(constant, &param.name);
@@ -55,7 +67,9 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
     for (index, output) in kernel.outputs.iter().enumerate() {
         let name = output_name(kernel, index);
         match output {
-            Output::Buffer { binding, layout, .. } => {
+            Output::Buffer {
+                binding, layout, ..
+            } => {
                 names.buffer(module, *binding, &name, layout, "Buffer", "elements")?;
             }
             Output::Texture { binding, .. } => {
@@ -104,9 +118,20 @@ pub fn output_name(kernel: &Kernel, index: usize) -> String {
         Output::Target { .. } => "color",
     };
     let name = stem(&kernel.outputs[index]);
-    let alike = kernel.outputs.iter().filter(|other| stem(other) == name).count();
-    let number = kernel.outputs[..index].iter().filter(|other| stem(other) == name).count();
-    if alike == 1 { name.into() } else { format!("{name}{number}") }
+    let alike = kernel
+        .outputs
+        .iter()
+        .filter(|other| stem(other) == name)
+        .count();
+    let number = kernel.outputs[..index]
+        .iter()
+        .filter(|other| stem(other) == name)
+        .count();
+    if alike == 1 {
+        name.into()
+    } else {
+        format!("{name}{number}")
+    }
 }
 
 fn failure(kernel: &str, construct: String, message: String) -> Failure {
@@ -144,7 +169,10 @@ fn entry_point(module: &Module, kernel: &Kernel) -> Result<(), Failure> {
     }
     if let Stage::Compute { threads, .. } = &kernel.stage {
         let mode = Operand::ExecutionMode(rspirv::spirv::ExecutionMode::LocalSize);
-        let size = module.execution_modes.iter().find(|it| it.operands.get(1) == Some(&mode));
+        let size = module
+            .execution_modes
+            .iter()
+            .find(|it| it.operands.get(1) == Some(&mode));
         let size = size.map(|it| [2, 3, 4].map(|place| literal(it, place).unwrap_or_default()));
         if size != Some(*threads) {
             let message = format!("the workgroup is {size:?}, not {threads:?}");
@@ -171,14 +199,17 @@ fn located(module: &Module, class: StorageClass, location: u32) -> Option<Word> 
 }
 
 fn built_in(module: &Module, number: u32) -> Option<Word> {
-    module.annotations.iter().find_map(|note| match note.operands.as_slice() {
-        [Operand::IdRef(target), Operand::Decoration(Decoration::BuiltIn), Operand::BuiltIn(which)]
-            if *which as u32 == number =>
-        {
-            Some(*target)
-        }
-        _ => None,
-    })
+    module
+        .annotations
+        .iter()
+        .find_map(|note| match note.operands.as_slice() {
+            [
+                Operand::IdRef(target),
+                Operand::Decoration(Decoration::BuiltIn),
+                Operand::BuiltIn(which),
+            ] if *which as u32 == number => Some(*target),
+            _ => None,
+        })
 }
 
 fn variables(module: &Module) -> impl Iterator<Item = Word> + '_ {
@@ -199,7 +230,8 @@ struct Names<'a> {
 impl Names<'_> {
     fn set(&mut self, target: Word, name: &str) {
         let operands = vec![Operand::IdRef(target), Operand::LiteralString(name.into())];
-        self.names.push(Instruction::new(Op::Name, None, None, operands));
+        self.names
+            .push(Instruction::new(Op::Name, None, None, operands));
     }
 
     fn set_member(&mut self, target: Word, member: u32, name: &str) {
@@ -208,7 +240,8 @@ impl Names<'_> {
             Operand::LiteralBit32(member),
             Operand::LiteralString(name.into()),
         ];
-        self.names.push(Instruction::new(Op::MemberName, None, None, operands));
+        self.names
+            .push(Instruction::new(Op::MemberName, None, None, operands));
     }
 
     /// A buffer: the variable, the block around its value or elements, and their structure.
@@ -221,26 +254,38 @@ impl Names<'_> {
         suffix: &str,
         member: &str,
     ) -> Result<(), Failure> {
-        let Some(variable) = bound(module, binding) else { return Ok(()) };
+        let Some(variable) = bound(module, binding) else {
+            return Ok(());
+        };
         self.set(variable, name);
         let pointee = |pointer: Word| global(module, pointer).and_then(|it| id(it, 1));
-        let Some(block) = global(module, variable).and_then(|it| it.result_type).and_then(pointee)
+        let Some(block) = global(module, variable)
+            .and_then(|it| it.result_type)
+            .and_then(pointee)
         else {
             return Ok(());
         };
         let Some(block_type) = global(module, block).filter(|it| op(it) == Op::TypeStruct) else {
-            return Err(failure(self.kernel, format!("`{name}`"), "it is no buffer".into()));
+            return Err(failure(
+                self.kernel,
+                format!("`{name}`"),
+                "it is no buffer".into(),
+            ));
         };
         if self.taken.insert(block, layout.name.clone()).is_none() {
             self.set(block, &format!("{}{suffix}", camel_case(&layout.name)));
             self.set_member(block, 0, member);
         }
-        let Some(mut element) = id(block_type, 0) else { return Ok(()) };
+        let Some(mut element) = id(block_type, 0) else {
+            return Ok(());
+        };
         if let Some(array) = global(module, element).filter(|it| op(it) == Op::TypeRuntimeArray) {
             let stride = decoration(module, element, Decoration::ArrayStride);
             if stride != Some(layout.size) {
-                let message =
-                    format!("an element takes {stride:?} bytes in SPIR-V, {} in Rust", layout.size);
+                let message = format!(
+                    "an element takes {stride:?} bytes in SPIR-V, {} in Rust",
+                    layout.size
+                );
                 return Err(failure(self.kernel, format!("`{name}`"), message));
             }
             element = id(array, 0).unwrap_or(element);
@@ -311,7 +356,12 @@ pub(crate) fn camel_case(name: &str) -> String {
     name.split('_')
         .flat_map(|part| {
             let mut letters = part.chars();
-            letters.next().map(char::to_uppercase).into_iter().flatten().chain(letters)
+            letters
+                .next()
+                .map(char::to_uppercase)
+                .into_iter()
+                .flatten()
+                .chain(letters)
         })
         .collect()
 }

@@ -5,8 +5,8 @@ use std::collections::HashSet;
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{
-    AddressingModel, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel, MemorySemantics,
-    Op, StorageClass, Word,
+    AddressingModel, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel,
+    MemorySemantics, Op, StorageClass, Word,
 };
 
 use super::{global, id, literal, op};
@@ -20,12 +20,14 @@ pub fn capabilities(module: &mut Module) {
         .all_inst_iter()
         .filter_map(|instruction| needs(instruction))
         .collect();
-    module.capabilities.retain(|instruction| match instruction.operands.first() {
-        Some(Operand::Capability(capability)) if ENABLED.contains(capability) => {
-            used.contains(capability)
-        }
-        _ => true,
-    });
+    module
+        .capabilities
+        .retain(|instruction| match instruction.operands.first() {
+            Some(Operand::Capability(capability)) if ENABLED.contains(capability) => {
+                used.contains(capability)
+            }
+            _ => true,
+        });
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
@@ -46,7 +48,9 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
         | Op::ImageQueryLevels
         | Op::ImageQuerySamples => Some(Capability::ImageQuery),
         Op::TypeImage => match instruction.operands.get(6) {
-            Some(Operand::ImageFormat(format)) => (!is_core(*format)).then_some(Capability::StorageImageExtendedFormats),
+            Some(Operand::ImageFormat(format)) => {
+                (!is_core(*format)).then_some(Capability::StorageImageExtendedFormats)
+            }
             _ => None,
         },
         _ => None,
@@ -82,7 +86,12 @@ fn is_core(format: ImageFormat) -> bool {
 /// which is what the kernels mean; and devices need not know the newer model.
 pub fn memory_model(module: &mut Module) {
     let vulkan = Operand::MemoryModel(MemoryModel::Vulkan);
-    if module.memory_model.as_ref().and_then(|model| model.operands.get(1)) != Some(&vulkan) {
+    if module
+        .memory_model
+        .as_ref()
+        .and_then(|model| model.operands.get(1))
+        != Some(&vulkan)
+    {
         return;
     }
     let plain = MemoryAccess::VOLATILE | MemoryAccess::ALIGNED | MemoryAccess::NONTEMPORAL;
@@ -102,7 +111,9 @@ pub fn memory_model(module: &mut Module) {
         | MemorySemantics::VOLATILE;
     let says_more = module.all_inst_iter().any(|instruction| {
         let constant = op(instruction) == Op::Constant
-            && instruction.result_id.is_some_and(|id| semantics.contains(&id))
+            && instruction
+                .result_id
+                .is_some_and(|id| semantics.contains(&id))
             && literal(instruction, 0)
                 .is_none_or(|bits| MemorySemantics::from_bits_truncate(bits).intersects(beyond));
         constant
@@ -125,10 +136,14 @@ pub fn memory_model(module: &mut Module) {
         ],
     ));
     let needed = Operand::Capability(Capability::VulkanMemoryModel);
-    module.capabilities.retain(|instruction| instruction.operands.first() != Some(&needed));
+    module
+        .capabilities
+        .retain(|instruction| instruction.operands.first() != Some(&needed));
     module.extensions.retain(|instruction| {
         instruction.operands.first()
-            != Some(&Operand::LiteralString("SPV_KHR_vulkan_memory_model".into()))
+            != Some(&Operand::LiteralString(
+                "SPV_KHR_vulkan_memory_model".into(),
+            ))
     });
 }
 
@@ -140,7 +155,8 @@ pub fn write_only_textures(module: &mut Module) {
         .iter()
         .filter(|variable| {
             op(variable) == Op::Variable
-                && variable.operands.first() == Some(&Operand::StorageClass(StorageClass::UniformConstant))
+                && variable.operands.first()
+                    == Some(&Operand::StorageClass(StorageClass::UniformConstant))
                 && is_storage_image(module, variable).unwrap_or(false)
         })
         .filter_map(|variable| variable.result_id)
@@ -155,7 +171,9 @@ pub fn write_only_textures(module: &mut Module) {
         });
         if !there {
             let operands = vec![Operand::IdRef(texture), non_readable];
-            module.annotations.push(Instruction::new(Op::Decorate, None, None, operands));
+            module
+                .annotations
+                .push(Instruction::new(Op::Decorate, None, None, operands));
         }
     }
 }
@@ -168,7 +186,12 @@ fn is_storage_image(module: &Module, variable: &Instruction) -> Option<bool> {
 
 /// Whether anything but `OpImageWrite` and queries of the size uses the variable.
 fn is_read(module: &Module, variable: Word) -> bool {
-    let body = || module.functions.iter().flat_map(|function| function.all_inst_iter());
+    let body = || {
+        module
+            .functions
+            .iter()
+            .flat_map(|function| function.all_inst_iter())
+    };
     let mut loaded = HashSet::new();
     for instruction in body() {
         let mentions = instruction.operands.contains(&Operand::IdRef(variable));
@@ -180,9 +203,14 @@ fn is_read(module: &Module, variable: Word) -> bool {
     }
     body().any(|instruction| {
         let harmless = matches!(op(instruction), Op::ImageWrite | Op::ImageQuerySize);
-        instruction.operands.iter().enumerate().any(|(place, operand)| {
-            matches!(operand, Operand::IdRef(id) if loaded.contains(id)) && !(harmless && place == 0)
-        })
+        instruction
+            .operands
+            .iter()
+            .enumerate()
+            .any(|(place, operand)| {
+                matches!(operand, Operand::IdRef(id) if loaded.contains(id))
+                    && !(harmless && place == 0)
+            })
     })
 }
 
@@ -193,8 +221,12 @@ pub fn debug(module: &mut Module) {
     module.debug_names.clear();
     for function in &mut module.functions {
         for block in &mut function.blocks {
-            block.instructions.retain(|instruction| !matches!(op(instruction), Op::Line | Op::NoLine));
+            block
+                .instructions
+                .retain(|instruction| !matches!(op(instruction), Op::Line | Op::NoLine));
         }
     }
-    module.types_global_values.retain(|instruction| !matches!(op(instruction), Op::Line | Op::NoLine));
+    module
+        .types_global_values
+        .retain(|instruction| !matches!(op(instruction), Op::Line | Op::NoLine));
 }

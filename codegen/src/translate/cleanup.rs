@@ -37,7 +37,9 @@ struct Wrapper {
 }
 
 fn read_wrapper(module: &Module) -> Option<Wrapper> {
-    let [entry] = module.entry_points.as_slice() else { return None };
+    let [entry] = module.entry_points.as_slice() else {
+        return None;
+    };
     let function = &entry.function;
     let global = |handle: Handle<Expression>| match function.expressions[handle] {
         Expression::GlobalVariable(global) => Some(global),
@@ -56,9 +58,11 @@ fn read_wrapper(module: &Module) -> Option<Wrapper> {
                 };
                 inputs.insert(global(pointer)?, argument);
             }
-            Statement::Call { function, ref arguments, result: None }
-                if inner.is_none() && arguments.is_empty() =>
-            {
+            Statement::Call {
+                function,
+                ref arguments,
+                result: None,
+            } if inner.is_none() && arguments.is_empty() => {
                 inner = Some(function);
             }
             Statement::Return { value: Some(value) } if inner.is_some() => {
@@ -79,7 +83,12 @@ fn read_wrapper(module: &Module) -> Option<Wrapper> {
             _ => return None,
         }
     }
-    Some(Wrapper { inner: inner?, inputs, outputs, composed })
+    Some(Wrapper {
+        inner: inner?,
+        inputs,
+        outputs,
+        composed,
+    })
 }
 
 fn fold(module: &mut Module) -> Option<()> {
@@ -113,7 +122,11 @@ fn inputs_to_arguments(
 ) -> Option<()> {
     // Pointers into inputs: the variable and constant members of it.
     let mut rooted: HashSet<Handle<Expression>> = HashSet::new();
-    let handles: Vec<_> = function.expressions.iter().map(|(handle, _)| handle).collect();
+    let handles: Vec<_> = function
+        .expressions
+        .iter()
+        .map(|(handle, _)| handle)
+        .collect();
     for handle in handles {
         match function.expressions[handle] {
             Expression::GlobalVariable(global) => {
@@ -167,26 +180,38 @@ fn outputs_to_result(
             return None;
         }
         let local = function.local_variables.append(
-            LocalVariable { name: global.name.clone(), ty: global.ty, init: None },
+            LocalVariable {
+                name: global.name.clone(),
+                ty: global.ty,
+                init: None,
+            },
             Span::UNDEFINED,
         );
         for &pointer in &pointers {
             function.expressions[pointer] = Expression::LocalVariable(local);
         }
-        let pointer = function.expressions.append(Expression::LocalVariable(local), Span::UNDEFINED);
-        components.push(function.expressions.append(Expression::Load { pointer }, Span::UNDEFINED));
+        let pointer = function
+            .expressions
+            .append(Expression::LocalVariable(local), Span::UNDEFINED);
+        components.push(
+            function
+                .expressions
+                .append(Expression::Load { pointer }, Span::UNDEFINED),
+        );
     }
     let value = match wrapper.composed {
-        Some(ty) => {
-            function.expressions.append(Expression::Compose { ty, components }, Span::UNDEFINED)
-        }
+        Some(ty) => function
+            .expressions
+            .append(Expression::Compose { ty, components }, Span::UNDEFINED),
         None => *components.first()?,
     };
     if function.expressions.len() > first_new {
         let range = function.expressions.range_from(first_new);
         function.body.push(Statement::Emit(range), Span::UNDEFINED);
     }
-    function.body.push(Statement::Return { value: Some(value) }, Span::UNDEFINED);
+    function
+        .body
+        .push(Statement::Return { value: Some(value) }, Span::UNDEFINED);
     Some(())
 }
 
@@ -196,13 +221,16 @@ fn single_store(
     function: &mut naga::Function,
     pointers: &HashSet<Handle<Expression>>,
 ) -> Option<Handle<Expression>> {
-    let used_otherwise = function.expressions.iter().any(|(_, expression)| match expression {
-        Expression::Load { pointer } => pointers.contains(pointer),
-        Expression::AccessIndex { base, .. } | Expression::Access { base, .. } => {
-            pointers.contains(base)
-        }
-        _ => false,
-    });
+    let used_otherwise = function
+        .expressions
+        .iter()
+        .any(|(_, expression)| match expression {
+            Expression::Load { pointer } => pointers.contains(pointer),
+            Expression::AccessIndex { base, .. } | Expression::Access { base, .. } => {
+                pointers.contains(base)
+            }
+            _ => false,
+        });
     let mut stores = 0;
     each_statement(&function.body, &mut |statement| {
         if let Statement::Store { pointer, .. } = statement {
@@ -215,14 +243,18 @@ fn single_store(
     let place = function.body.iter().position(
         |statement| matches!(statement, Statement::Store { pointer, .. } if pointers.contains(pointer)),
     )?;
-    let Statement::Store { value, .. } = function.body[place] else { return None };
+    let Statement::Store { value, .. } = function.body[place] else {
+        return None;
+    };
     function.body.cull(place..=place);
     Some(value)
 }
 
 fn returns(block: &Block) -> bool {
     let mut found = false;
-    each_statement(block, &mut |statement| found |= matches!(statement, Statement::Return { .. }));
+    each_statement(block, &mut |statement| {
+        found |= matches!(statement, Statement::Return { .. })
+    });
     found
 }
 
@@ -236,9 +268,13 @@ fn each_statement(block: &Block, visit: &mut impl FnMut(&Statement)) {
                 each_statement(reject, visit);
             }
             Statement::Switch { cases, .. } => {
-                cases.iter().for_each(|case| each_statement(&case.body, visit));
+                cases
+                    .iter()
+                    .for_each(|case| each_statement(&case.body, visit));
             }
-            Statement::Loop { body, continuing, .. } => {
+            Statement::Loop {
+                body, continuing, ..
+            } => {
                 each_statement(body, visit);
                 each_statement(continuing, visit);
             }
@@ -275,9 +311,13 @@ fn mend_emits(block: &mut Block, expressions: &Arena<Expression>) {
                 mend_emits(reject, expressions);
             }
             Statement::Switch { cases, .. } => {
-                cases.iter_mut().for_each(|case| mend_emits(&mut case.body, expressions));
+                cases
+                    .iter_mut()
+                    .for_each(|case| mend_emits(&mut case.body, expressions));
             }
-            Statement::Loop { body, continuing, .. } => {
+            Statement::Loop {
+                body, continuing, ..
+            } => {
                 mend_emits(body, expressions);
                 mend_emits(continuing, expressions);
             }
@@ -293,10 +333,16 @@ pub fn unwrap_blocks(module: &mut Module) {
         .global_variables
         .iter()
         .filter(|(_, global)| {
-            matches!(global.space, AddressSpace::Uniform | AddressSpace::Storage { .. })
+            matches!(
+                global.space,
+                AddressSpace::Uniform | AddressSpace::Storage { .. }
+            )
         })
         .filter_map(|(handle, global)| match &module.types[global.ty] {
-            Type { name, inner: TypeInner::Struct { members, .. } } => match members.as_slice() {
+            Type {
+                name,
+                inner: TypeInner::Struct { members, .. },
+            } => match members.as_slice() {
                 [only] if only.offset == 0 => Some((handle, only.ty, name.clone())),
                 _ => None,
             },
@@ -310,10 +356,18 @@ pub fn unwrap_blocks(module: &mut Module) {
         functions_mut(module).for_each(|function| skip_member(function, global));
         module.global_variables.get_mut(global).ty = content;
         // MSL and GLSL declare the array's type: by the block's name.
-        if let (Type { name: None, inner: TypeInner::Array { .. } }, Some(name)) =
-            (&module.types[content], name)
+        if let (
+            Type {
+                name: None,
+                inner: TypeInner::Array { .. },
+            },
+            Some(name),
+        ) = (&module.types[content], name)
         {
-            let named = Type { name: Some(name), ..module.types[content].clone() };
+            let named = Type {
+                name: Some(name),
+                ..module.types[content].clone()
+            };
             module.types.replace(content, named);
         }
     }
@@ -326,18 +380,20 @@ fn functions(module: &Module) -> impl Iterator<Item = &naga::Function> {
 
 fn functions_mut(module: &mut Module) -> impl Iterator<Item = &mut naga::Function> {
     let inner = module.functions.iter_mut().map(|(_, function)| function);
-    inner.chain(module.entry_points.iter_mut().map(|entry| &mut entry.function))
+    inner.chain(
+        module
+            .entry_points
+            .iter_mut()
+            .map(|entry| &mut entry.function),
+    )
 }
 
 /// A load or store of the whole block would change its meaning.
 fn only_member_used(function: &naga::Function, global: GlobalHandle) -> bool {
-    let is_block = |handle: &Handle<Expression>| {
-        matches!(function.expressions[*handle], Expression::GlobalVariable(other) if other == global)
-    };
-    let loaded = function
-        .expressions
-        .iter()
-        .any(|(_, expression)| matches!(expression, Expression::Load { pointer } if is_block(pointer)));
+    let is_block = |handle: &Handle<Expression>| matches!(function.expressions[*handle], Expression::GlobalVariable(other) if other == global);
+    let loaded = function.expressions.iter().any(
+        |(_, expression)| matches!(expression, Expression::Load { pointer } if is_block(pointer)),
+    );
     let mut passed = false;
     each_statement(&function.body, &mut |statement| {
         passed |= match statement {
@@ -352,7 +408,11 @@ fn only_member_used(function: &naga::Function, global: GlobalHandle) -> bool {
 type GlobalHandle = Handle<GlobalVariable>;
 
 fn skip_member(function: &mut naga::Function, global: GlobalHandle) {
-    let handles: Vec<_> = function.expressions.iter().map(|(handle, _)| handle).collect();
+    let handles: Vec<_> = function
+        .expressions
+        .iter()
+        .map(|(handle, _)| handle)
+        .collect();
     // Decided before the first edit: an edited access looks like the block itself.
     let accesses: Vec<_> = handles
         .into_iter()
@@ -385,13 +445,20 @@ fn drop_return(body: &mut Block) {
 
 /// Names the structure that a vertex or fragment stage with several outputs returns.
 pub fn name_result(module: &mut Module, name: &str, members: &[String]) {
-    let Some(FunctionResult { ty, .. }) =
-        module.entry_points.first().and_then(|entry| entry.function.result.clone())
+    let Some(FunctionResult { ty, .. }) = module
+        .entry_points
+        .first()
+        .and_then(|entry| entry.function.result.clone())
     else {
         return;
     };
     let mut named = module.types[ty].clone();
-    let TypeInner::Struct { members: fields, .. } = &mut named.inner else { return };
+    let TypeInner::Struct {
+        members: fields, ..
+    } = &mut named.inner
+    else {
+        return;
+    };
     if named.name.is_some() || fields.len() != members.len() {
         return;
     }
@@ -418,15 +485,17 @@ pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
         let name = match *expression {
             Expression::Load { pointer } => match function.expressions[pointer] {
                 Expression::AccessIndex { base, index } => match pointee(base) {
-                    Some(Type { inner: TypeInner::Struct { members, .. }, .. }) => {
-                        members[index as usize].name.clone()
-                    }
+                    Some(Type {
+                        inner: TypeInner::Struct { members, .. },
+                        ..
+                    }) => members[index as usize].name.clone(),
                     _ => None,
                 },
                 Expression::Access { .. } => match pointee(pointer) {
-                    Some(Type { name: Some(name), inner: TypeInner::Struct { .. } }) => {
-                        Some(snake_case(name))
-                    }
+                    Some(Type {
+                        name: Some(name),
+                        inner: TypeInner::Struct { .. },
+                    }) => Some(snake_case(name)),
                     _ => None,
                 },
                 _ => None,
@@ -434,14 +503,18 @@ pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
             Expression::ImageLoad { image, .. } | Expression::ImageSample { image, .. } => {
                 texture_name(module, function, image).map(|name| format!("{name}_texel"))
             }
-            Expression::ImageQuery { image, query: ImageQuery::Size { .. } } => {
-                texture_name(module, function, image).map(|name| format!("{name}_size"))
-            }
+            Expression::ImageQuery {
+                image,
+                query: ImageQuery::Size { .. },
+            } => texture_name(module, function, image).map(|name| format!("{name}_size")),
             _ => None,
         };
         names.extend(name.map(|name| (handle, name)));
     }
-    module.entry_points[0].function.named_expressions.extend(names);
+    module.entry_points[0]
+        .function
+        .named_expressions
+        .extend(names);
 }
 
 fn texture_name(

@@ -35,7 +35,13 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
             _ => *counter,
         };
         *counter += 1;
-        options.binding_map.insert(ResourceBinding { group: it.group, binding: it.binding }, number);
+        options.binding_map.insert(
+            ResourceBinding {
+                group: it.group,
+                binding: it.binding,
+            },
+            number,
+        );
         numbers.insert(it.binding, u32::from(number));
     }
     let pipeline = PipelineOptions {
@@ -44,11 +50,22 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         multiview: None,
     };
     let mut source = String::new();
-    let written = Writer::new(&mut source, &module, &info, &options, &pipeline, job.options.policies())
-        .and_then(|mut writer| writer.write());
+    let written = Writer::new(
+        &mut source,
+        &module,
+        &info,
+        &options,
+        &pipeline,
+        job.options.policies(),
+    )
+    .and_then(|mut writer| writer.write());
     let reflection = match written {
         Ok(reflection) => reflection,
-        Err(error @ (Error::MissingFeatures(_) | Error::ImageMultipleSamplers | Error::UnsupportedScalar(_))) => {
+        Err(
+            error @ (Error::MissingFeatures(_)
+            | Error::ImageMultipleSamplers
+            | Error::UnsupportedScalar(_)),
+        ) => {
             return Ok(Written::Unsupported(format!("{}: {error}", job.language)));
         }
         Err(error) => return Err(job.failure(&error)),
@@ -57,13 +74,19 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let of_handle = |handle| bound.iter().find(|it| it.handle == handle);
     let mut combined: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for mapping in reflection.texture_mapping.values() {
-        if let (Some(texture), Some(sampler)) =
-            (of_handle(mapping.texture), mapping.sampler.and_then(of_handle))
-        {
-            combined.entry(sampler.binding).or_default().push(texture.binding);
+        if let (Some(texture), Some(sampler)) = (
+            of_handle(mapping.texture),
+            mapping.sampler.and_then(of_handle),
+        ) {
+            combined
+                .entry(sampler.binding)
+                .or_default()
+                .push(texture.binding);
         }
     }
-    combined.values_mut().for_each(|textures| textures.sort_unstable());
+    combined
+        .values_mut()
+        .for_each(|textures| textures.sort_unstable());
     let mut places = BTreeMap::new();
     for it in &bound {
         let mut place = Place {
@@ -77,7 +100,10 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         if it.kind == Kind::Sampler {
             place.combined_with = combined.remove(&it.binding).unwrap_or_default();
         } else {
-            place.index = numbers.get(&it.binding).copied().filter(|_| job.language != Language::Essl300);
+            place.index = numbers
+                .get(&it.binding)
+                .copied()
+                .filter(|_| job.language != Language::Essl300);
             place.name = Some(rename_variable(&mut source, it, entry.stage));
             place.block = reflection
                 .uniforms
@@ -115,15 +141,27 @@ fn rename_variable(source: &mut String, it: &Bound, stage: ShaderStage) -> Strin
         _ => "cs",
     };
     let given = format!("_group_{}_binding_{}_{stage}", it.group, it.binding);
-    let prefix = if matches!(it.kind, Kind::Buffer { .. }) { "b" } else { "u" };
+    let prefix = if matches!(it.kind, Kind::Buffer { .. }) {
+        "b"
+    } else {
+        "u"
+    };
     // Two underscores in a row are reserved.
     let wanted = format!("{prefix}_{}", it.name.trim_matches('_').replace("__", "_"));
     replace(source, given, wanted)
 }
 
 fn rename_block(source: &mut String, given: &str, it: &Bound) -> String {
-    let suffix = if it.kind == Kind::Uniform { "Uniform" } else { "Buffer" };
-    replace(source, given.to_owned(), format!("{}{suffix}", camel_case(&it.name)))
+    let suffix = if it.kind == Kind::Uniform {
+        "Uniform"
+    } else {
+        "Buffer"
+    };
+    replace(
+        source,
+        given.to_owned(),
+        format!("{}{suffix}", camel_case(&it.name)),
+    )
 }
 
 /// Renames where the new name is free; gives the name that stands.

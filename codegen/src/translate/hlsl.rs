@@ -37,7 +37,13 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
             restrict_indexing: restrict,
             ..BindTarget::default()
         };
-        options.binding_map.insert(ResourceBinding { group: it.group, binding: it.binding }, target);
+        options.binding_map.insert(
+            ResourceBinding {
+                group: it.group,
+                binding: it.binding,
+            },
+            target,
+        );
         *register += 1;
     }
     let pipeline = PipelineOptions::default();
@@ -86,11 +92,14 @@ fn plain_samplers(source: &str) -> Option<String> {
     for line in source.lines() {
         let heap = line.starts_with("SamplerState nagaSamplerHeap[")
             || line.starts_with("SamplerComparisonState nagaComparisonSamplerHeap[")
-            || (line.starts_with("StructuredBuffer<uint> nagaGroup") && line.contains("SamplerIndexArray"));
+            || (line.starts_with("StructuredBuffer<uint> nagaGroup")
+                && line.contains("SamplerIndexArray"));
         if heap {
             continue;
         }
-        let declaration = line.strip_prefix("static const Sampler").filter(|rest| rest.contains("SamplerHeap["));
+        let declaration = line
+            .strip_prefix("static const Sampler")
+            .filter(|rest| rest.contains("SamplerHeap["));
         match declaration {
             Some(rest) => {
                 // `State name = nagaSamplerHeap[nagaGroup0SamplerIndexArray[register]];`
@@ -119,7 +128,13 @@ StructuredBuffer<uint> nagaGroup0SamplerIndexArray : register(t0, space255);
 static const SamplerState smp = nagaSamplerHeap[nagaGroup0SamplerIndexArray[1]];
 float x;
 ";
-        assert_eq!(plain_samplers(source).unwrap(), "SamplerState smp : register(s1);\nfloat x;\n");
-        assert_eq!(plain_samplers("static const SamplerState smp = nagaSamplerHeap[other];\n"), None);
+        assert_eq!(
+            plain_samplers(source).unwrap(),
+            "SamplerState smp : register(s1);\nfloat x;\n"
+        );
+        assert_eq!(
+            plain_samplers("static const SamplerState smp = nagaSamplerHeap[other];\n"),
+            None
+        );
     }
 }

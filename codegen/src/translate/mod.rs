@@ -17,17 +17,20 @@ mod cleanup;
 mod glsl;
 mod hlsl;
 mod msl;
-mod text;
+pub(crate) mod text;
 mod wgsl;
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-use hankel_dsl::native::describe::{Kernel, Output, Role, Stage};
+use hankel_dsl::native::describe::{Kernel, Stage};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, Expression, ImageClass, ImageDimension, Literal, Module, Scalar, ScalarKind, StorageAccess, StorageFormat, TypeInner};
+use naga::{
+    AddressSpace, Expression, ImageClass, ImageDimension, Literal, Module, Scalar, ScalarKind,
+    StorageAccess, StorageFormat, TypeInner,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -98,13 +101,15 @@ impl FromStr for ShaderModel {
 
     fn from_str(value: &str) -> Result<Self, Error> {
         let wanted = value.replace('_', ".");
-        SHADER_MODELS.iter().find(|(name, _)| *name == wanted).map(|(_, model)| Self(*model)).ok_or(
-            Error::Option {
+        SHADER_MODELS
+            .iter()
+            .find(|(name, _)| *name == wanted)
+            .map(|(_, model)| Self(*model))
+            .ok_or(Error::Option {
                 option: "shader model",
                 value: value.into(),
                 expected: "5.1, or 6.0 to 6.9",
-            },
-        )
+            })
     }
 }
 
@@ -256,7 +261,12 @@ impl Ir {
         let name = kernel.name.as_str();
         let module = guarded(|| parse(spirv, name), name, Step::Parse)?;
         let info = guarded(|| validate(&module, name), name, Step::Check)?;
-        let raw = Self { module, info, kernel: name.into(), clean: false };
+        let raw = Self {
+            module,
+            info,
+            kernel: name.into(),
+            clean: false,
+        };
         // Where the clean-up does not apply, what naga read is still right.
         Ok(raw.cleaned(kernel).unwrap_or(raw))
     }
@@ -284,7 +294,12 @@ impl Ir {
             let info = validate(&module, name)?;
             cleanup::name_loads(&mut module, &info);
             let info = validate(&module, name)?;
-            Ok(Self { module, info, kernel: name.into(), clean: folded })
+            Ok(Self {
+                module,
+                info,
+                kernel: name.into(),
+                clean: folded,
+            })
         };
         guarded(step, name, Step::Check).ok()
     }
@@ -303,7 +318,12 @@ impl Ir {
         if let Some(reason) = self.unsupported(language, &kernel.stage) {
             return Ok(Written::Unsupported(reason));
         }
-        let job = Job { ir: self, kernel, options, language };
+        let job = Job {
+            ir: self,
+            kernel,
+            options,
+            language,
+        };
         let step = Step::Write(language);
         let mut written = guarded(
             || match language {
@@ -317,6 +337,7 @@ impl Ir {
             step,
         )?;
         if let Written::Text(text) = &mut written {
+            job.restore_digits(text);
             text.source = head(language, kernel, &text.source);
         }
         Ok(written)
@@ -325,7 +346,9 @@ impl Ir {
     /// Why a language cannot express the kernel, where that can be told without trying.
     fn unsupported(&self, language: Language, stage: &Stage) -> Option<String> {
         let es = matches!(language, Language::Essl310 | Language::Essl300);
-        if self.has_wide(ScalarKind::Float) && (es || matches!(language, Language::Wgsl | Language::Msl)) {
+        if self.has_wide(ScalarKind::Float)
+            && (es || matches!(language, Language::Wgsl | Language::Msl))
+        {
             return Some(format!("{language} has no 64-bit floating-point numbers"));
         }
         let wide_integers = self.has_wide(ScalarKind::Uint) || self.has_wide(ScalarKind::Sint);
@@ -336,30 +359,46 @@ impl Ir {
             if matches!(stage, Stage::Compute { .. }) {
                 return Some(format!("{language} has no compute shaders"));
             }
-            if self.globals().any(|(global, _)| matches!(global.space, AddressSpace::Storage { .. })) {
+            if self
+                .globals()
+                .any(|(global, _)| matches!(global.space, AddressSpace::Storage { .. }))
+            {
                 return Some(format!("{language} has no storage buffers"));
             }
         }
         for (_, inner) in self.globals() {
-            let TypeInner::Image { dim, class, .. } = *inner else { continue };
+            let TypeInner::Image { dim, class, .. } = *inner else {
+                continue;
+            };
             match class {
                 ImageClass::Storage { .. } if language == Language::Essl300 => {
                     return Some(format!("{language} has no storage textures"));
                 }
-                ImageClass::Storage { format, .. } if language == Language::Essl310 && !in_es(format) => {
+                ImageClass::Storage { format, .. }
+                    if language == Language::Essl310 && !in_es(format) =>
+                {
                     return Some(format!("{language} has no {format:?} storage textures"));
                 }
                 ImageClass::Storage { format, access }
                     if language == Language::Essl310
                         && access.contains(StorageAccess::LOAD | StorageAccess::STORE)
-                        && !matches!(format, StorageFormat::R32Float | StorageFormat::R32Uint | StorageFormat::R32Sint) =>
+                        && !matches!(
+                            format,
+                            StorageFormat::R32Float
+                                | StorageFormat::R32Uint
+                                | StorageFormat::R32Sint
+                        ) =>
                 {
-                    return Some(format!("{language} cannot both read and write {format:?} textures"));
+                    return Some(format!(
+                        "{language} cannot both read and write {format:?} textures"
+                    ));
                 }
                 ImageClass::Sampled { multi: true, .. } if language == Language::Essl300 => {
                     return Some(format!("{language} has no multisampled textures"));
                 }
-                ImageClass::Storage { .. } | ImageClass::Sampled { .. } if es && dim == ImageDimension::D1 => {
+                ImageClass::Storage { .. } | ImageClass::Sampled { .. }
+                    if es && dim == ImageDimension::D1 =>
+                {
                     return Some(format!("{language} has no one-dimensional textures"));
                 }
                 _ => {}
@@ -382,11 +421,16 @@ impl Ir {
             Expression::Literal(Literal::F64(_)) => kind == ScalarKind::Float,
             Expression::Literal(Literal::I64(_)) => kind == ScalarKind::Sint,
             Expression::Literal(Literal::U64(_)) => kind == ScalarKind::Uint,
-            Expression::As { kind: to, convert: Some(8), .. } => to == kind,
+            Expression::As {
+                kind: to,
+                convert: Some(8),
+                ..
+            } => to == kind,
             _ => false,
         };
         let functions = self.module.functions.iter().map(|(_, function)| function);
-        let mut functions = functions.chain(self.module.entry_points.iter().map(|entry| &entry.function));
+        let mut functions =
+            functions.chain(self.module.entry_points.iter().map(|entry| &entry.function));
         self.module.types.iter().any(|(_, ty)| match ty.inner {
             TypeInner::Scalar(scalar)
             | TypeInner::Vector { scalar, .. }
@@ -402,8 +446,19 @@ fn in_es(format: StorageFormat) -> bool {
     use StorageFormat::*;
     matches!(
         format,
-        Rgba32Float | Rgba16Float | R32Float | Rgba8Unorm | Rgba8Snorm | Rgba32Sint | Rgba16Sint
-            | Rgba8Sint | R32Sint | Rgba32Uint | Rgba16Uint | Rgba8Uint | R32Uint
+        Rgba32Float
+            | Rgba16Float
+            | R32Float
+            | Rgba8Unorm
+            | Rgba8Snorm
+            | Rgba32Sint
+            | Rgba16Sint
+            | Rgba8Sint
+            | R32Sint
+            | Rgba32Uint
+            | Rgba16Uint
+            | Rgba8Uint
+            | R32Uint
     )
 }
 
@@ -420,7 +475,9 @@ struct Job<'a> {
 enum Kind {
     Uniform,
     /// Storage buffer; written or only read.
-    Buffer { written: bool },
+    Buffer {
+        written: bool,
+    },
     Texture,
     /// Storage texture.
     Image,
@@ -450,16 +507,32 @@ impl Job<'_> {
                 let inner = &module.types[global.ty].inner;
                 let kind = match (global.space, inner) {
                     (AddressSpace::Uniform, _) => Kind::Uniform,
-                    (AddressSpace::Storage { access }, _) => {
-                        Kind::Buffer { written: access.contains(StorageAccess::STORE) }
-                    }
+                    (AddressSpace::Storage { access }, _) => Kind::Buffer {
+                        written: access.contains(StorageAccess::STORE),
+                    },
                     (_, TypeInner::Sampler { .. }) => Kind::Sampler,
-                    (_, TypeInner::Image { class: ImageClass::Storage { .. }, .. }) => Kind::Image,
+                    (
+                        _,
+                        TypeInner::Image {
+                            class: ImageClass::Storage { .. },
+                            ..
+                        },
+                    ) => Kind::Image,
                     _ => Kind::Texture,
                 };
-                let name = global.name.clone().unwrap_or_else(|| format!("binding{}", place.binding));
+                let name = global
+                    .name
+                    .clone()
+                    .unwrap_or_else(|| format!("binding{}", place.binding));
                 let unsized_ = inner.is_dynamically_sized(&module.types);
-                Some(Bound { group: place.group, binding: place.binding, kind, name, handle, unsized_ })
+                Some(Bound {
+                    group: place.group,
+                    binding: place.binding,
+                    kind,
+                    name,
+                    handle,
+                    unsized_,
+                })
             })
             .collect();
         bound.sort_by_key(|it| (it.group, it.binding));
@@ -467,7 +540,15 @@ impl Job<'_> {
     }
 
     /// The module with every specialisation constant replaced by its value.
-    fn frozen(&self) -> Result<(std::borrow::Cow<'_, Module>, std::borrow::Cow<'_, ModuleInfo>), Failure> {
+    fn frozen(
+        &self,
+    ) -> Result<
+        (
+            std::borrow::Cow<'_, Module>,
+            std::borrow::Cow<'_, ModuleInfo>,
+        ),
+        Failure,
+    > {
         naga::back::pipeline_constants::process_overrides(
             &self.ir.module,
             &self.ir.info,
@@ -475,6 +556,68 @@ impl Job<'_> {
             &naga::back::PipelineConstants::default(),
         )
         .map_err(|error| self.failure(&error))
+    }
+
+    /// naga puts an underscore after every name that ends in a digit (`b1_`): takes it away again
+    /// where the name is free and no type's.
+    fn restore_digits(&self, text: &mut Text) {
+        let module = &self.ir.module;
+        let functions = module.entry_points.iter().map(|entry| &entry.function);
+        let mut names: Vec<&str> = Vec::new();
+        for (_, ty) in module.types.iter() {
+            names.extend(ty.name.as_deref());
+            if let TypeInner::Struct { members, .. } = &ty.inner {
+                names.extend(members.iter().filter_map(|member| member.name.as_deref()));
+            }
+        }
+        names.extend(
+            module
+                .global_variables
+                .iter()
+                .filter_map(|(_, it)| it.name.as_deref()),
+        );
+        names.extend(
+            module
+                .overrides
+                .iter()
+                .filter_map(|(_, it)| it.name.as_deref()),
+        );
+        names.push(&self.kernel.name);
+        for function in functions {
+            names.extend(
+                function
+                    .arguments
+                    .iter()
+                    .filter_map(|it| it.name.as_deref()),
+            );
+            names.extend(
+                function
+                    .local_variables
+                    .iter()
+                    .filter_map(|(_, it)| it.name.as_deref()),
+            );
+            names.extend(function.named_expressions.values().map(String::as_str));
+        }
+        names.sort_unstable();
+        names.dedup();
+        for name in names {
+            let given = format!("{name}_");
+            let ends_in_digit = name.ends_with(|letter: char| letter.is_ascii_digit());
+            if !ends_in_digit || looks_like_a_type(name) || text::has_name(&text.source, name) {
+                continue;
+            }
+            text.source = text::rename(&text.source, &given, name);
+            if text.entry_point == given {
+                text.entry_point = name.into();
+            }
+            for place in text.places.values_mut() {
+                for slot in [&mut place.name, &mut place.block] {
+                    if slot.as_deref() == Some(given.as_str()) {
+                        *slot = Some(name.into());
+                    }
+                }
+            }
+        }
     }
 
     fn failure(&self, error: &dyn std::error::Error) -> Failure {
@@ -486,6 +629,28 @@ impl Job<'_> {
             panicked: false,
         }
     }
+}
+
+/// `float4`, `u32`, `vec3`, `mat2x2`, `texture2d`, `atan2`: some language's own, or near enough.
+fn looks_like_a_type(name: &str) -> bool {
+    const STEMS: [&str; 30] = [
+        "f", "u", "i", "bf", "float", "double", "half", "int", "uint", "bool", "vec", "ivec",
+        "uvec", "bvec", "dvec", "mat", "dmat", "long", "ulong", "short", "ushort", "char", "uchar",
+        "min", "sampler", "texture", "image", "log", "exp", "atan",
+    ];
+    let stem = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    STEMS.contains(&stem)
+        || name.contains(|letter: char| letter.is_ascii_digit()) && {
+            let letters: String = name
+                .chars()
+                .filter(|letter| letter.is_ascii_alphabetic())
+                .collect();
+            [
+                "matx", "floatx", "doublex", "halfx", "intx", "uintx", "minfloat", "minint",
+                "minuint",
+            ]
+            .contains(&letters.as_str())
+        }
 }
 
 /// An error and its causes in one line.
@@ -535,10 +700,11 @@ fn validate(module: &Module, name: &str) -> Result<ModuleInfo, Failure> {
 /// Puts the comment on top that says where a text comes from. GLSL's `#version` stays first:
 /// WebGL insists.
 fn head(language: Language, kernel: &Kernel, source: &str) -> String {
-    let place = format!("{}:{}", file_name(&kernel.file), kernel.line);
+    // No line number: an edit above the kernel would change every text below it.
     let comment = format!(
-        "// Generated by hankel {VERSION} from `{}` ({place}). Do not edit.\n// {}\n",
+        "// Generated by hankel {VERSION} from `{}` in {}. Do not edit.\n// {}\n",
         kernel.function,
+        file_name(&kernel.file),
         first_line(&kernel.summary),
     );
     let source = format!("{}\n", source.trim_end());
@@ -552,7 +718,11 @@ fn head(language: Language, kernel: &Kernel, source: &str) -> String {
 
 fn first_line(summary: &str) -> String {
     let text = summary.split_whitespace().collect::<Vec<_>>().join(" ");
-    if text.is_empty() { "No description.".into() } else { text }
+    if text.is_empty() {
+        "No description.".into()
+    } else {
+        text
+    }
 }
 
 /// The path within the crate: what the compiler saw may begin with folders of the machine.
@@ -560,30 +730,17 @@ pub(crate) fn file_name(file: &str) -> String {
     let file = file.replace('\\', "/");
     match file.rfind("/src/") {
         Some(place) => file[place + 1..].to_owned(),
-        None => file.trim_start_matches("./").rsplit_once("/").map_or(file.clone(), |(folder, name)| {
-            if folder == "src" || folder.starts_with("src/") { format!("{folder}/{name}") } else { name.to_owned() }
-        }),
-    }
-}
-
-/// The binding of a parameter.
-pub(crate) fn param_binding(role: &Role) -> Option<u32> {
-    match role {
-        Role::Uniform { binding, .. }
-        | Role::Element { binding, .. }
-        | Role::Storage { binding, .. }
-        | Role::Atomic { binding }
-        | Role::Texture { binding, .. }
-        | Role::Sampler { binding } => Some(*binding),
-        _ => None,
-    }
-}
-
-/// The binding of an output.
-pub(crate) fn output_binding(output: &Output) -> Option<u32> {
-    match output {
-        Output::Buffer { binding, .. } | Output::Texture { binding, .. } => Some(*binding),
-        _ => None,
+        None => {
+            file.trim_start_matches("./")
+                .rsplit_once("/")
+                .map_or(file.clone(), |(folder, name)| {
+                    if folder == "src" || folder.starts_with("src/") {
+                        format!("{folder}/{name}")
+                    } else {
+                        name.to_owned()
+                    }
+                })
+        }
     }
 }
 
@@ -596,16 +753,25 @@ mod tests {
         assert_eq!("6.5".parse::<ShaderModel>().unwrap().to_string(), "6.5");
         assert_eq!("5_1".parse::<ShaderModel>().unwrap().to_string(), "5.1");
         assert!("4.0".parse::<ShaderModel>().is_err());
-        assert_eq!("2.1".parse::<MslVersion>().unwrap(), MslVersion { major: 2, minor: 1 });
+        assert_eq!(
+            "2.1".parse::<MslVersion>().unwrap(),
+            MslVersion { major: 2, minor: 1 }
+        );
         assert!("2.9".parse::<MslVersion>().is_err());
         assert!("two".parse::<MslVersion>().is_err());
-        assert_eq!("restrict".parse::<BoundsChecks>().unwrap(), BoundsChecks::Restrict);
+        assert_eq!(
+            "restrict".parse::<BoundsChecks>().unwrap(),
+            BoundsChecks::Restrict
+        );
         assert!("some".parse::<BoundsChecks>().is_err());
     }
 
     #[test]
     fn file_names_lose_the_machine() {
-        assert_eq!(file_name("/home/me/hankel/kernels/shadows/src/shade.rs"), "src/shade.rs");
+        assert_eq!(
+            file_name("/home/me/hankel/kernels/shadows/src/shade.rs"),
+            "src/shade.rs"
+        );
         assert_eq!(file_name("kernels/shadows/src/a/b.rs"), "src/a/b.rs");
         assert_eq!(file_name("src/lib.rs"), "src/lib.rs");
         assert_eq!(file_name("C:\\x\\src\\lib.rs"), "src/lib.rs");

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use naga::ResourceBinding;
-use naga::back::msl::{self, BindSamplerTarget, BindTarget, EntryPointResources, Error, Options, PipelineOptions};
+use naga::back::msl::{
+    self, BindSamplerTarget, BindTarget, EntryPointResources, Error, Options, PipelineOptions,
+};
 
 use super::{Job, Kind, Place, Text, Written, text};
 use crate::error::Failure;
@@ -36,7 +38,13 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
                 target.sampler = Some(BindSamplerTarget::Resource(slot));
             }
         }
-        resources.resources.insert(ResourceBinding { group: it.group, binding: it.binding }, target);
+        resources.resources.insert(
+            ResourceBinding {
+                group: it.group,
+                binding: it.binding,
+            },
+            target,
+        );
     }
     // The sizes come after the other buffers; in the order of the globals, as naga lists them.
     resources.sizes_buffer = Some(buffers);
@@ -57,14 +65,16 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let (source, written) =
         match msl::write_string(&module, &info, &options, &PipelineOptions::default()) {
             Ok(written) => written,
-            Err(error @ (Error::UnsupportedAttribute(_)
+            Err(
+                error @ (Error::UnsupportedAttribute(_)
                 | Error::UnsupportedFunction(_)
                 | Error::UnsupportedWritableStorageBuffer
                 | Error::UnsupportedWritableStorageTexture(_)
                 | Error::UnsupportedRWStorageTexture
                 | Error::UnsupportedArrayOf(_)
                 | Error::UnsupportedBuiltIn(_)
-                | Error::CapabilityNotSupported(_))) => {
+                | Error::CapabilityNotSupported(_)),
+            ) => {
                 return Ok(Written::Unsupported(format!("MSL {version}: {error}")));
             }
             Err(error) => return Err(job.failure(&error)),
@@ -74,7 +84,13 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         Some(Err(error)) => return Err(job.failure(&error)),
         None => job.kernel.name.clone(),
     };
-    let sizes_slot = source.contains("_mslBufferSizes& ").then_some(u32::from(buffers));
+    // naga leaves an empty structure for inputs, and the offset of what is no longer in a block.
+    let source = source
+        .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
+        .replace(" - 0 - ", " - ");
+    let sizes_slot = source
+        .contains("_mslBufferSizes& ")
+        .then_some(u32::from(buffers));
     let places = bound
         .iter()
         .map(|it| {
@@ -95,7 +111,11 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         entry_point,
         places,
         sizes_slot,
-        sized: if sizes_slot.is_some() { sized } else { Vec::new() },
+        sized: if sizes_slot.is_some() {
+            sized
+        } else {
+            Vec::new()
+        },
         requires: Vec::new(),
     }))
 }

@@ -14,7 +14,11 @@ pub fn rename(text: &str, from: &str, to: &str) -> String {
         let last = rest[..place].chars().next_back().unwrap_or(before);
         let after = rest[place + from.len()..].chars().next().unwrap_or(' ');
         renamed.push_str(&rest[..place]);
-        renamed.push_str(if is_name(last) || is_name(after) { from } else { to });
+        renamed.push_str(if is_name(last) || is_name(after) {
+            from
+        } else {
+            to
+        });
         rest = &rest[place + from.len()..];
         before = from.chars().next_back().unwrap_or(' ');
     }
@@ -32,8 +36,14 @@ pub fn name_before(text: &str, mark: &str) -> Option<String> {
     let line = text[..place].rsplit('\n').next()?;
     // Of `uint a[4] : register(..)` the name is `a`.
     let line = line.trim_end();
-    let line = if line.ends_with(']') { &line[..line.rfind('[')?] } else { line };
-    let name = line.rsplit(|letter| !is_name(letter)).find(|name| !name.is_empty())?;
+    let line = if line.ends_with(']') {
+        &line[..line.rfind('[')?]
+    } else {
+        line
+    };
+    let name = line
+        .rsplit(|letter| !is_name(letter))
+        .find(|name| !name.is_empty())?;
     Some(name.to_owned())
 }
 
@@ -50,9 +60,22 @@ mod tests {
 
     #[test]
     fn the_name_before_a_mark_is_found() {
-        assert_eq!(name_before("float4 a;\nTexture2D<float4> src : register(t0);", " : register(t0)").unwrap(), "src");
-        assert_eq!(name_before("device T const& in_ [[buffer(1)]]", " [[buffer(1)]]").unwrap(), "in_");
-        assert_eq!(name_before("uint a[4] : register(b0)", " : register(b0)").unwrap(), "a");
+        assert_eq!(
+            name_before(
+                "float4 a;\nTexture2D<float4> src : register(t0);",
+                " : register(t0)"
+            )
+            .unwrap(),
+            "src"
+        );
+        assert_eq!(
+            name_before("device T const& in_ [[buffer(1)]]", " [[buffer(1)]]").unwrap(),
+            "in_"
+        );
+        assert_eq!(
+            name_before("uint a[4] : register(b0)", " : register(b0)").unwrap(),
+            "a"
+        );
         assert_eq!(name_before("x", "y"), None);
     }
 }

@@ -52,11 +52,28 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
 fn needs_more_formats(inner: &TypeInner) -> bool {
     use StorageFormat::*;
     match inner {
-        TypeInner::Image { class: ImageClass::Storage { format, .. }, .. } => !matches!(
+        TypeInner::Image {
+            class: ImageClass::Storage { format, .. },
+            ..
+        } => !matches!(
             format,
-            Rgba8Unorm | Rgba8Snorm | Rgba8Uint | Rgba8Sint | Rgba16Uint | Rgba16Sint | Rgba16Float
-                | R32Uint | R32Sint | R32Float | Rg32Uint | Rg32Sint | Rg32Float | Rgba32Uint
-                | Rgba32Sint | Rgba32Float | Bgra8Unorm
+            Rgba8Unorm
+                | Rgba8Snorm
+                | Rgba8Uint
+                | Rgba8Sint
+                | Rgba16Uint
+                | Rgba16Sint
+                | Rgba16Float
+                | R32Uint
+                | R32Sint
+                | R32Float
+                | Rg32Uint
+                | Rg32Sint
+                | Rg32Float
+                | Rgba32Uint
+                | Rgba32Sint
+                | Rgba32Float
+                | Bgra8Unorm
         ),
         _ => false,
     }
@@ -71,9 +88,12 @@ fn declared(source: &str, group: u32, binding: u32) -> Option<String> {
 
 /// The text from the entry point's `fn` on.
 fn source_after_stage(source: &str) -> String {
-    let stage = ["\n@compute", "\n@vertex", "\n@fragment"].iter().find_map(|mark| source.find(mark));
+    let stage = ["\n@compute", "\n@vertex", "\n@fragment"]
+        .iter()
+        .find_map(|mark| source.find(mark));
     let rest = &source[stage.unwrap_or(0)..];
-    rest.find("fn ").map_or_else(String::new, |place| rest[place..].to_owned())
+    rest.find("fn ")
+        .map_or_else(String::new, |place| rest[place..].to_owned())
 }
 
 fn read_back(source: &str, name: &str) -> Result<(), Failure> {
@@ -88,5 +108,7 @@ fn read_back(source: &str, name: &str) -> Result<(), Failure> {
         message: error.message().to_owned(),
         panicked: false,
     })?;
-    validate(&module, name).map(drop).map_err(|failure| Failure { step, ..failure })
+    validate(&module, name)
+        .map(drop)
+        .map_err(|failure| Failure { step, ..failure })
 }

@@ -9,8 +9,14 @@ use spirv_tools::assembler::Assembler;
 /// Assembles SPIR-V text.
 pub fn assemble(text: &str) -> Vec<u8> {
     let assembler = spirv_tools::assembler::create(Some(TargetEnv::Vulkan_1_2));
-    let options = spirv_tools::assembler::AssemblerOptions { preserve_numeric_ids: false };
-    assembler.assemble(text, options).expect("the fixture assembles").as_bytes().to_vec()
+    let options = spirv_tools::assembler::AssemblerOptions {
+        preserve_numeric_ids: false,
+    };
+    assembler
+        .assemble(text, options)
+        .expect("the fixture assembles")
+        .as_bytes()
+        .to_vec()
 }
 
 /// SPIR-V of a fixture.
@@ -28,7 +34,14 @@ pub fn spirv(name: &str) -> Vec<u8> {
 
 /// All hand-made kernels.
 pub fn all() -> Vec<Kernel> {
-    vec![bound(), resample(), exchange(), fullscreen(), tint(), wide()]
+    vec![
+        bound(),
+        resample(),
+        exchange(),
+        fullscreen(),
+        tint(),
+        wide(),
+    ]
 }
 
 fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) -> Kernel {
@@ -42,16 +55,28 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         precision: None,
         params,
         outputs,
-        tolerance: Tolerance { ulp: 0, absolute: 0.0, why: "only + - * / and sqrt".into() },
+        tolerance: Tolerance {
+            ulp: 0,
+            absolute: 0.0,
+            why: "only + - * / and sqrt".into(),
+        },
     }
 }
 
 fn compute(threads: [u32; 3], dimensions: u32) -> Stage {
-    Stage::Compute { threads, dimensions, phases: 0, workgroup_bytes: 0 }
+    Stage::Compute {
+        threads,
+        dimensions,
+        phases: 0,
+        workgroup_bytes: 0,
+    }
 }
 
 fn param(name: &str, role: Role) -> Param {
-    Param { name: name.into(), role }
+    Param {
+        name: name.into(),
+        role,
+    }
 }
 
 /// A structure of `f32`.
@@ -66,7 +91,9 @@ pub fn floats(name: &str, fields: &[&str]) -> Layout {
             .map(|(field, index)| Field {
                 name: (*field).into(),
                 summary: format!("The {field}."),
-                ty: Type::Scalar { scalar: Scalar::F32 },
+                ty: Type::Scalar {
+                    scalar: Scalar::F32,
+                },
                 offset: 4 * index,
                 size: 4,
             })
@@ -76,12 +103,26 @@ pub fn floats(name: &str, fields: &[&str]) -> Layout {
 
 fn plain(scalar: Scalar, name: &str, size: u32) -> Layout {
     let ty = Type::Scalar { scalar };
-    let fields = vec![Field { name: String::new(), summary: String::new(), ty, offset: 0, size }];
-    Layout { name: name.into(), size, align: size, fields }
+    let fields = vec![Field {
+        name: String::new(),
+        summary: String::new(),
+        ty,
+        offset: 0,
+        size,
+    }];
+    Layout {
+        name: name.into(),
+        size,
+        align: size,
+        fields,
+    }
 }
 
 fn vector(size: u32) -> Type {
-    Type::Vector { scalar: Scalar::F32, size }
+    Type::Vector {
+        scalar: Scalar::F32,
+        size,
+    }
 }
 
 pub fn bound() -> Kernel {
@@ -92,10 +133,26 @@ pub fn bound() -> Kernel {
         "bound",
         compute([64, 1, 1], 1),
         vec![
-            param("settings", Role::Uniform { binding: 0, layout: settings }),
-            param("input", Role::Element { binding: 1, layout: moments }),
+            param(
+                "settings",
+                Role::Uniform {
+                    binding: 0,
+                    layout: settings,
+                },
+            ),
+            param(
+                "input",
+                Role::Element {
+                    binding: 1,
+                    layout: moments,
+                },
+            ),
         ],
-        vec![Output::Buffer { binding: 2, layout: shadow, per_group: false }],
+        vec![Output::Buffer {
+            binding: 2,
+            layout: shadow,
+            per_group: false,
+        }],
     );
     bound.precision = Some(Precision::F32);
     bound
@@ -113,49 +170,92 @@ pub fn resample() -> Kernel {
             param("linear", Role::Sampler { binding: 1 }),
             param("depth", texture(2, TextureKind::Texture2dMultisampled)),
         ],
-        vec![Output::Texture { binding: 3, format: TexelFormat::Rgba16Unorm, dimensions: 2 }],
+        vec![Output::Texture {
+            binding: 3,
+            format: TexelFormat::Rgba16Unorm,
+            dimensions: 2,
+        }],
     );
-    resample.tolerance = Tolerance { ulp: 0, absolute: 1.5e-5, why: "one step of 16-bit unorm".into() };
+    resample.tolerance = Tolerance {
+        ulp: 0,
+        absolute: 1.5e-5,
+        why: "one step of 16-bit unorm".into(),
+    };
     resample
 }
 
 pub fn exchange() -> Kernel {
     let number = || plain(Scalar::U32, "u32", 4);
-    let stage =
-        Stage::Compute { threads: [64, 1, 1], dimensions: 1, phases: 3, workgroup_bytes: 512 };
+    let stage = Stage::Compute {
+        threads: [64, 1, 1],
+        dimensions: 1,
+        phases: 3,
+        workgroup_bytes: 512,
+    };
     kernel(
         "exchange",
         stage,
         vec![
-            param("input", Role::Storage { binding: 0, layout: number() }),
+            param(
+                "input",
+                Role::Storage {
+                    binding: 0,
+                    layout: number(),
+                },
+            ),
             param("group", Role::Group),
             param("phase", Role::Phase),
         ],
-        vec![Output::Buffer { binding: 1, layout: number(), per_group: false }],
+        vec![Output::Buffer {
+            binding: 1,
+            layout: number(),
+            per_group: false,
+        }],
     )
 }
 
 pub fn fullscreen() -> Kernel {
-    let attribute = Role::Attribute { location: 0, ty: vector(2) };
+    let attribute = Role::Attribute {
+        location: 0,
+        ty: vector(2),
+    };
     kernel(
         "fullscreen",
         Stage::Vertex,
         vec![param("at", attribute)],
-        vec![Output::Position, Output::Varying { location: 0, ty: vector(2) }],
+        vec![
+            Output::Position,
+            Output::Varying {
+                location: 0,
+                ty: vector(2),
+            },
+        ],
     )
 }
 
 pub fn tint() -> Kernel {
-    let map = Role::Texture { binding: 0, texture: TextureKind::Texture2d };
+    let map = Role::Texture {
+        binding: 0,
+        texture: TextureKind::Texture2d,
+    };
     kernel(
         "tint",
         Stage::Fragment,
         vec![
             param("map", map),
             param("linear", Role::Sampler { binding: 1 }),
-            param("uv", Role::Varying { location: 0, ty: vector(2) }),
+            param(
+                "uv",
+                Role::Varying {
+                    location: 0,
+                    ty: vector(2),
+                },
+            ),
         ],
-        vec![Output::Target { location: 0, ty: vector(4) }],
+        vec![Output::Target {
+            location: 0,
+            ty: vector(4),
+        }],
     )
 }
 
@@ -164,8 +264,18 @@ pub fn wide() -> Kernel {
     let mut wide = kernel(
         "wide_f64",
         compute([64, 1, 1], 1),
-        vec![param("input", Role::Element { binding: 0, layout: number() })],
-        vec![Output::Buffer { binding: 1, layout: number(), per_group: false }],
+        vec![param(
+            "input",
+            Role::Element {
+                binding: 0,
+                layout: number(),
+            },
+        )],
+        vec![Output::Buffer {
+            binding: 1,
+            layout: number(),
+            per_group: false,
+        }],
     );
     wide.function = "wide".into();
     wide.precision = Some(Precision::F64);

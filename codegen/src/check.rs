@@ -1,0 +1,332 @@
+//! For CI: compares what is committed with what the sources give, and holds budgets.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::build::{Generated, MANIFEST_FILE};
+use crate::cost::Cost;
+use crate::error::{During, Error, Failure, Result};
+use crate::finish;
+use crate::spirv;
+
+/// Limits on a kernel's cost; see [`Cost`] for what is counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Most arithmetic instructions.
+    pub arithmetic: Option<u32>,
+    /// Most scalar operations.
+    pub operations: Option<u32>,
+    /// Most branches.
+    pub branches: Option<u32>,
+    /// Most texture instructions.
+    pub texture: Option<u32>,
+    /// Most instructions in all.
+    pub total: Option<u32>,
+}
+
+/// `hankel.toml`:
+///
+/// ```toml
+/// [budget]
+/// branches = 4
+///
+/// [budget.kernels.hamburger_4msm_f32]
+/// arithmetic = 80
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// The budget.
+    #[serde(default)]
+    pub budget: Budget,
+}
+
+/// Limits for all kernels and for single ones.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// Most arithmetic instructions of any kernel.
+    pub arithmetic: Option<u32>,
+    /// Most scalar operations.
+    pub operations: Option<u32>,
+    /// Most branches.
+    pub branches: Option<u32>,
+    /// Most texture instructions.
+    pub texture: Option<u32>,
+    /// Most instructions in all.
+    pub total: Option<u32>,
+    /// Limits of single kernels, which come before those for all.
+    #[serde(default)]
+    pub kernels: BTreeMap<String, Limits>,
+}
+
+impl Config {
+    /// Reads `hankel.toml`.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or says something that is not known.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).during("read", path)?;
+        toml::from_str(&text).map_err(|error| Error::Budget {
+            path: path.to_owned(),
+            problem: error.to_string().trim().to_owned(),
+        })
+    }
+}
+
+impl Budget {
+    /// The limits of a kernel.
+    pub fn of(&self, kernel: &str) -> Limits {
+        let own = self.kernels.get(kernel).copied().unwrap_or_default();
+        Limits {
+            arithmetic: own.arithmetic.or(self.arithmetic),
+            operations: own.operations.or(self.operations),
+            branches: own.branches.or(self.branches),
+            texture: own.texture.or(self.texture),
+            total: own.total.or(self.total),
+        }
+    }
+}
+
+/// A kernel that grew past its budget.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct OverBudget {
+    /// The kernel.
+    pub kernel: String,
+    /// What is limited.
+    pub what: &'static str,
+    /// How much of it there is.
+    pub got: u32,
+    /// How much there may be.
+    pub limit: u32,
+}
+
+/// A file that differs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Changed {
+    /// Its path in the folder.
+    pub file: String,
+    /// A unified diff from what is committed to what the sources give; for SPIR-V, sizes.
+    pub diff: String,
+}
+
+/// What a check found.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Report {
+    /// Files that are as they should be.
+    pub same: usize,
+    /// Files that differ.
+    pub changed: Vec<Changed>,
+    /// Files that should be there.
+    pub missing: Vec<String>,
+    /// Files that should not.
+    pub extra: Vec<String>,
+    /// Committed SPIR-V that spirv-val rejects.
+    pub invalid: Vec<String>,
+    /// Kernels past their budget.
+    pub over_budget: Vec<OverBudget>,
+    /// Kernels in the budget that there are not.
+    pub unknown_in_budget: Vec<String>,
+}
+
+impl Report {
+    /// Whether everything is as it should be.
+    pub fn is_fine(&self) -> bool {
+        let Self {
+            same: _,
+            changed,
+            missing,
+            extra,
+            invalid,
+            over_budget,
+            unknown_in_budget,
+        } = self;
+        changed.is_empty()
+            && missing.is_empty()
+            && extra.is_empty()
+            && invalid.is_empty()
+            && over_budget.is_empty()
+            && unknown_in_budget.is_empty()
+    }
+}
+
+/// Compares the folder `committed` with what was generated.
+///
+/// # Errors
+///
+/// A file that is there cannot be read.
+pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result<Report> {
+    let mut report = Report::default();
+    for (name, expected) in &generated.files {
+        let path = committed.join(name);
+        match std::fs::read(&path) {
+            Ok(there) if there == *expected => report.same += 1,
+            Ok(there) => {
+                if name.ends_with(".spv") {
+                    report
+                        .invalid
+                        .extend(invalid(name, &there).map(|failure| failure.to_string()));
+                }
+                report.changed.push(Changed {
+                    file: name.clone(),
+                    diff: diff(name, &there, expected),
+                });
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                report.missing.push(name.clone());
+            }
+            Err(source) => {
+                return Err(Error::Io {
+                    action: "read",
+                    path,
+                    source,
+                });
+            }
+        }
+    }
+    list(committed, "", &mut |name| {
+        if !generated.files.contains_key(name) {
+            report.extra.push(name.to_owned());
+        }
+    })?;
+    report.extra.sort();
+    for (kernel, entry) in &generated.manifest.kernels {
+        report
+            .over_budget
+            .extend(over_budget(kernel, entry.cost, budget.of(kernel)));
+    }
+    let known = &generated.manifest.kernels;
+    report.unknown_in_budget = budget
+        .kernels
+        .keys()
+        .filter(|name| !known.contains_key(*name))
+        .cloned()
+        .collect();
+    Ok(report)
+}
+
+fn over_budget(kernel: &str, cost: Cost, limits: Limits) -> Vec<OverBudget> {
+    [
+        (
+            "arithmetic instructions",
+            cost.arithmetic,
+            limits.arithmetic,
+        ),
+        ("scalar operations", cost.operations, limits.operations),
+        ("branches", cost.branches, limits.branches),
+        ("texture instructions", cost.texture, limits.texture),
+        ("instructions", cost.total, limits.total),
+    ]
+    .into_iter()
+    .filter_map(|(what, got, limit)| {
+        let limit = limit.filter(|limit| got > *limit)?;
+        Some(OverBudget {
+            kernel: kernel.into(),
+            what,
+            got,
+            limit,
+        })
+    })
+    .collect()
+}
+
+fn invalid(name: &str, bytes: &[u8]) -> Option<Failure> {
+    spirv::words(bytes, name)
+        .and_then(|words| finish::validate(&words, name))
+        .err()
+}
+
+fn diff(name: &str, there: &[u8], expected: &[u8]) -> String {
+    match (std::str::from_utf8(there), std::str::from_utf8(expected)) {
+        (Ok(there), Ok(expected)) => similar::TextDiff::from_lines(there, expected)
+            .unified_diff()
+            .context_radius(3)
+            .header(&format!("committed/{name}"), &format!("generated/{name}"))
+            .to_string(),
+        _ => format!(
+            "--- committed/{name}\n+++ generated/{name}\nbinary files differ: {} and {} bytes\n",
+            there.len(),
+            expected.len()
+        ),
+    }
+}
+
+/// Every file below a folder that could be a build's, by its path with `/`.
+fn list(folder: &Path, prefix: &str, visit: &mut impl FnMut(&str)) -> Result<()> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        // Everything is missing, then.
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(source) => {
+            return Err(Error::Io {
+                action: "read",
+                path: folder.to_owned(),
+                source,
+            });
+        }
+    };
+    for entry in entries {
+        let entry = entry.during("read", folder)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let path = entry.path();
+        if path.is_dir() {
+            // Folders of a build; whatever else lies beside them is none of its business.
+            let ours = crate::Language::ALL
+                .iter()
+                .any(|language| language.name() == name)
+                || name == "include";
+            if !prefix.is_empty() || ours {
+                list(&path, &format!("{prefix}{name}/"), visit)?;
+            }
+        } else if !prefix.is_empty() || name == MANIFEST_FILE {
+            visit(&format!("{prefix}{name}"));
+        }
+    }
+    Ok(())
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for changed in &self.changed {
+            writeln!(f, "{}", changed.diff)?;
+        }
+        for file in &self.missing {
+            writeln!(f, "missing: {file}")?;
+        }
+        for file in &self.extra {
+            writeln!(f, "not from the sources: {file}")?;
+        }
+        for failure in &self.invalid {
+            writeln!(f, "invalid: {failure}")?;
+        }
+        for over in &self.over_budget {
+            let OverBudget {
+                kernel,
+                what,
+                got,
+                limit,
+            } = over;
+            writeln!(
+                f,
+                "over budget: kernel `{kernel}` has {got} {what}, {limit} are allowed"
+            )?;
+        }
+        for kernel in &self.unknown_in_budget {
+            writeln!(f, "in the budget, but no kernel: {kernel}")?;
+        }
+        write!(
+            f,
+            "{} files as they should be, {} changed, {} missing, {} extra, {} over budget",
+            self.same,
+            self.changed.len(),
+            self.missing.len(),
+            self.extra.len(),
+            self.over_budget.len()
+        )
+    }
+}

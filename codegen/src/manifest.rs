@@ -1,0 +1,579 @@
+//! What was generated: the file that engines and build tools read.
+//!
+//! JSON; the schema is `codegen/manifest.schema.json`, derived from the types below. Everything is
+//! sorted, nothing names the machine or the time.
+
+use std::collections::BTreeMap;
+
+use hankel_dsl::native::describe::{self, Kernel, Output, Role, Stage};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::cost::Cost;
+use crate::finish::PIPELINE;
+use crate::headers::Layouts;
+use crate::spirv::names::output_name;
+use crate::translate::{self, Options, Place};
+use crate::{Language, VERSION};
+
+/// Number of this format; raised when a reader of the old one would misunderstand.
+pub const FORMAT: u32 = 1;
+
+/// The manifest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(title = "Hankel manifest")]
+pub struct Manifest {
+    /// Number of this format.
+    pub format: u32,
+    /// What made the files.
+    pub made_by: Versions,
+    /// The kernel crate.
+    pub crate_name: String,
+    /// SHA-256 over everything that the files follow from: sources, options, versions.
+    pub inputs_sha256: String,
+    /// The options that they were made with.
+    pub options: WriteOptions,
+    /// The kernels by the names of their entry points.
+    pub kernels: BTreeMap<String, KernelEntry>,
+    /// The structures of buffers, as the headers name them.
+    pub layouts: BTreeMap<String, LayoutEntry>,
+    /// Every file but this one, by its path from here.
+    pub files: BTreeMap<String, FileEntry>,
+}
+
+/// Versions of what the files follow from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Versions {
+    /// Hankel.
+    pub hankel: String,
+    /// rust-gpu, which made the SPIR-V.
+    pub rust_gpu: String,
+    /// The crate with SPIRV-Tools.
+    pub spirv_tools: String,
+    /// naga.
+    pub naga: String,
+    /// Number of what Hankel does to SPIR-V between those.
+    pub pipeline: u32,
+}
+
+impl Versions {
+    /// This build's, with the version of rust-gpu that made the SPIR-V.
+    pub fn with(rust_gpu: &str) -> Self {
+        Self {
+            hankel: VERSION.into(),
+            rust_gpu: rust_gpu.into(),
+            spirv_tools: env!("HANKEL_SPIRV_TOOLS_VERSION").into(),
+            naga: env!("HANKEL_NAGA_VERSION").into(),
+            pipeline: PIPELINE,
+        }
+    }
+}
+
+/// Options that the files were made with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct WriteOptions {
+    /// Bounds checks in HLSL, MSL and GLSL.
+    pub bounds_checks: translate::BoundsChecks,
+    /// HLSL's shader model.
+    pub shader_model: String,
+    /// Metal's version.
+    pub msl_version: String,
+    /// Specialisation constants that were given a value for good.
+    pub constants: BTreeMap<String, u32>,
+}
+
+impl WriteOptions {
+    /// As the manifest shows them.
+    pub fn of(options: &Options) -> Self {
+        Self {
+            bounds_checks: options.bounds_checks,
+            shader_model: options.shader_model.to_string(),
+            msl_version: options.msl_version.to_string(),
+            constants: options.constants.clone(),
+        }
+    }
+}
+
+/// A file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FileEntry {
+    /// SHA-256 in hexadecimal.
+    pub sha256: String,
+    /// Size in bytes.
+    pub bytes: u64,
+}
+
+/// An entry point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct KernelEntry {
+    /// The Rust function.
+    pub function: String,
+    /// Its file within the crate.
+    pub file: String,
+    /// The attribute's line, from 1.
+    pub line: u32,
+    /// The first paragraph of its documentation.
+    pub summary: String,
+    /// `compute`, `vertex` or `fragment`.
+    pub stage: StageName,
+    /// Compute: invocations of a workgroup along x, y, z.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub workgroup_size: Option<[u32; 3]>,
+    /// Compute: how many dimensions index the output.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub dimensions: Option<u32>,
+    /// Compute: bytes of workgroup memory.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub workgroup_bytes: Option<u32>,
+    /// Floating-point type of a function that has several: `f32` or `f64`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub precision: Option<String>,
+    /// What is bound, in the order of the bindings in set 0.
+    pub bindings: Vec<Binding>,
+    /// Specialisation constants.
+    pub constants: Vec<Constant>,
+    /// Vertex attributes and interpolated inputs.
+    pub inputs: Vec<Interface>,
+    /// Interpolated outputs and colour attachments.
+    pub outputs: Vec<Interface>,
+    /// What it costs, counted in the SPIR-V.
+    pub cost: Cost,
+    /// How closely backends agree with the native scalar run.
+    pub tolerance: Tolerance,
+    /// The text in each language.
+    pub languages: BTreeMap<Language, LanguageEntry>,
+    /// Languages that cannot express it, and why.
+    pub unsupported: BTreeMap<Language, String>,
+}
+
+/// A pipeline stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum StageName {
+    /// Compute.
+    Compute,
+    /// Vertex.
+    Vertex,
+    /// Fragment.
+    Fragment,
+}
+
+/// Something that is bound.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Binding {
+    /// Descriptor set in SPIR-V.
+    pub set: u32,
+    /// Number in it.
+    pub binding: u32,
+    /// The parameter's name; `out` for what the kernel returns.
+    pub name: String,
+    /// What it is.
+    pub kind: BindingKind,
+    /// The kernel writes it.
+    pub written: bool,
+    /// Buffers: the type of the value or of an element; a structure's name is in `layouts`.
+    #[serde(rename = "type", skip_serializing_if = "Option::is_none", default)]
+    pub ty: Option<String>,
+    /// Buffers: bytes of the value, or from one element to the next.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub stride: Option<u32>,
+    /// Buffers of elements: what an element belongs to.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub element_for_each: Option<String>,
+    /// Textures: `2d`, `2d-multisampled`, `3d`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub texture: Option<String>,
+    /// Written textures: the format.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub format: Option<String>,
+    /// Where it is in each language; absent where the kernel's code does not use it.
+    pub places: BTreeMap<Language, Place>,
+}
+
+/// The kinds of bindings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BindingKind {
+    /// A uniform buffer.
+    Uniform,
+    /// A storage buffer.
+    Storage,
+    /// A storage buffer of `u32` counters.
+    Atomic,
+    /// A texture that is read.
+    Texture,
+    /// A texture that is written.
+    StorageTexture,
+    /// A sampler.
+    Sampler,
+}
+
+/// A specialisation constant.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Constant {
+    /// Its name.
+    pub name: String,
+    /// `SpecId` in SPIR-V, `@id` in WGSL.
+    pub id: u32,
+    /// The value unless specialised.
+    pub default: u32,
+    /// Languages whose file lets it be specialised; the others have a value in it.
+    pub overridable_in: Vec<Language>,
+    /// The value in the others.
+    pub value: u32,
+}
+
+/// A value at a stage's interface.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Interface {
+    /// Its name.
+    pub name: String,
+    /// `attribute`, `varying`, `position` or `target`.
+    pub kind: String,
+    /// Location; the position has none.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub location: Option<u32>,
+    /// Type.
+    #[serde(rename = "type")]
+    pub ty: String,
+}
+
+/// How closely backends agree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Tolerance {
+    /// Units in the last place.
+    pub ulp: u32,
+    /// Or an absolute difference.
+    pub absolute: f64,
+    /// Why.
+    pub why: String,
+}
+
+/// A kernel's file in a language.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LanguageEntry {
+    /// Path from the manifest; its hash is in `files`.
+    pub file: String,
+    /// The entry point's name in it.
+    pub entry_point: String,
+    /// MSL: slot of the buffer with the sizes in bytes of other buffers, a `uint` for each.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub sizes_buffer: Option<u32>,
+    /// MSL: bindings whose sizes that buffer holds, in order.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub sized_bindings: Vec<u32>,
+    /// Extensions or device features beyond the language's core.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub requires: Vec<String>,
+}
+
+/// A structure in memory.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LayoutEntry {
+    /// Its name in the kernels.
+    pub name: String,
+    /// Size in bytes, also the stride in an array.
+    pub size: u32,
+    /// Alignment in bytes.
+    pub align: u32,
+    /// Its fields in order.
+    pub fields: Vec<FieldEntry>,
+}
+
+/// A field of a structure.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FieldEntry {
+    /// Its name.
+    pub name: String,
+    /// The first paragraph of its documentation.
+    pub summary: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub ty: String,
+    /// Bytes from the structure's start.
+    pub offset: u32,
+    /// Size in bytes.
+    pub size: u32,
+}
+
+impl Manifest {
+    /// The JSON text.
+    pub fn to_json(&self) -> String {
+        // Maps have string keys and floats are finite: nothing here can fail.
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    ///
+    /// It is none, or of another format.
+    pub fn from_json(text: &[u8]) -> Result<Self, String> {
+        let manifest: Self = serde_json::from_slice(text).map_err(|error| error.to_string())?;
+        if manifest.format != FORMAT {
+            return Err(format!(
+                "its format is {}, this hankel reads {FORMAT}",
+                manifest.format
+            ));
+        }
+        Ok(manifest)
+    }
+}
+
+/// The schema that the manifest follows, as JSON text.
+pub fn schema() -> String {
+    let mut text =
+        serde_json::to_string_pretty(&schemars::schema_for!(Manifest)).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// The structures, for the manifest.
+pub(crate) fn layouts(layouts: &Layouts) -> BTreeMap<String, LayoutEntry> {
+    layouts
+        .iter()
+        .map(|(name, layout)| {
+            let fields = layout
+                .fields
+                .iter()
+                .map(|field| FieldEntry {
+                    name: field.name.clone(),
+                    summary: field.summary.clone(),
+                    ty: layouts.spell(&field.ty),
+                    offset: field.offset,
+                    size: field.size,
+                })
+                .collect();
+            let entry = LayoutEntry {
+                name: layout.name.clone(),
+                size: layout.size,
+                align: layout.align,
+                fields,
+            };
+            (name.to_owned(), entry)
+        })
+        .collect()
+}
+
+/// What the description alone says of a kernel; languages are added as they are written.
+pub(crate) fn entry(
+    kernel: &Kernel,
+    layouts: &Layouts,
+    options: &Options,
+    cost: Cost,
+) -> KernelEntry {
+    let (stage, compute) = match &kernel.stage {
+        Stage::Compute {
+            threads,
+            dimensions,
+            workgroup_bytes,
+            ..
+        } => (
+            StageName::Compute,
+            Some((*threads, *dimensions, *workgroup_bytes)),
+        ),
+        Stage::Vertex => (StageName::Vertex, None),
+        Stage::Fragment => (StageName::Fragment, None),
+    };
+    let (inputs, outputs) = interfaces(kernel, layouts);
+    KernelEntry {
+        function: kernel.function.clone(),
+        file: translate::file_name(&kernel.file),
+        line: kernel.line,
+        summary: kernel.summary.clone(),
+        stage,
+        workgroup_size: compute.map(|it| it.0),
+        dimensions: compute.map(|it| it.1),
+        workgroup_bytes: compute.map(|it| it.2),
+        precision: kernel.precision.map(|precision| {
+            match precision {
+                describe::Precision::F32 => "f32",
+                describe::Precision::F64 => "f64",
+            }
+            .into()
+        }),
+        bindings: bindings(kernel, layouts),
+        constants: constants(kernel, options),
+        inputs,
+        outputs,
+        cost,
+        tolerance: Tolerance {
+            ulp: kernel.tolerance.ulp,
+            absolute: kernel.tolerance.absolute,
+            why: kernel.tolerance.why.clone(),
+        },
+        languages: BTreeMap::new(),
+        unsupported: BTreeMap::new(),
+    }
+}
+
+fn constants(kernel: &Kernel, options: &Options) -> Vec<Constant> {
+    let constant = |param: &describe::Param| match param.role {
+        Role::Constant { id, default } => {
+            let frozen = options.constants.get(&param.name).copied();
+            Some(Constant {
+                name: param.name.clone(),
+                id,
+                default,
+                overridable_in: match frozen {
+                    Some(_) => Vec::new(),
+                    None => vec![Language::Spirv, Language::Wgsl],
+                },
+                value: frozen.unwrap_or(default),
+            })
+        }
+        _ => None,
+    };
+    kernel.params.iter().filter_map(constant).collect()
+}
+
+fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interface>) {
+    let made = |name: &str, kind: &str, location: Option<u32>, ty: String| Interface {
+        name: name.into(),
+        kind: kind.into(),
+        location,
+        ty,
+    };
+    let inputs = kernel
+        .params
+        .iter()
+        .filter_map(|param| match &param.role {
+            Role::Attribute { location, ty } => Some(made(
+                &param.name,
+                "attribute",
+                Some(*location),
+                layouts.spell(ty),
+            )),
+            Role::Varying { location, ty } => Some(made(
+                &param.name,
+                "varying",
+                Some(*location),
+                layouts.spell(ty),
+            )),
+            _ => None,
+        })
+        .collect();
+    let outputs = kernel
+        .outputs
+        .iter()
+        .enumerate()
+        .filter_map(|(index, output)| {
+            let name = output_name(kernel, index);
+            match output {
+                Output::Position => Some(made(&name, "position", None, "vec4<f32>".into())),
+                Output::Varying { location, ty } => {
+                    Some(made(&name, "varying", Some(*location), layouts.spell(ty)))
+                }
+                Output::Target { location, ty } => {
+                    Some(made(&name, "target", Some(*location), layouts.spell(ty)))
+                }
+                _ => None,
+            }
+        })
+        .collect();
+    (inputs, outputs)
+}
+
+fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
+    let plain = |binding: u32, name: &str, kind: BindingKind| Binding {
+        set: 0,
+        binding,
+        name: name.into(),
+        kind,
+        written: false,
+        ty: None,
+        stride: None,
+        element_for_each: None,
+        texture: None,
+        format: None,
+        places: BTreeMap::new(),
+    };
+    let buffer = |binding: u32, name: &str, kind: BindingKind, layout: &describe::Layout| Binding {
+        ty: Some(layouts.name(layout)),
+        stride: Some(layout.size),
+        ..plain(binding, name, kind)
+    };
+    let params = kernel.params.iter().filter_map(|param| {
+        let name = param.name.as_str();
+        Some(match &param.role {
+            Role::Uniform { binding, layout } => {
+                buffer(*binding, name, BindingKind::Uniform, layout)
+            }
+            Role::Element { binding, layout } => Binding {
+                element_for_each: Some("invocation".into()),
+                ..buffer(*binding, name, BindingKind::Storage, layout)
+            },
+            Role::Storage { binding, layout } => {
+                buffer(*binding, name, BindingKind::Storage, layout)
+            }
+            Role::Atomic { binding } => Binding {
+                written: true,
+                ty: Some("u32".into()),
+                stride: Some(4),
+                ..plain(*binding, name, BindingKind::Atomic)
+            },
+            Role::Texture { binding, texture } => {
+                let shape = match texture {
+                    describe::TextureKind::Texture2d => "2d",
+                    describe::TextureKind::Texture2dMultisampled => "2d-multisampled",
+                    describe::TextureKind::Texture3d => "3d",
+                };
+                Binding {
+                    texture: Some(shape.into()),
+                    ..plain(*binding, name, BindingKind::Texture)
+                }
+            }
+            Role::Sampler { binding } => plain(*binding, name, BindingKind::Sampler),
+            _ => return None,
+        })
+    });
+    let outputs = kernel
+        .outputs
+        .iter()
+        .enumerate()
+        .filter_map(|(index, output)| {
+            let name = output_name(kernel, index);
+            Some(match output {
+                Output::Buffer {
+                    binding,
+                    layout,
+                    per_group,
+                } => Binding {
+                    written: true,
+                    element_for_each: Some(
+                        if *per_group {
+                            "workgroup"
+                        } else {
+                            "invocation"
+                        }
+                        .into(),
+                    ),
+                    ..buffer(*binding, &name, BindingKind::Storage, layout)
+                },
+                Output::Texture {
+                    binding,
+                    format,
+                    dimensions,
+                } => Binding {
+                    written: true,
+                    texture: Some(format!("{dimensions}d")),
+                    format: Some(format_name(*format)),
+                    ..plain(*binding, &name, BindingKind::StorageTexture)
+                },
+                _ => return None,
+            })
+        });
+    let mut bindings: Vec<Binding> = params.chain(outputs).collect();
+    bindings.sort_by_key(|binding| binding.binding);
+    bindings
+}
+
+/// `rgba16unorm`: the description's own spelling.
+fn format_name(format: describe::TexelFormat) -> String {
+    serde_json::to_value(format)
+        .ok()
+        .and_then(|value| value.as_str().map(str::to_owned))
+        .unwrap_or_default()
+}
