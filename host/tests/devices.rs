@@ -8,7 +8,7 @@ use hankel_dsl::native::describe::*;
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::{
     Bind, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, NativeDevice, Pass, Program,
-    Shader, TextureShape, Topology,
+    Shader, TextureShape, Topology, VulkanDevice,
 };
 
 const NEAREST: Sampler = Sampler {
@@ -634,6 +634,36 @@ fn a_lost_device_says_so() {
     let error = gpu.read_buffer(buffer).unwrap_err();
     assert!(matches!(error, DeviceError::Lost { .. }), "{error}");
     assert!(matches!(gpu.buffer("c", 16), Err(DeviceError::Lost { .. })));
+}
+
+/// Set in the child process of the test below.
+const WITHOUT_DRIVER: &str = "HANKEL_TEST_WITHOUT_DRIVER";
+
+#[test]
+fn without_a_driver_one_message_says_how_to_get_one() {
+    if std::env::var_os(WITHOUT_DRIVER).is_some() {
+        let error = VulkanDevice::new().unwrap_err();
+        assert!(matches!(error, DeviceError::NoDriver { .. }), "{error}");
+        println!("{error}");
+        return;
+    }
+    let output = std::process::Command::new(std::env::current_exe().unwrap())
+        .args([
+            "--exact",
+            "without_a_driver_one_message_says_how_to_get_one",
+            "--nocapture",
+        ])
+        .env(WITHOUT_DRIVER, "1")
+        .env("VK_DRIVER_FILES", "none.json")
+        .env("VK_ICD_FILENAMES", "none.json")
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}");
+    assert!(
+        text.contains("apt-get install mesa-vulkan-drivers libvulkan1"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -316,7 +316,8 @@ pub struct Depth {
     pub write: bool,
 }
 
-/// A draw call of a pass.
+/// A draw call of a pass. Its two stages go the same way, [`Shader::SpirvPassthrough`] or not:
+/// wgpu checks one against the other only if it has read both.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw<'a> {
     /// The vertex stage.

@@ -304,7 +304,7 @@ pub fn check(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given]) -> Result<()>
 }
 
 /// An argument error.
-pub(super) fn refuse(kernel: &Kernel, slot: &Slot<'_>, problem: String) -> DeviceError {
+pub(crate) fn refuse(kernel: &Kernel, slot: &Slot<'_>, problem: String) -> DeviceError {
     DeviceError::Argument {
         kernel: kernel.name.clone(),
         argument: slot.to_string(),

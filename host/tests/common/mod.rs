@@ -4,8 +4,10 @@
 
 use std::sync::atomic::Ordering;
 
+use hankel_dsl::Texture3d;
 use hankel_dsl::native::describe::*;
 use hankel_dsl::native::{Arg, Call, CallError};
+use hankel_host::crates::KernelEntry;
 use hankel_host::device::{Program, Shader, VulkanDevice};
 
 /// A kernel and its code.
@@ -435,7 +437,7 @@ pub fn image() -> Sample {
         let [
             Arg::Texture(ms),
             Arg::Texture(volume),
-            Arg::Sampler(_),
+            Arg::Sampler(sampler),
             Arg::TextureMut(out),
         ] = &mut call.args[..]
         else {
@@ -445,13 +447,12 @@ pub fn image() -> Sample {
             });
         };
         let samples = f32s(ms.bytes);
-        // The middle of a 2x2x2 volume's first texel.
-        let first = volume.format.load(volume.bytes);
+        let (volume, sampler) = (Texture3d::new(*volume), hankel_dsl::Sampler::new(*sampler));
+        let filtered = volume.sample(sampler, hankel_dsl::glam::Vec3::splat(0.25));
         for (i, texel) in out.bytes.chunks_exact_mut(8).enumerate() {
             let s = &samples[i * 4..i * 4 + 4];
-            let mean = (s[0] + s[1] + s[2] + s[3]) * 0.25;
-            let mut v = first;
-            v.x = mean;
+            let mut v = filtered;
+            v.x = (s[0] + s[1] + s[2] + s[3]) * 0.25;
             out.format.store(texel, v);
         }
         Ok(())
@@ -607,4 +608,120 @@ pub fn tint() -> Sample {
              return colour * factor;
          }",
     )
+}
+
+impl Sample {
+    /// As an entry point of a crate.
+    pub fn entry(&self) -> KernelEntry {
+        KernelEntry::new(self.kernel.clone(), self.native)
+    }
+}
+
+/// Numbers of every type: `q = a / n`, `s = -m`, `v = 3 a` for a `bias` added to `a`.
+pub fn mixed() -> Sample {
+    let mut settings = structure("Settings", &[("bias", Scalar::F64), ("gain", Scalar::F64)]);
+    settings.fields[1].summary = "Factor; default 3.".into();
+    let row = structure(
+        "Row",
+        &[("a", Scalar::F64), ("n", Scalar::U32), ("m", Scalar::I32)],
+    );
+    let result = structure(
+        "Out",
+        &[("q", Scalar::F64), ("v", Scalar::F64), ("s", Scalar::I32)],
+    );
+    let mut kernel = kernel(
+        "mixed_f64",
+        compute([64, 1, 1], 1, 0),
+        vec![
+            param(
+                "settings",
+                Role::Uniform {
+                    binding: 0,
+                    layout: settings,
+                },
+            ),
+            param(
+                "row",
+                Role::Element {
+                    binding: 1,
+                    layout: row,
+                },
+            ),
+            param("shift", Role::Constant { id: 0, default: 0 }),
+        ],
+        vec![Output::Buffer {
+            binding: 2,
+            layout: result,
+            per_group: false,
+        }],
+    );
+    kernel.function = "mixed".into();
+    kernel.precision = Some(Precision::F64);
+    fn run(call: &mut Call<'_>) -> Result<(), CallError> {
+        let shift = call.constants[0];
+        let [Arg::Bytes(settings), Arg::Bytes(rows), Arg::BytesMut(out)] = &mut call.args[..]
+        else {
+            return Err(CallError::Count {
+                expected: 3,
+                got: call.args.len(),
+            });
+        };
+        let s: &[f64] = bytemuck::cast_slice(settings);
+        for (o, r) in out.chunks_mut(24).zip(rows.chunks(16)) {
+            let a = f64::from_le_bytes(r[..8].try_into().unwrap_or_default()) + s[0];
+            let n = u32::from_le_bytes(r[8..12].try_into().unwrap_or_default()) + shift;
+            let m = i32::from_le_bytes(r[12..].try_into().unwrap_or_default());
+            o[..8].copy_from_slice(&(a / f64::from(n)).to_le_bytes());
+            o[8..16].copy_from_slice(&(a * s[1]).to_le_bytes());
+            o[16..20].copy_from_slice(&m.wrapping_neg().to_le_bytes());
+        }
+        Ok(())
+    }
+    let mut sample = sample(
+        kernel,
+        run,
+        "struct Settings { bias: f64, gain: f64 }
+         struct Row { a: f64, n: u32, m: i32 }
+         struct Out { q: f64, v: f64, s: i32 }
+         @group(0) @binding(0) var<uniform> settings: Settings;
+         @group(0) @binding(1) var<storage, read> row: array<Row>;
+         @group(0) @binding(2) var<storage, read_write> out: array<Out>;
+         const shift: u32 = 0u;
+         @compute @workgroup_size(64) fn mixed_f64(@builtin(global_invocation_id) id: vec3<u32>) {
+             if (id.x < arrayLength(&out)) {
+                 let a = row[id.x].a + settings.bias;
+                 out[id.x].q = a / f64(row[id.x].n + shift);
+                 out[id.x].v = a * settings.gain;
+                 out[id.x].s = -row[id.x].m;
+             }
+         }",
+    );
+    let stand_in = sample.wgsl.replace("shift: u32 = 0u", "shift: u32 = 7777u");
+    sample.spirv = with_constant(&spirv(&stand_in), 7777);
+    sample
+}
+
+/// The module with its constant `value` turned into the specialisation constant 0, which is 0
+/// unless given.
+fn with_constant(words: &[u32], value: u32) -> Vec<u32> {
+    let mut all = words.to_vec();
+    // OpConstant with one word: type, result, value.
+    let at = (5..words.len() - 3)
+        .find(|&i| words[i] == 4 << 16 | 43 && words[i + 3] == value)
+        .expect("the constant is in the module");
+    all[at] = 4 << 16 | 50;
+    all[at + 3] = 0;
+    // Decorations stand before the types; the first one is OpTypeVoid or a scalar's.
+    let first = (5..words.len())
+        .find(|&i| words[i] & 0xffff == 71)
+        .expect("it has decorations");
+    all.splice(first..first, [4 << 16 | 71, words[at + 2], 1, 0]);
+    all
+}
+
+pub const F32: Scalar = Scalar::F32;
+
+/// A role that is an element of a buffer.
+pub fn element(binding: u32, layout: Layout) -> Role {
+    Role::Element { binding, layout }
 }

@@ -1,0 +1,451 @@
+//! Kernel crates: the built-in ones, and anybody's, whose native code is built as a plug-in.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::plugin::{Plugin, PluginError};
+use hankel_dsl::native::{Call, CallError, Entry};
+use serde::Deserialize;
+
+use crate::device::{Program, Shader};
+
+/// A kernel crate with its native code.
+#[derive(Clone, Debug)]
+pub struct KernelCrate {
+    /// The package's name.
+    pub name: String,
+    /// Its entry points, in the order of its `kernels![…]`.
+    pub entries: Vec<KernelEntry>,
+}
+
+type Run = dyn Fn(&mut Call<'_>) -> Result<(), CallError> + Send + Sync;
+
+/// An entry point of a crate, wherever its native code comes from.
+#[derive(Clone)]
+pub struct KernelEntry {
+    /// What it is.
+    pub kernel: Kernel,
+    run: Arc<Run>,
+}
+
+impl fmt::Debug for KernelEntry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("KernelEntry")
+            .field(&self.kernel.name)
+            .finish()
+    }
+}
+
+impl From<Entry> for KernelEntry {
+    fn from(entry: Entry) -> Self {
+        Self {
+            kernel: entry.kernel,
+            run: Arc::new(entry.run),
+        }
+    }
+}
+
+impl KernelEntry {
+    /// An entry point with the given native code.
+    pub fn new(
+        kernel: Kernel,
+        run: impl Fn(&mut Call<'_>) -> Result<(), CallError> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            kernel,
+            run: Arc::new(run),
+        }
+    }
+
+    /// Runs the native code.
+    ///
+    /// # Errors
+    /// Arguments that do not fit, or a panic of the kernel.
+    pub fn run(&self, call: &mut Call<'_>) -> Result<(), CallError> {
+        (self.run)(call)
+    }
+
+    /// The entry point as a device runs it, with `shader` on Vulkan.
+    #[must_use]
+    pub fn program<'a>(&'a self, shader: Option<Shader<'a>>, constants: &'a [u32]) -> Program<'a> {
+        Program {
+            kernel: &self.kernel,
+            constants,
+            native: Some(&*self.run),
+            shader,
+        }
+    }
+}
+
+/// Why a crate's kernels could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum CrateError {
+    /// There is no such manifest.
+    #[error("{}: no such file; give the path of a kernel crate's Cargo.toml", path.display())]
+    NoManifest {
+        /// What was given.
+        path: PathBuf,
+    },
+    /// cargo does not start.
+    #[error("cannot run `cargo` ({detail}); Rust comes from https://rustup.rs")]
+    NoCargo {
+        /// What the system said.
+        detail: String,
+    },
+    /// The manifest is wrong, or is not that of one library.
+    #[error("{}: {problem}", path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What cargo said, or what is missing.
+        problem: String,
+    },
+    /// The crate does not compile.
+    #[error("`{package}` does not compile for this machine:\n{diagnostics}")]
+    Build {
+        /// The package.
+        package: String,
+        /// The compiler's words.
+        diagnostics: String,
+    },
+    /// What was built is no plug-in.
+    #[error(transparent)]
+    Plugin(#[from] PluginError),
+    /// No kernel of that name.
+    #[error("`{crate_name}` has no kernel `{name}`; it has: {known}")]
+    NoKernel {
+        /// The crate.
+        crate_name: String,
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+}
+
+impl KernelCrate {
+    /// A crate that this program was built with.
+    pub fn from_entries(name: impl Into<String>, entries: Vec<Entry>) -> Self {
+        Self {
+            name: name.into(),
+            entries: entries.into_iter().map(KernelEntry::from).collect(),
+        }
+    }
+
+    /// Builds the crate at `manifest` (its `Cargo.toml`) for this machine with cargo, into
+    /// `hankel/native` under cargo's own target folder, and loads it. The crate is trusted: its
+    /// code runs in this process. `progress` gets cargo's lines as they come.
+    ///
+    /// # Errors
+    /// See [`CrateError`].
+    pub fn load(manifest: &Path, progress: &mut dyn FnMut(&str)) -> Result<Self, CrateError> {
+        let package = Package::find(manifest)?;
+        let library = package.build(progress)?;
+        let plugin = Arc::new(Plugin::load(&library)?);
+        let entries = plugin
+            .kernels()
+            .iter()
+            .enumerate()
+            .map(|(i, kernel)| {
+                let plugin = Arc::clone(&plugin);
+                KernelEntry::new(kernel.clone(), move |call| plugin.run(i, call))
+            })
+            .collect();
+        Ok(Self {
+            name: package.name,
+            entries,
+        })
+    }
+
+    /// The entry point called `name`.
+    ///
+    /// # Errors
+    /// [`CrateError::NoKernel`], with the names there are.
+    pub fn entry(&self, name: &str) -> Result<&KernelEntry, CrateError> {
+        self.entries
+            .iter()
+            .find(|e| e.kernel.name == name)
+            .ok_or_else(|| CrateError::NoKernel {
+                crate_name: self.name.clone(),
+                name: name.into(),
+                known: self
+                    .entries
+                    .iter()
+                    .map(|e| e.kernel.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })
+    }
+}
+
+/// A package with a library, as cargo describes it.
+struct Package {
+    name: String,
+    manifest: PathBuf,
+    target_dir: PathBuf,
+}
+
+/// What is read of `cargo metadata`.
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<MetadataPackage>,
+    target_directory: PathBuf,
+}
+
+#[derive(Deserialize)]
+struct MetadataPackage {
+    name: String,
+    manifest_path: PathBuf,
+    targets: Vec<Target>,
+}
+
+#[derive(Deserialize)]
+struct Target {
+    kind: Vec<String>,
+}
+
+/// What is read of cargo's messages.
+#[derive(Deserialize)]
+#[serde(tag = "reason", rename_all = "kebab-case")]
+enum Message {
+    CompilerMessage {
+        message: Diagnostic,
+    },
+    CompilerArtifact {
+        manifest_path: PathBuf,
+        target: ArtifactTarget,
+        filenames: Vec<PathBuf>,
+    },
+    #[serde(other)]
+    Other,
+}
+
+#[derive(Deserialize)]
+struct Diagnostic {
+    level: String,
+    rendered: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct ArtifactTarget {
+    crate_types: Vec<String>,
+}
+
+/// Environment variables that an outer `cargo run` or build script sets for its own package, and
+/// which mean something else to an inner cargo.
+fn is_outer_cargo(name: &str) -> bool {
+    const EXACT: [&str; 12] = [
+        "CARGO",
+        "CARGO_CRATE_NAME",
+        "CARGO_ENCODED_RUSTFLAGS",
+        "CARGO_MAKEFLAGS",
+        "CARGO_PRIMARY_PACKAGE",
+        "CARGO_TARGET_TMPDIR",
+        "CARGO_TARGET_DIR",
+        "DEBUG",
+        "NUM_JOBS",
+        "OPT_LEVEL",
+        "OUT_DIR",
+        "RUSTUP_TOOLCHAIN",
+    ];
+    const PREFIXES: [&str; 6] = [
+        "CARGO_BIN_",
+        "CARGO_CFG_",
+        "CARGO_FEATURE_",
+        "CARGO_MANIFEST_",
+        "CARGO_PKG_",
+        "DEP_",
+    ];
+    EXACT.contains(&name) || PREFIXES.iter().any(|p| name.starts_with(p))
+}
+
+/// cargo, as if a user had typed it.
+fn cargo() -> Command {
+    let mut command = Command::new("cargo");
+    // A user's own CARGO_TARGET_DIR or RUSTUP_TOOLCHAIN stays; an outer cargo's goes.
+    let nested = std::env::var_os("CARGO_PKG_NAME").is_some();
+    for (name, _) in std::env::vars_os().filter(|_| nested) {
+        let Some(text) = name.to_str() else { continue };
+        if is_outer_cargo(text) {
+            command.env_remove(&name);
+        }
+    }
+    command.stdin(Stdio::null());
+    command
+}
+
+fn no_cargo(e: &std::io::Error) -> CrateError {
+    CrateError::NoCargo {
+        detail: e.to_string(),
+    }
+}
+
+/// cargo's words without the `error:` at their start.
+fn without_prefix(stderr: &str) -> String {
+    stderr
+        .trim()
+        .trim_start_matches("error:")
+        .trim()
+        .to_string()
+}
+
+impl Package {
+    fn find(manifest: &Path) -> Result<Self, CrateError> {
+        let path = if manifest.is_dir() {
+            manifest.join("Cargo.toml")
+        } else {
+            manifest.into()
+        };
+        let manifest = path
+            .canonicalize()
+            .map_err(|_| CrateError::NoManifest { path: path.clone() })?;
+        let bad = |problem: String| CrateError::Manifest {
+            path: path.clone(),
+            problem,
+        };
+        let output = cargo()
+            .args([
+                "metadata",
+                "--no-deps",
+                "--format-version",
+                "1",
+                "--manifest-path",
+            ])
+            .arg(&manifest)
+            .output()
+            .map_err(|e| no_cargo(&e))?;
+        if !output.status.success() {
+            return Err(bad(without_prefix(&String::from_utf8_lossy(
+                &output.stderr,
+            ))));
+        }
+        let metadata: Metadata = serde_json::from_slice(&output.stdout)
+            .map_err(|e| bad(format!("cargo metadata cannot be read: {e}")))?;
+        let package = metadata
+            .packages
+            .into_iter()
+            .find(|p| p.manifest_path.canonicalize().is_ok_and(|m| m == manifest))
+            .ok_or_else(|| {
+                bad("it is a workspace without a package; give one crate's Cargo.toml".into())
+            })?;
+        let is_library = |t: &Target| {
+            t.kind
+                .iter()
+                .any(|k| matches!(k.as_str(), "lib" | "rlib" | "dylib" | "cdylib"))
+        };
+        if !package.targets.iter().any(is_library) {
+            return Err(bad(format!(
+                "`{}` has no library; kernels live in src/lib.rs",
+                package.name
+            )));
+        }
+        Ok(Self {
+            name: package.name,
+            manifest,
+            target_dir: metadata.target_directory,
+        })
+    }
+
+    /// Builds the plug-in; gives its path.
+    fn build(&self, progress: &mut dyn FnMut(&str)) -> Result<PathBuf, CrateError> {
+        let target_dir = self.target_dir.join("hankel").join("native");
+        let mut child = cargo()
+            .args(["rustc", "--lib", "--release", "--crate-type", "cdylib"])
+            .args(["--message-format", "json", "--manifest-path"])
+            .arg(&self.manifest)
+            .arg("--target-dir")
+            .arg(&target_dir)
+            .args([OsString::from("--"), "--cfg".into(), "hankel_plugin".into()])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|e| no_cargo(&e))?;
+        // Both pipes are drained at once: either could fill up while the other is waited for.
+        let mut stdout = child.stdout.take();
+        let messages = std::thread::spawn(move || {
+            let mut text = Vec::new();
+            if let Some(out) = &mut stdout {
+                // A pipe that breaks ends the text; cargo's status tells the rest.
+                let _ = out.read_to_end(&mut text);
+            }
+            text
+        });
+        let mut words = String::new();
+        if let Some(stderr) = child.stderr.take() {
+            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                progress(&line);
+                words.push_str(&line);
+                words.push('\n');
+            }
+        }
+        let status = child.wait().map_err(|e| no_cargo(&e))?;
+        let messages = messages.join().unwrap_or_default();
+        let mut diagnostics = String::new();
+        let mut library = None;
+        for line in messages.split(|&b| b == b'\n').filter(|l| !l.is_empty()) {
+            match serde_json::from_slice(line) {
+                Ok(Message::CompilerMessage { message }) if message.level == "error" => {
+                    diagnostics.push_str(&message.rendered.unwrap_or_default());
+                }
+                Ok(Message::CompilerArtifact {
+                    manifest_path,
+                    target,
+                    filenames,
+                }) if manifest_path
+                    .canonicalize()
+                    .is_ok_and(|m| m == self.manifest)
+                    && target.crate_types.iter().any(|t| t == "cdylib") =>
+                {
+                    let dynamic = |p: &PathBuf| {
+                        p.extension()
+                            .is_some_and(|e| e == std::env::consts::DLL_EXTENSION)
+                    };
+                    library = filenames.into_iter().find(dynamic);
+                }
+                _ => {}
+            }
+        }
+        match library {
+            Some(library) if status.success() => Ok(library),
+            _ => Err(CrateError::Build {
+                package: self.name.clone(),
+                diagnostics: if diagnostics.is_empty() {
+                    without_prefix(&words)
+                } else {
+                    diagnostics
+                },
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_outer_cargo_sets_is_known() {
+        for name in [
+            "CARGO_PKG_NAME",
+            "CARGO_MANIFEST_DIR",
+            "RUSTUP_TOOLCHAIN",
+            "DEP_Z_ROOT",
+        ] {
+            assert!(is_outer_cargo(name), "{name}");
+        }
+        for name in [
+            "CARGO_HOME",
+            "CARGO_NET_OFFLINE",
+            "PATH",
+            "RUSTFLAGS",
+            "CARGO_BUILD_JOBS",
+        ] {
+            assert!(!is_outer_cargo(name), "{name}");
+        }
+    }
+}

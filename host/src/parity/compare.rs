@@ -1,0 +1,275 @@
+//! How far apart two numbers are.
+
+use hankel_dsl::native::describe::{Scalar, TexelFormat};
+use serde::{Deserialize, Serialize};
+
+use crate::flat::Number;
+
+/// The distance of two numbers in units in the last place: how many floats lie between them, plus
+/// one. Zeros of different sign are equal, and so are NaNs; a NaN and a number are as far apart
+/// as can be.
+#[must_use]
+pub fn ulp_f32(a: f32, b: f32) -> u64 {
+    match (a.is_nan(), b.is_nan()) {
+        (true, true) => 0,
+        (false, false) => ordered_f32(a).abs_diff(ordered_f32(b)),
+        _ => u64::MAX,
+    }
+}
+
+/// As [`ulp_f32`].
+#[must_use]
+pub fn ulp_f64(a: f64, b: f64) -> u64 {
+    match (a.is_nan(), b.is_nan()) {
+        (true, true) => 0,
+        (false, false) => {
+            let distance = ordered_f64(a).abs_diff(ordered_f64(b));
+            u64::try_from(distance).unwrap_or(u64::MAX)
+        }
+        _ => u64::MAX,
+    }
+}
+
+/// A float's place among all floats, both zeros at 0.
+fn ordered_f32(x: f32) -> i64 {
+    let magnitude = i64::from(x.to_bits() & 0x7fff_ffff);
+    if x.is_sign_negative() {
+        -magnitude
+    } else {
+        magnitude
+    }
+}
+
+fn ordered_f64(x: f64) -> i128 {
+    let magnitude = i128::from(x.to_bits() & (u64::MAX >> 1));
+    if x.is_sign_negative() {
+        -magnitude
+    } else {
+        magnitude
+    }
+}
+
+/// A subnormal float as zero, any other as it is.
+fn flushed(number: Number) -> Number {
+    match number {
+        Number::F32(x) if x.is_subnormal() => Number::F32(0.0),
+        Number::F64(x) if x.is_subnormal() => Number::F64(0.0),
+        other => other,
+    }
+}
+
+/// The type of an output value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A number in memory.
+    Scalar(Scalar),
+    /// Half a float: a channel of a 16-bit float texture.
+    Half,
+    /// A step of a 16-bit normalised channel.
+    Unorm16,
+    /// A step of an 8-bit normalised channel.
+    Unorm8,
+}
+
+impl Kind {
+    /// The type of a texture's channels.
+    #[must_use]
+    pub const fn of(format: TexelFormat) -> Self {
+        match format {
+            TexelFormat::R32Float | TexelFormat::Rgba32Float => Self::Scalar(Scalar::F32),
+            TexelFormat::R32Uint | TexelFormat::Rgba32Uint => Self::Scalar(Scalar::U32),
+            TexelFormat::Rgba16Float => Self::Half,
+            TexelFormat::Rgba16Unorm => Self::Unorm16,
+            TexelFormat::Rgba8Unorm => Self::Unorm8,
+        }
+    }
+
+    /// Bytes of a value.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Scalar(s) => crate::device::slots::scalar_bytes(s),
+            Self::Half | Self::Unorm16 => 2,
+            Self::Unorm8 => 1,
+        }
+    }
+
+    /// Compares the values at the start of two byte slices. Integers and normalised channels
+    /// count steps. With `flush`, subnormal numbers count as zero.
+    #[must_use]
+    pub fn compare(self, a: &[u8], b: &[u8], flush: bool) -> Distance {
+        match self {
+            Self::Scalar(scalar) => {
+                let read = |bytes: &[u8]| {
+                    let number = Number::read(scalar, bytes);
+                    if flush { flushed(number) } else { number }
+                };
+                let (a, b) = (read(a), read(b));
+                let ulp = match (a, b) {
+                    (Number::F32(a), Number::F32(b)) => ulp_f32(a, b),
+                    (Number::F64(a), Number::F64(b)) => ulp_f64(a, b),
+                    (Number::U32(a), Number::U32(b)) => a.abs_diff(b).into(),
+                    (Number::I32(a), Number::I32(b)) => a.abs_diff(b).into(),
+                    _ => u64::MAX,
+                };
+                Distance::new(ulp, a.to_f64(), b.to_f64())
+            }
+            Self::Half => {
+                let read = |v: &[u8]| v.first_chunk().map_or(0, |c| u16::from_le_bytes(*c));
+                let (x, y) = (half(read(a)), half(read(b)));
+                let ordered = |bits: u16| {
+                    let magnitude = i32::from(bits & 0x7fff);
+                    if bits >> 15 == 1 {
+                        -magnitude
+                    } else {
+                        magnitude
+                    }
+                };
+                let ulp = match (x.is_nan(), y.is_nan()) {
+                    (true, true) => 0,
+                    (false, false) => ordered(read(a)).abs_diff(ordered(read(b))).into(),
+                    _ => u64::MAX,
+                };
+                Distance::new(ulp, x, y)
+            }
+            Self::Unorm16 => {
+                let read = |v: &[u8]| v.first_chunk().map_or(0, |c| u16::from_le_bytes(*c));
+                let (a, b) = (read(a), read(b));
+                Distance::new(
+                    a.abs_diff(b).into(),
+                    f64::from(a) / 65535.0,
+                    f64::from(b) / 65535.0,
+                )
+            }
+            Self::Unorm8 => {
+                let read = |v: &[u8]| v.first().copied().unwrap_or(0);
+                let (a, b) = (read(a), read(b));
+                Distance::new(
+                    a.abs_diff(b).into(),
+                    f64::from(a) / 255.0,
+                    f64::from(b) / 255.0,
+                )
+            }
+        }
+    }
+}
+
+/// A 16-bit float's value.
+fn half(bits: u16) -> f64 {
+    let mut texel = [0; 8];
+    texel[..2].copy_from_slice(&bits.to_le_bytes());
+    TexelFormat::Rgba16Float.load(&texel).x.into()
+}
+
+/// How far apart two values are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distance {
+    /// In units in the last place, or steps.
+    pub ulp: u64,
+    /// As numbers; infinite if only one of them is finite.
+    pub absolute: f64,
+    /// The first one.
+    pub a: f64,
+    /// The second one.
+    pub b: f64,
+}
+
+impl Distance {
+    fn new(ulp: u64, a: f64, b: f64) -> Self {
+        let difference = (a - b).abs();
+        let absolute = match (ulp, difference.is_nan()) {
+            (0, _) => 0.0,
+            (_, true) => f64::INFINITY,
+            _ => difference,
+        };
+        Self {
+            ulp,
+            absolute,
+            a,
+            b,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_are_one_apart_over_every_boundary() {
+        for x in [
+            0.0f32,
+            1.0,
+            -1.0,
+            1e-40,
+            f32::MIN_POSITIVE,
+            2.0f32.powi(23),
+            f32::MAX,
+        ] {
+            assert_eq!(ulp_f32(x, x.next_up()), 1, "{x:e}");
+            assert_eq!(ulp_f32(x.next_up(), x), 1);
+            assert_eq!(ulp_f32(-x, -x.next_up()), 1);
+        }
+        for x in [0.0f64, 1.0, 5e-324, f64::MIN_POSITIVE, f64::MAX] {
+            assert_eq!(ulp_f64(x, x.next_up()), 1, "{x:e}");
+        }
+    }
+
+    #[test]
+    fn signs_zeros_and_nans() {
+        assert_eq!(ulp_f32(0.0, -0.0), 0);
+        assert_eq!(ulp_f32(f32::from_bits(1), -f32::from_bits(1)), 2);
+        assert_eq!(ulp_f32(1.0, -1.0), 2 * u64::from(1.0f32.to_bits()));
+        assert_eq!(ulp_f32(f32::NAN, -f32::NAN), 0);
+        assert_eq!(ulp_f32(f32::NAN, 0.0), u64::MAX);
+        assert_eq!(ulp_f64(0.0, f64::NAN), u64::MAX);
+        assert_eq!(ulp_f32(f32::INFINITY, f32::MAX), 1);
+        assert_eq!(
+            ulp_f64(f64::INFINITY, f64::NEG_INFINITY),
+            2 * f64::INFINITY.to_bits()
+        );
+    }
+
+    #[test]
+    fn the_distance_is_a_metric() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        for _ in 0..10_000 {
+            let [a, b, c] = [(); 3].map(|()| f32::from_bits(rng.u32(..)));
+            if [a, b, c].iter().any(|x| x.is_nan()) {
+                continue;
+            }
+            assert_eq!(ulp_f32(a, b), ulp_f32(b, a));
+            assert!(ulp_f32(a, c) <= ulp_f32(a, b) + ulp_f32(b, c));
+            assert_eq!(ulp_f32(a, b) == 0, a == b);
+        }
+    }
+
+    #[test]
+    fn every_kind_counts_its_own_steps() {
+        let d = Kind::Scalar(Scalar::U32).compare(&7u32.to_le_bytes(), &4u32.to_le_bytes(), false);
+        assert_eq!((d.ulp, d.absolute), (3, 3.0));
+        let d =
+            Kind::Scalar(Scalar::I32).compare(&(-7i32).to_le_bytes(), &4i32.to_le_bytes(), false);
+        assert_eq!((d.ulp, d.absolute), (11, 11.0));
+        let d = Kind::Unorm16.compare(&65535u16.to_le_bytes(), &65533u16.to_le_bytes(), false);
+        assert_eq!((d.ulp, d.a), (2, 1.0));
+        let d = Kind::Unorm8.compare(&[0], &[255], false);
+        assert_eq!((d.ulp, d.absolute), (255, 1.0));
+        // 1.0 and the next half float.
+        let d = Kind::Half.compare(&0x3c00u16.to_le_bytes(), &0x3c01u16.to_le_bytes(), false);
+        assert_eq!((d.ulp, d.a, d.absolute), (1, 1.0, 1.0 / 1024.0));
+        let d =
+            Kind::Scalar(Scalar::F32).compare(&1f32.to_le_bytes(), &f32::NAN.to_le_bytes(), false);
+        assert_eq!((d.ulp, d.absolute), (u64::MAX, f64::INFINITY));
+        let least = f32::from_bits(1).to_le_bytes();
+        let zero = 0f32.to_le_bytes();
+        assert_eq!(
+            Kind::Scalar(Scalar::F32).compare(&least, &zero, true).ulp,
+            0
+        );
+        assert_eq!(
+            Kind::Scalar(Scalar::F32).compare(&least, &zero, false).ulp,
+            1
+        );
+    }
+}

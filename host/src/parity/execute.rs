@@ -1,0 +1,485 @@
+//! Runs a case of any stage on a device, and gives back what was written.
+
+use hankel_dsl::native::describe::{
+    Kernel, Output, Param, Role, Scalar, Stage, TexelFormat, Tolerance, Type,
+};
+
+use super::capture;
+use crate::device::slots::{self, Slot, Use};
+use crate::device::{
+    Bind, BufferId, Colour, Cull, Device, DeviceError, Draw, Pass, Program, Shader, TextureId,
+    TextureShape, Topology,
+};
+use crate::inputs::{Case, Input};
+
+/// What was written, one for each slot that is written, in order: the bytes of its buffer or
+/// texture.
+pub type Written = Vec<Vec<u8>>;
+
+/// Why a case did not run.
+#[derive(Debug, thiserror::Error)]
+pub enum ExecuteError {
+    /// The device's words.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// A stage that cannot be read back.
+    #[error("kernel `{kernel}`: {problem}")]
+    Stage {
+        /// The kernel.
+        kernel: String,
+        /// Why not.
+        problem: String,
+    },
+}
+
+/// Width of the targets that vertices and fragments are read back through.
+const WIDTH: u32 = 64;
+
+/// What a case holds on a device, freed at the end.
+#[derive(Default)]
+struct Held {
+    buffers: Vec<BufferId>,
+    textures: Vec<TextureId>,
+}
+
+impl Held {
+    fn free(self, device: &mut dyn Device) -> Result<(), DeviceError> {
+        for b in self.buffers {
+            device.free_buffer(b)?;
+        }
+        for t in self.textures {
+            device.free_texture(t)?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs a case as a map: compute kernels anywhere, vertex and fragment kernels natively.
+///
+/// # Errors
+/// The device's.
+pub fn dispatch(
+    device: &mut dyn Device,
+    program: &Program<'_>,
+    case: &Case,
+) -> Result<Written, DeviceError> {
+    let slots = slots::slots(program.kernel);
+    let mut held = Held::default();
+    let result = dispatch_with(device, program, &slots, case, &mut held);
+    let freed = held.free(device);
+    let written = result?;
+    freed?;
+    Ok(written)
+}
+
+fn dispatch_with(
+    device: &mut dyn Device,
+    program: &Program<'_>,
+    slots: &[Slot<'_>],
+    case: &Case,
+    held: &mut Held,
+) -> Result<Written, DeviceError> {
+    let binds = upload(device, slots, &case.args, held)?;
+    device.dispatch(program, &binds)?;
+    let mut written = Vec::new();
+    for (slot, bind) in slots
+        .iter()
+        .zip(&binds)
+        .filter(|(s, _)| s.role.is_written())
+    {
+        written.push(match bind {
+            Bind::Buffer(id) => device.read_buffer(*id)?,
+            Bind::Texture(id) => device.read_texture(*id)?,
+            Bind::Bytes(_) | Bind::Sampler(_) => {
+                return Err(slots::refuse(
+                    program.kernel,
+                    slot,
+                    "it cannot be written".into(),
+                ));
+            }
+        });
+    }
+    Ok(written)
+}
+
+/// Makes a device's buffers and textures from inputs.
+fn upload<'a>(
+    device: &mut dyn Device,
+    slots: &[Slot<'_>],
+    inputs: &'a [Input],
+    held: &mut Held,
+) -> Result<Vec<Bind<'a>>, DeviceError> {
+    let mut binds = Vec::with_capacity(inputs.len());
+    for (slot, input) in slots.iter().zip(inputs) {
+        binds.push(match (input, slot.role) {
+            (Input::Bytes(bytes), Use::Uniform(_)) => Bind::Bytes(bytes),
+            (Input::Bytes(bytes), _) => {
+                let id = device.buffer_from(&slot.name, bytes)?;
+                held.buffers.push(id);
+                Bind::Buffer(id)
+            }
+            (Input::Texture { shape, bytes }, _) => {
+                let id = device.texture_from(&slot.name, shape, bytes)?;
+                held.textures.push(id);
+                Bind::Texture(id)
+            }
+            (Input::Sampler(s), _) => Bind::Sampler(*s),
+        });
+    }
+    Ok(binds)
+}
+
+/// Runs a case on Vulkan, whatever its stage: vertices and fragments are drawn as points, each in
+/// a pixel of its own.
+///
+/// # Errors
+/// The device's, and [`ExecuteError::Stage`] for an interface that targets cannot hold.
+pub fn on_vulkan(
+    device: &mut dyn Device,
+    program: &Program<'_>,
+    case: &Case,
+) -> Result<Written, ExecuteError> {
+    match program.kernel.stage {
+        Stage::Compute { .. } => Ok(dispatch(device, program, case)?),
+        Stage::Fragment | Stage::Vertex => {
+            let mut held = Held::default();
+            let result = if program.kernel.stage == Stage::Vertex {
+                vertex(device, program, case, &mut held)
+            } else {
+                fragment(device, program, case, &mut held)
+            };
+            let freed = held.free(device);
+            let written = result?;
+            freed?;
+            Ok(written)
+        }
+    }
+}
+
+fn bad(kernel: &Kernel, problem: impl Into<String>) -> ExecuteError {
+    ExecuteError::Stage {
+        kernel: kernel.name.clone(),
+        problem: problem.into(),
+    }
+}
+
+/// A helper stage's description.
+fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) -> Kernel {
+    Kernel {
+        name: name.into(),
+        function: name.into(),
+        summary: String::new(),
+        file: file!().into(),
+        line: line!(),
+        stage,
+        precision: None,
+        params,
+        outputs,
+        tolerance: Tolerance {
+            ulp: 0,
+            absolute: 0.0,
+            why: String::new(),
+        },
+    }
+}
+
+/// A scalar or vector type: its scalar, its components, its name in WGSL.
+fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), ExecuteError> {
+    let (scalar, size) = match ty {
+        Type::Scalar { scalar } => (*scalar, 1),
+        Type::Vector { scalar, size } => (*scalar, *size),
+        Type::Array { .. } | Type::Struct { .. } => {
+            return Err(bad(kernel, "only scalars and vectors pass between stages"));
+        }
+    };
+    let name = match scalar {
+        Scalar::F32 => "f32",
+        Scalar::U32 => "u32",
+        Scalar::I32 => "i32",
+        Scalar::F64 => return Err(bad(kernel, "64-bit values do not pass between stages")),
+    };
+    let text = if size == 1 {
+        name.to_string()
+    } else {
+        format!("vec{size}<{name}>")
+    };
+    Ok((scalar, size, text))
+}
+
+/// How a varying is declared: integers are never interpolated.
+const fn interpolation(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::F32 | Scalar::F64 => "",
+        Scalar::U32 | Scalar::I32 => "@interpolate(flat) ",
+    }
+}
+
+/// The bytes of `count` values of `size` components out of texels of four.
+fn narrowed(texels: &[u8], size: u32, count: usize) -> Vec<u8> {
+    texels
+        .chunks_exact(16)
+        .take(count)
+        .flat_map(|t| &t[..4 * size as usize])
+        .copied()
+        .collect()
+}
+
+fn pass<'a>(colours: &'a [Colour], draws: &'a [Draw<'a>]) -> Pass<'a> {
+    Pass {
+        label: "parity",
+        colours,
+        depth: None,
+        draws,
+    }
+}
+
+/// Draws each fragment as a point whose varyings are the case's, all of them constant over it.
+fn fragment(
+    device: &mut dyn Device,
+    program: &Program<'_>,
+    case: &Case,
+    held: &mut Held,
+) -> Result<Written, ExecuteError> {
+    let kernel = program.kernel;
+    let slots = slots::slots(kernel);
+    let height = (case.invocations as u32).div_ceil(WIDTH);
+    let mut members = String::from("@builtin(position) position: vec4<f32>,\n");
+    let mut inputs = String::from("@builtin(vertex_index) i: u32,\n");
+    let mut copies = String::new();
+    let (mut params, mut outputs) = (Vec::new(), vec![Output::Position]);
+    let (mut vertex_args, mut fragment_args) = (Vec::new(), Vec::new());
+    let all = upload(device, &slots, &case.args, held)?;
+    for (slot, bind) in slots.iter().zip(&all) {
+        match slot.role {
+            Use::Varying(location, ty) => {
+                let (scalar, _, text) = interface(kernel, ty)?;
+                let flat = interpolation(scalar);
+                members.push_str(&format!(
+                    "@location({location}) {flat}v{location}: {text},\n"
+                ));
+                inputs.push_str(&format!("@location({location}) v{location}: {text},\n"));
+                copies.push_str(&format!("o.v{location} = v{location};\n"));
+                params.push(Param {
+                    name: slot.name.clone(),
+                    role: Role::Attribute {
+                        location,
+                        ty: ty.clone(),
+                    },
+                });
+                outputs.push(Output::Varying {
+                    location,
+                    ty: ty.clone(),
+                });
+                vertex_args.push(*bind);
+            }
+            Use::Interface(_) => {}
+            _ => fragment_args.push(*bind),
+        }
+    }
+    let text = format!(
+        "struct Point {{\n{members}}}\n\
+         @vertex fn hankel_points({inputs}) -> Point {{\n\
+         var o: Point;\n\
+         let at = vec2<f32>(f32(i % {WIDTH}u), f32(i / {WIDTH}u)) + 0.5;\n\
+         let size = vec2<f32>({WIDTH}.0, -{height}.0);\n\
+         o.position = vec4<f32>(at * 2.0 / size + vec2<f32>(-1.0, 1.0), 0.0, 1.0);\n\
+         {copies}return o;\n}}\n"
+    );
+    let points = helper("hankel_points", Stage::Vertex, params, outputs);
+    let mut targets = Vec::new();
+    for output in &kernel.outputs {
+        let Output::Target { ty, .. } = output else {
+            continue;
+        };
+        let (scalar, size, _) = interface(kernel, ty)?;
+        let format = match (scalar, size) {
+            (Scalar::F32, 1) => TexelFormat::R32Float,
+            (Scalar::F32, 4) => TexelFormat::Rgba32Float,
+            (Scalar::U32, 1) => TexelFormat::R32Uint,
+            (Scalar::U32, 4) => TexelFormat::Rgba32Uint,
+            _ => {
+                return Err(bad(
+                    kernel,
+                    "no target format holds its output; return f32, u32, Vec4 or UVec4",
+                ));
+            }
+        };
+        let id = device.texture("target", &TextureShape::d2(WIDTH, height, format))?;
+        held.textures.push(id);
+        targets.push((id, format));
+    }
+    let colours: Vec<Colour> = targets
+        .iter()
+        .map(|&(texture, _)| Colour {
+            texture,
+            resolve: None,
+            clear: Some([0.0; 4]),
+        })
+        .collect();
+    let draw = Draw {
+        vertex: Program {
+            kernel: &points,
+            constants: &[],
+            native: None,
+            shader: Some(Shader::Wgsl {
+                text: &text,
+                entry_point: "hankel_points",
+            }),
+        },
+        vertex_args: &vertex_args,
+        fragment: Some(*program),
+        fragment_args: &fragment_args,
+        indices: None,
+        count: case.invocations as u32,
+        topology: Topology::Points,
+        cull: Cull::None,
+    };
+    device.draw(&pass(&colours, &[draw]))?;
+    targets
+        .into_iter()
+        .map(|(id, format)| {
+            let mut texels = device.read_texture(id)?;
+            texels.truncate(case.invocations * format.bytes());
+            Ok(texels)
+        })
+        .collect()
+}
+
+/// Draws each vertex into a pixel of its own, and reads one output after the other.
+fn vertex(
+    device: &mut dyn Device,
+    program: &Program<'_>,
+    case: &Case,
+    held: &mut Held,
+) -> Result<Written, ExecuteError> {
+    let kernel = program.kernel;
+    let height = (case.invocations as u32).div_ceil(WIDTH);
+    let shader = program
+        .shader
+        .ok_or_else(|| bad(kernel, "it has no shader"))?;
+    let words = match shader {
+        Shader::SpirvPassthrough(words) => words.to_vec(),
+        Shader::SpirvThroughNaga(words) => {
+            super::translate::spirv_to_spirv(words).map_err(|e| bad(kernel, e))?
+        }
+        Shader::Wgsl { text, entry_point } => {
+            super::translate::wgsl_to_spirv(text, entry_point, &kernel.name)
+                .map_err(|e| bad(kernel, e))?
+        }
+    };
+    let captured = capture::capture(&words, &kernel.name, WIDTH, height)
+        .map_err(|problem| bad(kernel, problem))?;
+    let slots = slots::slots(kernel);
+    let binds = upload(device, &slots, &case.args, held)?;
+    let vertex_args: Vec<Bind<'_>> = slots
+        .iter()
+        .zip(&binds)
+        .filter(|(s, _)| !matches!(s.role, Use::Interface(_)))
+        .map(|(_, b)| *b)
+        .collect();
+    let mut captured_kernel = kernel.clone();
+    captured_kernel.outputs = kernel
+        .outputs
+        .iter()
+        .map(|o| match o {
+            Output::Position => Output::Varying {
+                location: captured.location,
+                ty: slots::POSITION,
+            },
+            other => other.clone(),
+        })
+        .collect();
+    let target = device.texture(
+        "f32",
+        &TextureShape::d2(WIDTH, height, TexelFormat::Rgba32Float),
+    )?;
+    held.textures.push(target);
+    let integers = device.texture(
+        "u32",
+        &TextureShape::d2(WIDTH, height, TexelFormat::Rgba32Uint),
+    )?;
+    held.textures.push(integers);
+    let mut written = Vec::new();
+    for output in &captured_kernel.outputs {
+        let Output::Varying { location, ty } = output else {
+            return Err(bad(
+                kernel,
+                "a vertex stage writes a position and varyings only",
+            ));
+        };
+        let (scalar, size, text) = interface(kernel, ty)?;
+        let is_float = scalar == Scalar::F32;
+        let wide = if is_float { "f32" } else { "u32" };
+        let value = |i: usize| {
+            let part = if size == 1 {
+                "v".into()
+            } else {
+                format!("v.{}", &"xyzw"[i..=i])
+            };
+            match (i < size as usize, scalar) {
+                (false, _) => format!("{wide}()"),
+                (true, Scalar::I32) => format!("bitcast<u32>({part})"),
+                (true, _) => part,
+            }
+        };
+        let [x, y, z, w] = [0, 1, 2, 3].map(value);
+        let text = format!(
+            "@fragment fn hankel_take(@location({location}) @interpolate(flat) v: {text}) \
+             -> @location(0) vec4<{wide}> {{ return vec4<{wide}>({x}, {y}, {z}, {w}); }}"
+        );
+        let result = Type::Vector {
+            scalar: if is_float { scalar } else { Scalar::U32 },
+            size: 4,
+        };
+        // wgpu matches the stages of a pipeline only if it has read both, or neither.
+        let reader = super::translate::wgsl_to_spirv(&text, "hankel_take", "hankel_take")
+            .map_err(|e| bad(kernel, e))?;
+        let take = helper(
+            "hankel_take",
+            Stage::Fragment,
+            vec![Param {
+                name: "v".into(),
+                role: Role::Varying {
+                    location: *location,
+                    ty: ty.clone(),
+                },
+            }],
+            vec![Output::Target {
+                location: 0,
+                ty: result,
+            }],
+        );
+        let texture = if is_float { target } else { integers };
+        let draw = Draw {
+            vertex: Program {
+                kernel: &captured_kernel,
+                shader: Some(Shader::SpirvPassthrough(&captured.words)),
+                ..*program
+            },
+            vertex_args: &vertex_args,
+            fragment: Some(Program {
+                kernel: &take,
+                constants: &[],
+                native: None,
+                shader: Some(Shader::SpirvPassthrough(&reader)),
+            }),
+            fragment_args: &[],
+            indices: None,
+            count: case.invocations as u32,
+            topology: Topology::Points,
+            cull: Cull::None,
+        };
+        let colours = [Colour {
+            texture,
+            resolve: None,
+            clear: Some([0.0; 4]),
+        }];
+        device.draw(&pass(&colours, &[draw]))?;
+        written.push(narrowed(
+            &device.read_texture(texture)?,
+            size,
+            case.invocations,
+        ));
+    }
+    Ok(written)
+}
