@@ -12,6 +12,9 @@ use crate::error::{During, Error, Result};
 /// Lines of output that an error quotes.
 const TAIL_LINES: usize = 12;
 
+/// Characters of each that it quotes: some command lines are very long.
+const TAIL_WIDTH: usize = 240;
+
 /// Times that a busy program is tried again.
 const BUSY_RETRIES: u32 = 50;
 
@@ -59,7 +62,7 @@ pub(crate) fn run(
             if tail.len() == TAIL_LINES {
                 tail.remove(0);
             }
-            tail.push(line.to_owned());
+            tail.push(line.chars().take(TAIL_WIDTH).collect());
         }
     }
     let status = running.0.wait().during("wait for", &program)?;

@@ -272,6 +272,8 @@ fn being_killed_in_the_middle_leaves_what_the_next_run_removes() {
         .args(["--exact", "child_that_is_killed", "--ignored"])
         .env(CHILD_CACHE, scratch.join("cache"))
         .env("HANKEL_TOOLCHAIN_ARCHIVE", &archive)
+        .env_remove("HANKEL_TOOLCHAIN")
+        .env_remove("HANKEL_TOOLCHAIN_SHA256")
         .output()
         .unwrap()
         .status;

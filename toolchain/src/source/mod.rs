@@ -57,6 +57,7 @@ pub(crate) fn recipe() -> String {
     sha256::of_bytes([
         pinned::RUST_SRC_SHA256.as_bytes(),
         pinned::RUST_GPU_VERSION.as_bytes(),
+        include_bytes!("mod.rs"),
         include_bytes!("patch.rs"),
         DRIVER_MAIN.as_bytes(),
         DRIVER_MANIFEST.as_bytes(),
@@ -284,7 +285,7 @@ impl Build<'_> {
     fn neutral_paths(&self) -> Vec<String> {
         let mut flags = vec![format!(
             "--remap-path-prefix={}=/rust-gpu",
-            self.tree_folder().display()
+            self.work.display()
         )];
         let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
         let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
