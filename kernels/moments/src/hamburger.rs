@@ -16,6 +16,8 @@ pub(crate) struct Query<R> {
     pub mean: R,
     /// Mean square of the depth relative to the query point.
     pub square: R,
+    /// Variance of the depth.
+    pub variance: R,
     /// Weight of the query point itself, in [0, 1].
     pub own: R,
     pub k0: R,
@@ -27,23 +29,27 @@ impl<R: Real> Query<R> {
     #[inline(always)]
     pub fn new(m: Moments4<R>, z: R) -> Self {
         let Moments4 { b1, b2, b3, b4 } = m;
-        // Minors of the Hankel matrix. What rounding or invalid moments make of the two that must
-        // be positive is lifted to a value far below any that a bias leaves.
-        let floor = R::epsilon() * R::epsilon();
-        let variance = (b2 - b1 * b1).max(floor);
-        let skew = b3 - b1 * b2;
+        // Minors of the Hankel matrix. The two that are positive for valid moments are lifted to
+        // values below any that the caller's regularisation leaves of those.
+        let variance = (b2 - b1 * b1).max(R::epsilon() * lit!(0.25));
+        let covariance = b3 - b1 * b2;
         let spread = b4 - b2 * b2;
-        let determinant = (spread * variance - skew * skew).max(floor);
-        let d1 = z - b1;
-        let d2 = z * z - b2;
-        let k2 = variance * d2 - skew * d1;
-        let k1 = spread * d1 - skew * d2 + z * k2 * lit!(2.0);
-        // 1 / own = 1 + d1²/D22 + (…)²/D33, a sum of squares: no cancellation, and never 0.
-        let square = variance + d1 * d1;
+        let determinant =
+            (spread * variance - covariance * covariance).max(R::epsilon() * R::epsilon());
+        // From here on about the mean, which halves the error: d is the query point, skew the
+        // third central moment. The quadratic orthogonal polynomial times the variance is k2.
+        let d = z - b1;
+        let d_squared = d * d;
+        let skew = covariance - b1 * variance * lit!(2.0);
+        let k2 = variance * (d_squared - variance) - skew * d;
+        let k1 = (determinant * d - skew * k2) / variance + d * k2 * lit!(2.0);
+        // 1 / own = 1 + d²/D22 + k2²/(D22 D): a sum of squares, so no cancellation, and never 0.
+        let square = variance + d_squared;
         let total = square * determinant + k2 * k2;
         Self {
-            mean: -d1,
+            mean: -d,
             square,
+            variance,
             own: variance * determinant / total,
             k0: total / variance,
             k1,
@@ -72,10 +78,23 @@ pub fn hamburger_4<R: Real>(m: Moments4<R>, z: R) -> R {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let outside = R::select(query.k1.gt(zero), one - query.own, zero);
-    R::select(query.k2.lt(zero), between, outside).saturate()
+    query.within_two_moments(R::select(query.k2.lt(zero), between, outside))
 }
 
 impl<R: Real> Query<R> {
+    /// `share` moved into the bounds that mean and variance alone give (Cantelli's inequality).
+    /// Four moments never leave them; rounding does, when there is only one depth.
+    #[inline(always)]
+    pub fn within_two_moments(&self, share: R) -> R {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let near = self.variance / self.square;
+        let is_above = self.mean.lt(zero);
+        let least = R::select(is_above, one - near, zero);
+        let most = R::select(is_above, one, near);
+        share.clamp(least, most)
+    }
+
     /// The weight of the lower root when the query point lies between the roots (`k2` <= 0).
     #[inline(always)]
     pub fn between(&self) -> R {

@@ -49,7 +49,7 @@ pub fn hausdorff_4<R: Real>(m: Moments4<R>, z: R) -> R {
 
     let outside = R::select(above, one - own, zero);
     let three = R::select(straddles, query.between(), outside);
-    R::select(inside, three, four_points(m, z)).saturate()
+    query.within_two_moments(R::select(inside, three, four_points(m, z)))
 }
 
 /// The bound when 0 and 1 carry weight.

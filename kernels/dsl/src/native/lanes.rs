@@ -4,25 +4,54 @@
 
 use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
+use std::sync::OnceLock;
+use std::vec::Vec;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd};
 
 use super::layout::Lane;
 use crate::{Mask, Real};
 
-/// The best instruction set that this processor has.
+/// The instruction sets that this processor has and lanes can use, widest first, each by its name.
+#[must_use]
+pub fn levels() -> Vec<(&'static str, Level)> {
+    let best = Level::new();
+    let mut all = Vec::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    all.extend(
+        [
+            ("avx512", best.as_avx512().map(|s| s.level())),
+            ("avx2", best.as_avx2().map(|s| s.level())),
+            ("sse4.2", best.as_sse4_2().map(|s| s.level())),
+        ]
+        .into_iter()
+        .filter_map(|(name, level)| Some((name, level?))),
+    );
+    #[cfg(target_arch = "aarch64")]
+    all.extend(best.as_neon().map(|s| ("neon", s.level())));
+    all.push(("baseline", Level::baseline()));
+    all
+}
+
+/// The instruction set in use: the best one, or the one that the environment variable
+/// `HANKEL_SIMD` names, if the processor has it.
 #[must_use]
 pub fn level() -> Level {
-    Level::new()
+    static LEVEL: OnceLock<Level> = OnceLock::new();
+    *LEVEL.get_or_init(|| {
+        let wanted = std::env::var("HANKEL_SIMD").ok();
+        let levels = levels();
+        let named = levels.iter().find(|(name, _)| wanted.as_deref() == Some(name));
+        named.map_or_else(Level::new, |(_, level)| *level)
+    })
 }
 
 /// Its name, for reports.
 #[must_use]
-pub fn level_name() -> std::string::String {
-    std::format!("{:?}", level())
-        .chars()
-        .take_while(|c| c.is_alphanumeric() || *c == '_')
-        .collect()
+pub fn level_name() -> &'static str {
+    let name = |level: &Level| std::mem::discriminant(level);
+    levels().iter().find(|(_, l)| name(l) == name(&level())).map_or("baseline", |(n, _)| n)
 }
 
 /// The token of instruction set `S`, out of nothing.

@@ -1,0 +1,232 @@
+//! What must hold of every bound, whatever computes it.
+
+mod common;
+
+use common::{Distribution, distribution};
+use hankel_moments::{Moments4, hamburger_4, hausdorff_4, variance_2};
+use microlp::{ComparisonOp, OptimizationDirection, Problem};
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+
+/// What f64 leaves of a bound: the regularisation mixes in 1.8e-15, which a nearly singular Hankel
+/// matrix turns into at most its square root, 4e-8, over the distance of the depths.
+const TOLERANCE: f64 = 1e-6;
+
+fn single(m: Moments4<f64>) -> Moments4<f32> {
+    Moments4 {
+        b1: m.b1 as f32,
+        b2: m.b2 as f32,
+        b3: m.b3 as f32,
+        b4: m.b4 as f32,
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Chebyshev-Markov: the bound lies below every distribution with the moments.
+    #[test]
+    fn bounds_lie_below_the_distribution(d in distribution(6), z in 0.0..=1.0_f64) {
+        let share = d.below(z);
+        let m = d.moments();
+        prop_assert!(hamburger_4(m, z) <= share + TOLERANCE);
+        prop_assert!(hausdorff_4(m, z) <= share + TOLERANCE);
+        prop_assert!(variance_2(m.b1, m.b2, z, 0.0) <= share + TOLERANCE);
+    }
+
+    /// Two surfaces are reconstructed exactly: the case that most filter regions are.
+    #[test]
+    fn two_surfaces_are_exact(
+        near in 0.0..0.4_f64,
+        far in 0.6..=1.0_f64,
+        weight in 0.05..0.95_f64,
+        z in 0.45..0.55_f64,
+    ) {
+        let d = Distribution(vec![(near, weight), (far, 1.0 - weight)]);
+        prop_assert!((hamburger_4(d.moments(), z) - weight).abs() < TOLERANCE);
+        prop_assert!((hausdorff_4(d.moments(), z) - weight).abs() < TOLERANCE);
+    }
+
+    /// More knowledge, tighter bounds: two moments, four, and four with a known range.
+    #[test]
+    fn bounds_tighten(d in distribution(6), z in 0.0..=1.0_f64) {
+        let m = d.moments();
+        let four = hamburger_4(m, z);
+        prop_assert!(variance_2(m.b1, m.b2, z, 0.0) <= four + TOLERANCE);
+        prop_assert!(four <= hausdorff_4(m, z) + TOLERANCE);
+    }
+
+    /// The least share below a depth cannot fall as the depth grows.
+    #[test]
+    fn bounds_grow_with_depth(d in distribution(6), z in 0.0..=1.0_f64, step in 0.0..=0.2_f64) {
+        let m = d.moments();
+        prop_assert!(hamburger_4(m, z) <= hamburger_4(m, z + step) + TOLERANCE);
+        prop_assert!(hausdorff_4(m, z) <= hausdorff_4(m, (z + step).min(1.0)) + TOLERANCE);
+    }
+
+    /// Proposition 20: the Hamburger bound does not depend on where near and far plane are.
+    #[test]
+    fn affine_changes_of_depth_do_not_matter(d in distribution(6), z in 0.0..=1.0_f64) {
+        let moved = d.map(|z| 2.0 * z - 1.0);
+        let a = hamburger_4(d.moments(), z);
+        let b = hamburger_4(moved.moments(), 2.0 * z - 1.0);
+        // Where the bound jumps, the rounding of the moved moments may fall on either side.
+        let jump = d.0.iter().any(|(depth, _)| (depth - z).abs() < 1e-3);
+        prop_assert!(jump || (a - b).abs() < 1e-4, "{a} {b}");
+        let back = moved.moments().symmetric_to_unit();
+        let m = d.moments();
+        for (x, y) in [(back.b1, m.b1), (back.b2, m.b2), (back.b3, m.b3), (back.b4, m.b4)] {
+            prop_assert!((x - y).abs() < 1e-14);
+        }
+    }
+
+    /// Any finite input, valid or not, gives a number from 0 to 1.
+    #[test]
+    fn every_finite_input_gives_a_share(
+        b in prop::array::uniform4(any::<f32>().prop_filter("finite", |x| x.is_finite())),
+        z in any::<f32>().prop_filter("finite", |x| x.is_finite()),
+        least in any::<f32>().prop_filter("finite", |x| x.is_finite()),
+    ) {
+        let m = Moments4 { b1: b[0], b2: b[1], b3: b[2], b4: b[3] };
+        for share in [hamburger_4(m, z), hausdorff_4(m, z), variance_2(m.b1, m.b2, z, least)] {
+            prop_assert!((0.0..=1.0).contains(&share), "{share}");
+        }
+    }
+
+    /// The same near the edge of what distributions can have: quantised, truncated, duplicated.
+    #[test]
+    fn degenerate_moments_give_a_share(
+        d in distribution(2),
+        noise in prop::array::uniform4(-1e-6..=1e-6_f32),
+        on_a_surface in any::<bool>(),
+        z in 0.0..=1.0_f32,
+    ) {
+        let m = single(d.moments());
+        let z = if on_a_surface { d.0[0].0 as f32 } else { z };
+        for noise in [[0.0; 4], noise] {
+            let m = Moments4 {
+                b1: m.b1 + noise[0],
+                b2: m.b2 + noise[1],
+                b3: m.b3 + noise[2],
+                b4: m.b4 + noise[3],
+            };
+            for share in [hamburger_4(m, z), hausdorff_4(m, z)] {
+                prop_assert!((0.0..=1.0).contains(&share), "{share}");
+            }
+        }
+    }
+}
+
+/// Algorithm 1: the least share below `z` over distributions on a grid, by linear programming.
+fn linear_programme(m: Moments4<f64>, z: f64, grid: &[f64]) -> f64 {
+    let mut problem = Problem::new(OptimizationDirection::Minimize);
+    let weights: Vec<_> = grid
+        .iter()
+        .map(|depth| (problem.add_var(f64::from(*depth < z), (0.0, 1.0)), *depth))
+        .collect();
+    for (n, b) in [(0, 1.0), (1, m.b1), (2, m.b2), (3, m.b3), (4, m.b4)] {
+        let row: Vec<_> = weights
+            .iter()
+            .map(|(w, depth)| (*w, depth.powi(n)))
+            .collect();
+        problem.add_constraint(row, ComparisonOp::Eq, b);
+    }
+    problem
+        .solve()
+        .expect("the distribution itself is feasible")
+        .objective()
+}
+
+/// The closed forms against a linear programme, which knows nothing of moments' theory.
+#[test]
+fn a_linear_programme_gives_the_same_bound() {
+    let grid: Vec<f64> = (0..=250).map(|i| f64::from(i) / 250.0).collect();
+    let mut worst: f64 = 0.0;
+    let mut compared = 0;
+    for case in 0..60_u32 {
+        // Five depths on the grid, from a low-discrepancy sequence.
+        let points = (0..5_u32)
+            .map(|i| {
+                let at = (f64::from(case * 5 + i + 1) * 0.618_033_988_749_895).fract();
+                (grid[(at * 250.0) as usize], 0.2)
+            })
+            .collect();
+        let m = Distribution(points).moments();
+        for query in [23, 77, 125, 180, 231] {
+            let z = grid[query];
+            let exact = hausdorff_4(m, z);
+            let programme = linear_programme(m, z, &grid);
+            // Fewer distributions live on the grid, so its least share is larger.
+            assert!(programme > exact - 1e-6, "{programme} {exact}");
+            worst = worst.max(programme - exact);
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 300);
+    // A grid point off by half a step (1/500) moves a weight by about as much over the distance of
+    // two support points, of which the closest here are a few steps apart.
+    assert!(worst < 0.02, "{worst}");
+}
+
+/// Errors of an f32 bound against the same in f64, sorted, over regions of up to four surfaces
+/// with the recommended bias.
+fn errors(
+    bound: impl Fn(Moments4<f32>, f32) -> f32,
+    exact: impl Fn(Moments4<f64>, f64) -> f64,
+) -> Vec<f64> {
+    let mut runner = proptest::test_runner::TestRunner::deterministic();
+    let half = Moments4 {
+        b1: 0.5,
+        b2: 0.5,
+        b3: 0.5,
+        b4: 0.5,
+    };
+    let mut errors: Vec<f64> = (0..50_000)
+        .map(|_| {
+            let d = distribution(4).new_tree(&mut runner).unwrap().current();
+            let z = (0.0..=1.0_f64).new_tree(&mut runner).unwrap().current() as f32;
+            let m = single(d.moments().lerp(half, 3e-5));
+            let double = Moments4 {
+                b1: f64::from(m.b1),
+                b2: f64::from(m.b2),
+                b3: f64::from(m.b3),
+                b4: f64::from(m.b4),
+            };
+            let error = (f64::from(bound(m, z)) - exact(double, f64::from(z))).abs();
+            // The published form may give NaN: as wrong as can be.
+            if error.is_finite() { error } else { 1.0 }
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    errors
+}
+
+/// In single precision the robust form is at least as accurate as the published one.
+#[test]
+fn single_precision_is_no_worse_than_published() {
+    let published = errors(
+        |moments, depth| {
+            let biases = hankel_listing::Biases {
+                moment_bias: 0.0,
+                depth_bias: 0.0,
+            };
+            let receiver = hankel_listing::Receiver { moments, depth };
+            hankel_listing::hamburger_listing(&biases, receiver).shadow
+        },
+        hamburger_4,
+    );
+    let robust = errors(hamburger_4, hamburger_4);
+    for q in [0.5, 0.9, 0.99, 0.999] {
+        let at = (q * (robust.len() - 1) as f64) as usize;
+        println!(
+            "{q}: robust {:.1e}, published {:.1e}",
+            robust[at], published[at]
+        );
+        assert!(
+            robust[at] <= published[at],
+            "quantile {q}: {} > {}",
+            robust[at],
+            published[at]
+        );
+    }
+}

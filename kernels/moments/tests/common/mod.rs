@@ -1,0 +1,47 @@
+//! Distributions of depths, and what is true of them by definition.
+
+use hankel_moments::Moments4;
+use proptest::prelude::*;
+
+/// Depths with weights that add up to 1.
+#[derive(Clone, Debug)]
+pub struct Distribution(pub Vec<(f64, f64)>);
+
+impl Distribution {
+    /// The share strictly below `z`.
+    pub fn below(&self, z: f64) -> f64 {
+        self.0
+            .iter()
+            .filter(|(depth, _)| *depth < z)
+            .map(|(_, w)| w)
+            .sum()
+    }
+
+    /// The mean of the `n`-th power.
+    pub fn moment(&self, n: i32) -> f64 {
+        self.0.iter().map(|(z, w)| w * z.powi(n)).sum()
+    }
+
+    pub fn moments(&self) -> Moments4<f64> {
+        let m = |n| self.moment(n);
+        Moments4 {
+            b1: m(1),
+            b2: m(2),
+            b3: m(3),
+            b4: m(4),
+        }
+    }
+
+    /// Depths through `f`.
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.iter().map(|(z, w)| (f(*z), *w)).collect())
+    }
+}
+
+/// One to `most` depths in [0, 1].
+pub fn distribution(most: usize) -> impl Strategy<Value = Distribution> {
+    prop::collection::vec((0.0..=1.0_f64, 0.05..=1.0_f64), 1..=most).prop_map(|points| {
+        let total: f64 = points.iter().map(|(_, w)| w).sum();
+        Distribution(points.into_iter().map(|(z, w)| (z, w / total)).collect())
+    })
+}
