@@ -9,7 +9,27 @@ use crate::native;
 #[cfg(target_arch = "spirv")]
 #[allow(missing_docs, reason = "named by the macros only")]
 pub mod image {
+    use core::arch::asm;
     use spirv_std::Image;
+
+    /// Writes all four channels, whatever the format keeps of them: naga wants them, and
+    /// spirv-std's own `write` takes as many as the format has.
+    ///
+    /// # Safety
+    /// `image` is a storage image, `at` a texel of it, `channels` four numbers of its kind.
+    #[inline(always)]
+    pub unsafe fn write<I, C, V>(image: &I, at: C, channels: V) {
+        // SAFETY: the caller's.
+        unsafe {
+            asm!(
+                "%image = OpLoad _ {image}",
+                "%at = OpLoad _ {at}",
+                "%channels = OpLoad _ {channels}",
+                "OpImageWrite %image %at %channels",
+                image = in(reg) image, at = in(reg) &at, channels = in(reg) &channels,
+            );
+        }
+    }
     pub type Sampled2d = Image!(2D, type=f32, sampled);
     pub type Sampled2dMultisampled = Image!(2D, type=f32, sampled, multisampled);
     pub type Sampled3d = Image!(3D, type=f32, sampled);

@@ -221,14 +221,14 @@ impl Kernel {
                 let size: UVec2 = output.query_size();
                 if (invocation.x < size.x) & (invocation.y < size.y) {
                     let value = ::hankel_dsl::Texel::channels(#call);
-                    unsafe { output.write(UVec2::new(invocation.x, invocation.y), value) };
+                    unsafe { ::hankel_dsl::image::write(output, UVec2::new(invocation.x, invocation.y), value) };
                 }
             },
             (true, _) => quote! {
                 let size: UVec3 = output.query_size();
                 if (invocation.x < size.x) & (invocation.y < size.y) & (invocation.z < size.z) {
                     let value = ::hankel_dsl::Texel::channels(#call);
-                    unsafe { output.write(invocation, value) };
+                    unsafe { ::hankel_dsl::image::write(output, invocation, value) };
                 }
             },
         }

@@ -30,7 +30,7 @@ impl<R: Real> Query<R> {
     pub fn new(m: Moments4<R>, z: R) -> Self {
         let Moments4 { b1, b2, b3, b4 } = m;
         // Minors of the Hankel matrix. The two that are positive for valid moments are lifted to
-        // values below any that the caller's regularisation leaves of those.
+        // the size of their own rounding errors.
         let variance = (b2 - b1 * b1).max(R::epsilon() * lit!(0.25));
         let covariance = b3 - b1 * b2;
         let spread = b4 - b2 * b2;

@@ -42,7 +42,9 @@ pub fn level() -> Level {
     *LEVEL.get_or_init(|| {
         let wanted = std::env::var("HANKEL_SIMD").ok();
         let levels = levels();
-        let named = levels.iter().find(|(name, _)| wanted.as_deref() == Some(name));
+        let named = levels
+            .iter()
+            .find(|(name, _)| wanted.as_deref() == Some(name));
         named.map_or_else(Level::new, |(_, level)| *level)
     })
 }
@@ -51,7 +53,10 @@ pub fn level() -> Level {
 #[must_use]
 pub fn level_name() -> &'static str {
     let name = |level: &Level| std::mem::discriminant(level);
-    levels().iter().find(|(_, l)| name(l) == name(&level())).map_or("baseline", |(n, _)| n)
+    levels()
+        .iter()
+        .find(|(_, l)| name(l) == name(&level()))
+        .map_or("baseline", |(n, _)| n)
 }
 
 /// The token of instruction set `S`, out of nothing.

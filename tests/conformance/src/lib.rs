@@ -1,0 +1,245 @@
+//! One small kernel for each thing that a kernel can do: maps in one, two and three dimensions,
+//! both precisions, uniforms, buffers, counters, constants, textures of every shape, samplers,
+//! workgroup memory with both kinds of output, vertex and fragment stages. Tests take this crate
+//! through the whole chain as if it were somebody's own.
+#![no_std]
+
+use hankel_dsl::glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
+use hankel_dsl::{
+    Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, Texture2dMultisampled, Texture3d,
+    kernel, lit,
+};
+
+hankel_dsl::kernels![
+    affine,
+    gather,
+    histogram,
+    scan,
+    maximum,
+    checker,
+    gradient,
+    downsample,
+    texel_counts,
+    last_sample,
+    filtered,
+    slice,
+    corner,
+    tint,
+];
+
+/// A point and its weight.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Pair<R> {
+    /// The point.
+    pub x: R,
+    /// Its weight.
+    pub w: R,
+}
+
+/// An affine map.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Affine<R> {
+    /// Factor.
+    pub scale: R,
+    /// Summand.
+    pub offset: R,
+}
+
+/// The affine map of the point, its square root and its weight's smaller half.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn affine<R: Real>(#[uniform] map: &Affine<R>, #[element] pair: Pair<R>) -> Pair<R> {
+    let x = (pair.x * map.scale + map.offset).abs();
+    Pair {
+        x: x.sqrt() / (x + lit!(1.0)),
+        w: pair.w.min(pair.w * lit!(0.5)).floor(),
+    }
+}
+
+/// An index and what to add to what is found there; every kind of field that is no float.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
+#[repr(C)]
+pub struct Step {
+    /// A signed pair.
+    pub delta: IVec2,
+    /// An unsigned number.
+    pub jump: u32,
+    /// A signed number.
+    pub turn: i32,
+}
+
+/// The sum of two elements of a table, of which one is found by the invocation's own step.
+#[kernel(compute, threads(64))]
+pub fn gather(
+    #[index] i: u32,
+    #[storage] table: Buffer<'_, f32>,
+    #[element] step: Step,
+    #[constant(id = 3, default = 2)] stride: u32,
+) -> f32 {
+    let sum = step
+        .delta
+        .x
+        .wrapping_add(step.delta.y)
+        .wrapping_add(step.turn);
+    let far = (i.wrapping_mul(stride).wrapping_add(step.jump) ^ sum as u32) % table.len();
+    table.get(i % table.len()) + table.get(far)
+}
+
+/// Counts the numbers by their two lowest bits, and keeps the largest.
+#[kernel(compute, threads(64))]
+pub fn histogram(#[element] x: u32, #[atomic] bins: Atomics<'_>) {
+    bins.add(x & 3, 1);
+    bins.max(4, x);
+}
+
+/// Inclusive prefix sums within each workgroup (Hillis and Steele).
+#[kernel(compute, threads(64), phases(6))]
+pub fn scan(
+    #[phase] phase: u32,
+    #[group] sums: Group<'_, u32, 64>,
+    #[element] x: Option<u32>,
+) -> u32 {
+    if phase == 0 {
+        return x.unwrap_or(0);
+    }
+    let reach = 1 << (phase - 1);
+    if sums.me() < reach {
+        sums.own()
+    } else {
+        sums.own().wrapping_add(sums.get(sums.me() - reach))
+    }
+}
+
+/// The largest number of each workgroup.
+#[kernel(compute, threads(64), phases(6), per_group)]
+pub fn maximum(
+    #[phase] phase: u32,
+    #[group] largest: Group<'_, f32, 64>,
+    #[element] x: Option<f32>,
+) -> f32 {
+    if phase == 0 {
+        return x.unwrap_or(-3.0e38);
+    }
+    let reach = 32 >> (phase - 1);
+    let other = (largest.me() + reach) & 63;
+    Real::max(largest.own(), largest.get(other))
+}
+
+/// A checkerboard of two values.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Checker {
+    /// Values of the fields.
+    pub colours: [Vec4; 2],
+    /// Width and height of a field in texels, at least 1.
+    pub field: UVec2,
+    /// Fills the structure up.
+    pub padding: UVec2,
+}
+
+/// A checkerboard.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba8unorm, rgba16float),
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "one step of the format: rounding of a tie is the driver's choice"
+    )
+)]
+pub fn checker(#[index] at: UVec2, #[uniform] checker: &Checker) -> Vec4 {
+    let x = at.x / (checker.field.x | 1);
+    let y = at.y / (checker.field.y | 1);
+    if (x + y) & 1 == 0 {
+        checker.colours[0]
+    } else {
+        checker.colours[1]
+    }
+}
+
+/// The index itself, in three dimensions.
+#[kernel(compute, threads(4, 4, 4), texture(rgba32float))]
+pub fn gradient(#[index] at: UVec3) -> Vec4 {
+    Vec4::new(at.x as f32, at.y as f32, at.z as f32, 1.0)
+}
+
+/// The mean of four texels.
+#[kernel(compute, threads(8, 8), texture(r32float))]
+pub fn downsample(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> f32 {
+    let last = source.size() - UVec2::ONE;
+    let tap = |dx: u32, dy: u32| {
+        let (x, y) = (2 * at.x + dx, 2 * at.y + dy);
+        let x = if x > last.x { last.x } else { x };
+        let y = if y > last.y { last.y } else { y };
+        source.load(UVec2::new(x, y)).x
+    };
+    (tap(0, 0) + tap(1, 0) + (tap(0, 1) + tap(1, 1))) * 0.25
+}
+
+/// Integers in a texture.
+#[kernel(compute, threads(8, 8), texture(rgba32uint))]
+pub fn texel_counts(#[index] at: UVec2) -> UVec4 {
+    UVec4::new(at.x, at.y, at.x ^ at.y, at.x.wrapping_mul(at.y))
+}
+
+/// The last sample of each texel.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn last_sample(#[index] at: UVec2, #[texture] source: Texture2dMultisampled<'_>) -> Vec4 {
+    let last = source.size() - UVec2::ONE;
+    let x = if at.x > last.x { last.x } else { at.x };
+    let y = if at.y > last.y { last.y } else { at.y };
+    source.load(UVec2::new(x, y), 3)
+}
+
+/// A texture through a sampler, at points that the rows give.
+#[kernel(
+    compute,
+    threads(64),
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "interpolation weights may be rounded to 8 bits"
+    )
+)]
+pub fn filtered(
+    #[element] uv: Vec2,
+    #[texture] source: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+) -> f32 {
+    source.sample(sampler, uv).x
+}
+
+/// Texels of a volume.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn slice(#[index] at: UVec2, #[texture] volume: Texture3d<'_>) -> Vec4 {
+    let size = volume.size();
+    volume.load(UVec3::new(
+        at.x % size.x,
+        at.y % size.y,
+        (at.x + at.y) % size.z,
+    ))
+}
+
+/// A vertex moved by a uniform, with a varying.
+#[kernel(vertex)]
+pub fn corner(
+    #[attribute] position: Vec3,
+    #[attribute] colour: Vec4,
+    #[uniform] map: &Affine<f32>,
+) -> (Vec4, Vec4) {
+    let place = |x: f32| x * map.scale + map.offset;
+    (
+        Vec4::new(place(position.x), place(position.y), position.z, 1.0),
+        colour,
+    )
+}
+
+/// A colour times a uniform's, and its luminance to a second target.
+#[kernel(fragment)]
+pub fn tint(#[varying] colour: Vec4, #[uniform] map: &Affine<f32>) -> (Vec4, Vec4) {
+    let tinted = colour * map.scale;
+    let sum = tinted.x + tinted.y + tinted.z;
+    (tinted, Vec4::new(sum, map.offset, 0.0, 1.0))
+}
