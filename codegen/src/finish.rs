@@ -96,6 +96,7 @@ pub fn optimise(words: &[u32], name: &str) -> Result<Vec<u32>, Failure> {
         passes
             .register_pass(Passes::StripDebugInfo)
             .register_performance_passes()
+            .register_pass(Passes::LoopInvariantCodeMotion)
             .register_pass(Passes::IfConversion)
             .register_pass(Passes::LocalRedundancyElimination)
             .register_pass(Passes::RedundancyElimination)

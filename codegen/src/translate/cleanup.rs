@@ -7,6 +7,9 @@
 //! - [`fold_entry_point`] puts the inner function into the entry point: inputs are its arguments,
 //!   outputs its return value;
 //! - [`unwrap_blocks`] takes the structure off buffers: `input[i]`, not `input.elements[i]`;
+//! - [`plain_loops`] ends loops with `break` in their body instead of a condition at their end;
+//! - [`constant_indices`] makes `v[0]` with a constant index `v.x`;
+//! - [`drop_dead_locals`] drops variables that are only written;
 //! - [`drop_last_return`] drops the `return` at the end;
 //! - [`name_loads`] names what is loaded after the member or structure that it comes from.
 //!
@@ -429,6 +432,410 @@ fn skip_member(function: &mut naga::Function, global: GlobalHandle) {
     let mut body = std::mem::take(&mut function.body);
     mend_emits(&mut body, &function.expressions);
     function.body = body;
+}
+
+/// Loops without a `continuing` block or condition at the end.
+///
+/// This is not for looks alone: naga's HLSL, MSL and GLSL writers put that block before the body
+/// and write its condition out again there, from variables that have the next turn's values by
+/// then. What remains of such loops, [`has_late_loops`] tells.
+pub fn plain_loops(module: &mut Module) {
+    functions_mut(module).for_each(|function| {
+        let mut body = std::mem::take(&mut function.body);
+        plain_loops_in(&mut body, &function.expressions);
+        forward_stores(&mut body, &function.expressions);
+        function.body = body;
+    });
+}
+
+/// Whether a loop has a `continuing` block or a condition at its end.
+pub fn has_late_loops(module: &Module) -> bool {
+    let mut late = false;
+    functions(module).for_each(|function| {
+        each_statement(&function.body, &mut |statement| {
+            if let Statement::Loop {
+                continuing,
+                break_if,
+                ..
+            } = statement
+            {
+                late |= !continuing.is_empty() || break_if.is_some();
+            }
+        });
+    });
+    late
+}
+
+fn plain_loops_in(block: &mut Block, expressions: &Arena<Expression>) {
+    for statement in block.iter_mut() {
+        match statement {
+            Statement::Block(inner) => plain_loops_in(inner, expressions),
+            Statement::If { accept, reject, .. } => {
+                plain_loops_in(accept, expressions);
+                plain_loops_in(reject, expressions);
+            }
+            Statement::Switch { cases, .. } => {
+                cases
+                    .iter_mut()
+                    .for_each(|case| plain_loops_in(&mut case.body, expressions));
+            }
+            Statement::Loop {
+                body,
+                continuing,
+                break_if,
+            } => {
+                plain_loops_in(body, expressions);
+                plain_loops_in(continuing, expressions);
+                if let Some(Statement::Continue) = body.last() {
+                    let last = body.len() - 1;
+                    body.cull(last..);
+                }
+                if continues(body) {
+                    continue;
+                }
+                let end = std::mem::take(continuing);
+                match break_if.take() {
+                    None => append(body, end),
+                    Some(condition) => end_loop(body, end, condition, expressions),
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Whether a block goes on to the next turn of the loop around it before its end.
+fn continues(block: &Block) -> bool {
+    block.iter().any(|statement| match statement {
+        Statement::Continue => true,
+        Statement::Block(inner) => continues(inner),
+        Statement::If { accept, reject, .. } => continues(accept) || continues(reject),
+        Statement::Switch { cases, .. } => cases.iter().any(|case| continues(&case.body)),
+        _ => false,
+    })
+}
+
+fn append(block: &mut Block, more: Block) {
+    for (statement, span) in more.span_into_iter() {
+        block.push(statement, span);
+    }
+}
+
+/// Puts what happens at a loop's end into its body: `if condition { break }`.
+///
+/// rust-gpu's loops test the same condition twice: once around what they do, once at their end.
+/// Where nothing that happens in between can be seen after the loop, once is enough.
+fn end_loop(
+    body: &mut Block,
+    end: Block,
+    condition: Handle<Expression>,
+    expressions: &Arena<Expression>,
+) {
+    let negated = match expressions[condition] {
+        Expression::Unary {
+            op: naga::UnaryOperator::LogicalNot,
+            expr,
+        } => Some(expr),
+        _ => None,
+    };
+    let place = body
+        .iter()
+        .rposition(|statement| matches!(statement, Statement::If { .. }));
+    if let Some(place) = place {
+        let Statement::If {
+            condition: tested,
+            accept,
+            reject,
+        } = &body[place]
+        else {
+            return;
+        };
+        let stays = if negated == Some(*tested) {
+            Some((true, reject))
+        } else if condition == *tested {
+            Some((false, accept))
+        } else {
+            None
+        };
+        if let Some((stays_if, leaving)) = stays {
+            let after = Block::from_vec(body[place + 1..].to_vec());
+            let mut stored = HashSet::new();
+            let simple = [leaving, &after, &end]
+                .iter()
+                .all(|part| only_stores(part, expressions, &mut stored));
+            if simple && !loaded_outside(&stored, body, &end, expressions) {
+                let tested = *tested;
+                let mut staying = if stays_if {
+                    accept.clone()
+                } else {
+                    reject.clone()
+                };
+                append(&mut staying, after);
+                append(&mut staying, end);
+                let mut leave = Block::new();
+                leave.push(Statement::Break, Span::UNDEFINED);
+                let (accept, reject) = if stays_if {
+                    (staying, leave)
+                } else {
+                    (leave, staying)
+                };
+                body.cull(place..);
+                body.push(
+                    Statement::If {
+                        condition: tested,
+                        accept,
+                        reject,
+                    },
+                    Span::UNDEFINED,
+                );
+                return;
+            }
+        }
+    }
+    append(body, end);
+    let mut leave = Block::new();
+    leave.push(Statement::Break, Span::UNDEFINED);
+    body.push(
+        Statement::If {
+            condition,
+            accept: leave,
+            reject: Block::new(),
+        },
+        Span::UNDEFINED,
+    );
+}
+
+/// The local variable that an expression points to, if it is one as a whole.
+fn local(
+    expressions: &Arena<Expression>,
+    pointer: Handle<Expression>,
+) -> Option<Handle<LocalVariable>> {
+    match expressions[pointer] {
+        Expression::LocalVariable(local) => Some(local),
+        _ => None,
+    }
+}
+
+/// Whether a block does nothing but compute and store to local variables, which are collected.
+fn only_stores(
+    block: &Block,
+    expressions: &Arena<Expression>,
+    stored: &mut HashSet<Handle<LocalVariable>>,
+) -> bool {
+    block.iter().all(|statement| match statement {
+        Statement::Emit(_) => true,
+        Statement::Store { pointer, .. } => match local(expressions, *pointer) {
+            Some(local) => {
+                stored.insert(local);
+                true
+            }
+            None => false,
+        },
+        _ => false,
+    })
+}
+
+/// Whether any of the variables is used by an expression that a loop does not itself emit.
+fn loaded_outside(
+    variables: &HashSet<Handle<LocalVariable>>,
+    body: &Block,
+    end: &Block,
+    expressions: &Arena<Expression>,
+) -> bool {
+    let mut inside = HashSet::new();
+    for block in [body, end] {
+        each_statement(block, &mut |statement| {
+            if let Statement::Emit(range) = statement {
+                inside.extend(range.clone());
+            }
+        });
+    }
+    expressions.iter().any(|(handle, expression)| {
+        let pointer = match *expression {
+            Expression::Load { pointer } => pointer,
+            Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => base,
+            _ => return false,
+        };
+        local(expressions, pointer).is_some_and(|local| variables.contains(&local))
+            && !inside.contains(&handle)
+    })
+}
+
+/// Stores what was stored to another variable before, not what is loaded from that.
+fn forward_stores(block: &mut Block, expressions: &Arena<Expression>) {
+    let mut stored: HashMap<Handle<LocalVariable>, Handle<Expression>> = HashMap::new();
+    let mut loaded: HashMap<Handle<Expression>, Handle<Expression>> = HashMap::new();
+    for statement in block.iter_mut() {
+        match statement {
+            Statement::Emit(range) => {
+                for handle in range.clone() {
+                    if let Expression::Load { pointer } = expressions[handle] {
+                        let value =
+                            local(expressions, pointer).and_then(|local| stored.get(&local));
+                        loaded.extend(value.map(|value| (handle, *value)));
+                    }
+                }
+            }
+            Statement::Store { pointer, value } => {
+                if let Some(original) = loaded.get(value) {
+                    *value = *original;
+                }
+                match local(expressions, *pointer) {
+                    Some(local) => {
+                        stored.insert(local, *value);
+                    }
+                    None => stored.clear(),
+                }
+            }
+            other => {
+                // It may store.
+                stored.clear();
+                match other {
+                    Statement::Block(inner) => forward_stores(inner, expressions),
+                    Statement::If { accept, reject, .. } => {
+                        forward_stores(accept, expressions);
+                        forward_stores(reject, expressions);
+                    }
+                    Statement::Switch { cases, .. } => {
+                        cases
+                            .iter_mut()
+                            .for_each(|case| forward_stores(&mut case.body, expressions));
+                    }
+                    Statement::Loop {
+                        body, continuing, ..
+                    } => {
+                        forward_stores(body, expressions);
+                        forward_stores(continuing, expressions);
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+}
+
+/// Drops stores to local variables that nothing reads. The module must be compact: the variables
+/// themselves go with [`drop_unused_locals`] after it is compacted again.
+pub fn drop_dead_locals(module: &mut Module) {
+    functions_mut(module).for_each(|function| {
+        let expressions = &function.expressions;
+        let mut read = HashSet::new();
+        for (_, expression) in expressions.iter() {
+            match *expression {
+                Expression::Load { pointer: base }
+                | Expression::Access { base, .. }
+                | Expression::AccessIndex { base, .. } => read.extend(local(expressions, base)),
+                _ => {}
+            }
+        }
+        each_statement(&function.body, &mut |statement| match statement {
+            Statement::Call { arguments, .. } => {
+                read.extend(
+                    arguments
+                        .iter()
+                        .filter_map(|argument| local(expressions, *argument)),
+                );
+            }
+            Statement::Emit(_) | Statement::Store { .. } => {}
+            Statement::Atomic { pointer, .. } | Statement::WorkGroupUniformLoad { pointer, .. } => {
+                read.extend(local(expressions, *pointer));
+            }
+            _ => {}
+        });
+        let mut body = std::mem::take(&mut function.body);
+        drop_stores(&mut body, &|pointer| {
+            local(expressions, pointer).is_some_and(|local| !read.contains(&local))
+        });
+        function.body = body;
+    });
+}
+
+fn drop_stores(block: &mut Block, is_dead: &impl Fn(Handle<Expression>) -> bool) {
+    let old = std::mem::take(block);
+    for (mut statement, span) in old.span_into_iter() {
+        match &mut statement {
+            Statement::Store { pointer, .. } if is_dead(*pointer) => continue,
+            Statement::Block(inner) => drop_stores(inner, is_dead),
+            Statement::If { accept, reject, .. } => {
+                drop_stores(accept, is_dead);
+                drop_stores(reject, is_dead);
+            }
+            Statement::Switch { cases, .. } => {
+                cases
+                    .iter_mut()
+                    .for_each(|case| drop_stores(&mut case.body, is_dead));
+            }
+            Statement::Loop {
+                body, continuing, ..
+            } => {
+                drop_stores(body, is_dead);
+                drop_stores(continuing, is_dead);
+            }
+            _ => {}
+        }
+        block.push(statement, span);
+    }
+}
+
+/// Drops local variables that no expression names. The module must be compact.
+pub fn drop_unused_locals(module: &mut Module) {
+    functions_mut(module).for_each(|function| {
+        let used: HashSet<_> = function
+            .expressions
+            .iter()
+            .filter_map(|(handle, _)| local(&function.expressions, handle))
+            .collect();
+        let mut kept = Arena::new();
+        let mut moved = HashMap::new();
+        for (handle, variable) in function.local_variables.iter() {
+            if used.contains(&handle) {
+                moved.insert(handle, kept.append(variable.clone(), Span::UNDEFINED));
+            }
+        }
+        for (_, expression) in function.expressions.iter_mut() {
+            if let Expression::LocalVariable(local) = expression {
+                *local = moved[local];
+            }
+        }
+        function.local_variables = kept;
+    });
+}
+
+/// Indices that are constants become members: `v.x`, not `v[0u]`.
+pub fn constant_indices(module: &mut Module) {
+    let constants: HashMap<Handle<naga::Constant>, u32> = module
+        .constants
+        .iter()
+        .filter_map(|(handle, constant)| {
+            Some((handle, small(&module.global_expressions[constant.init])?))
+        })
+        .collect();
+    functions_mut(module).for_each(|function| {
+        let handles: Vec<_> = function
+            .expressions
+            .iter()
+            .map(|(handle, _)| handle)
+            .collect();
+        for handle in handles {
+            if let Expression::Access { base, index } = function.expressions[handle] {
+                let index = match &function.expressions[index] {
+                    Expression::Constant(constant) => constants.get(constant).copied(),
+                    other => small(other),
+                };
+                if let Some(index) = index {
+                    function.expressions[handle] = Expression::AccessIndex { base, index };
+                }
+            }
+        }
+    });
+}
+
+fn small(expression: &Expression) -> Option<u32> {
+    match *expression {
+        Expression::Literal(naga::Literal::U32(value)) => Some(value),
+        Expression::Literal(naga::Literal::I32(value)) => u32::try_from(value).ok(),
+        _ => None,
+    }
 }
 
 /// Drops `return` where the function ends anyway.

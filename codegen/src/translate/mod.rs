@@ -283,6 +283,8 @@ impl Ir {
             let mut module = self.module.clone();
             let folded = cleanup::fold_entry_point(&mut module);
             cleanup::unwrap_blocks(&mut module);
+            cleanup::plain_loops(&mut module);
+            cleanup::constant_indices(&mut module);
             cleanup::drop_last_return(&mut module);
             let members: Vec<String> = (0..kernel.outputs.len())
                 .map(|index| crate::spirv::names::output_name(kernel, index))
@@ -291,6 +293,10 @@ impl Ir {
             cleanup::name_result(&mut module, &result, &members);
             validate(&module, name)?;
             naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
+            cleanup::drop_dead_locals(&mut module);
+            validate(&module, name)?;
+            naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
+            cleanup::drop_unused_locals(&mut module);
             let info = validate(&module, name)?;
             cleanup::name_loads(&mut module, &info);
             let info = validate(&module, name)?;
@@ -315,7 +321,7 @@ impl Ir {
         kernel: &Kernel,
         options: &Options,
     ) -> Result<Written, Failure> {
-        if let Some(reason) = self.unsupported(language, &kernel.stage) {
+        if let Some(reason) = self.unsupported(language, &kernel.stage, options) {
             return Ok(Written::Unsupported(reason));
         }
         let job = Job {
@@ -344,12 +350,26 @@ impl Ir {
     }
 
     /// Why a language cannot express the kernel, where that can be told without trying.
-    fn unsupported(&self, language: Language, stage: &Stage) -> Option<String> {
+    fn unsupported(&self, language: Language, stage: &Stage, options: &Options) -> Option<String> {
         let es = matches!(language, Language::Essl310 | Language::Essl300);
+        let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
+        if language == Language::Hlsl && old && self.has_wide(ScalarKind::Float) {
+            return Some(format!(
+                "HLSL loads 64-bit floating-point numbers from buffers from shader model 6.2 on, \
+                 not in {}",
+                options.shader_model
+            ));
+        }
         if self.has_wide(ScalarKind::Float)
             && (es || matches!(language, Language::Wgsl | Language::Msl))
         {
             return Some(format!("{language} has no 64-bit floating-point numbers"));
+        }
+        if language != Language::Wgsl && cleanup::has_late_loops(&self.module) {
+            return Some(format!(
+                "naga's {language} writer would re-evaluate a loop's condition at its end; \
+                 write the loop with one test at its beginning"
+            ));
         }
         let wide_integers = self.has_wide(ScalarKind::Uint) || self.has_wide(ScalarKind::Sint);
         if wide_integers && (es || language == Language::Wgsl) {
