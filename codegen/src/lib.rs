@@ -25,6 +25,7 @@ pub mod finish;
 pub mod headers;
 mod language;
 pub mod manifest;
+pub mod scaffold;
 pub mod source_hash;
 pub mod spirv;
 pub mod translate;

@@ -1,0 +1,136 @@
+//! Makes a new kernel crate: one kernel, a test that its lanes agree with its scalar run, a
+//! README.
+
+use std::path::{Path, PathBuf};
+
+use crate::VERSION;
+use crate::error::{During, Error, Result};
+use crate::files::write_whole;
+
+/// Where the new crate gets the DSL from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Dsl {
+    /// From a folder: within a checkout.
+    Path(PathBuf),
+    /// From the registry.
+    Version(String),
+}
+
+impl Dsl {
+    /// The checkout's DSL if `start` or a folder above it is a checkout, else this version.
+    pub fn find(start: &Path) -> Self {
+        start
+            .ancestors()
+            .map(|folder| folder.join("kernels/dsl"))
+            .find(|dsl| dsl.join("Cargo.toml").is_file())
+            .map_or_else(|| Self::Version(VERSION.into()), Self::Path)
+    }
+}
+
+/// Makes a kernel crate in `folder`, which must not be there or be empty. Its name is the
+/// folder's. Gives the files that were written.
+///
+/// # Errors
+///
+/// The folder's name is no crate's name, there is something in it, or it cannot be written.
+pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
+    let fail = |problem: String| Error::Scaffold {
+        path: folder.to_owned(),
+        problem,
+    };
+    let folder_path = std::path::absolute(folder).during("resolve", folder)?;
+    let name = folder_path
+        .file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let fits = name.starts_with(|letter: char| letter.is_ascii_lowercase())
+        && name.chars().all(|letter| {
+            letter.is_ascii_lowercase() || letter.is_ascii_digit() || matches!(letter, '_' | '-')
+        });
+    if !fits {
+        return Err(fail(format!(
+            "`{name}` is no name for a crate: use small letters, digits, - and _, a letter first"
+        )));
+    }
+    if ["test", "core", "std", "alloc", "hankel-dsl"].contains(&name.as_str()) {
+        return Err(fail(format!("`{name}` is another crate's name")));
+    }
+    match std::fs::read_dir(&folder_path) {
+        Ok(mut entries) if entries.next().is_some() => return Err(fail("it is not empty".into())),
+        Ok(_) => {}
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(fail(error.to_string())),
+    }
+    let dependency = match dsl {
+        Dsl::Path(path) => {
+            let path = std::path::absolute(path).during("resolve", path)?;
+            format!(
+                "{{ path = {:?} }}",
+                relative(&folder_path, &path)
+                    .display()
+                    .to_string()
+                    .replace('\\', "/")
+            )
+        }
+        Dsl::Version(version) => format!("{version:?}"),
+    };
+    let library = name.replace('-', "_");
+    let fill = |text: &str| {
+        text.replace("@NAME@", &name)
+            .replace("@LIBRARY@", &library)
+            .replace("@DSL@", &dependency)
+    };
+    let mut written = Vec::new();
+    for (file, text) in FILES {
+        let path = folder_path.join(file);
+        write_whole(&path, fill(text).as_bytes())?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// The way from one folder to another; the other itself where they share nothing.
+fn relative(from: &Path, to: &Path) -> PathBuf {
+    let shared = from
+        .components()
+        .zip(to.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    // Only the root in common: the way by name is the clearer one.
+    if shared < 2 {
+        return to.to_owned();
+    }
+    let up = from.components().skip(shared).map(|_| "..");
+    up.map(PathBuf::from)
+        .chain(
+            to.components()
+                .skip(shared)
+                .map(|part| part.as_os_str().into()),
+        )
+        .collect()
+}
+
+const FILES: [(&str, &str); 5] = [
+    ("Cargo.toml", include_str!("scaffold/Cargo.toml.txt")),
+    (".gitignore", "/target\n/shaders\n"),
+    ("README.md", include_str!("scaffold/README.md")),
+    ("src/lib.rs", include_str!("scaffold/lib.rs.txt")),
+    ("tests/parity.rs", include_str!("scaffold/parity.rs.txt")),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relative_paths() {
+        assert_eq!(
+            relative(Path::new("/a/b/c"), Path::new("/a/b/d/e")),
+            Path::new("../d/e")
+        );
+        assert_eq!(
+            relative(Path::new("/x/c"), Path::new("/y/e")),
+            Path::new("/y/e")
+        );
+    }
+}
