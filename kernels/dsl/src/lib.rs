@@ -26,7 +26,7 @@
 //! /// Half the square of the abscissa.
 //! #[kernel(compute, threads(64), precision(f32, f64))]
 //! pub fn parabola<R: Real>(#[element] point: Point<R>) -> Height<R> {
-//!     Height { y: lit!(0.5) * point.x * point.x }
+//!     Height { y: point.x * point.x * lit!(0.5) }
 //! }
 //!
 //! hankel_dsl::kernels![parabola];

@@ -107,7 +107,8 @@ pub trait Real:
 /// A number of the [`Real`] type that the context asks for, rounded from the `f64` given:
 /// `x * lit!(0.1)`.
 ///
-/// The rounding happens when the kernel is compiled, so a shader in `f32` never mentions `f64`.
+/// It stands on the right of an operator: on the left, Rust does not infer its type. The rounding
+/// happens when the kernel is compiled, so a shader in `f32` never mentions `f64`.
 ///
 /// ```
 /// use hankel_dsl::{Real, lit};

@@ -1,7 +1,8 @@
 //! The host's half: the native executor and the description of each entry point.
 
 use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use quote::{format_ident, quote, quote_spanned};
+use syn::spanned::Spanned;
 
 use crate::kernel::{Compute, Kernel, Role, Stage, Texture, Variant};
 use crate::shader::{output_name, texture_type};
@@ -48,8 +49,8 @@ impl Kernel {
                 let message = format!(
                     "uniform `{name}`: an array in a uniform buffer needs elements of a multiple of 16 bytes, such as Vec4"
                 );
-                quote! {
-                    const { assert!(<#concrete as layout::Element>::UNIFORM, #message) };
+                quote_spanned! {ty.span()=>
+                    const _: () = assert!(<#concrete as layout::Element>::UNIFORM, #message);
                 }
             })
             .collect()

@@ -1,0 +1,10 @@
+#![allow(unused_imports)]
+use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+
+/// Doubles.
+#[kernel(compute, threads(8, 8))]
+fn double(#[element] x: f32) -> f32 {
+    2.0 * x
+}
+
+fn main() {}

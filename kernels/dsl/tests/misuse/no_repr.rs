@@ -1,0 +1,9 @@
+#![allow(unused_imports)]
+use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+
+#[derive(Clone, Copy, Element)]
+struct Light {
+    strength: f32,
+}
+
+fn main() {}

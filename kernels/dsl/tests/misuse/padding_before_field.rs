@@ -1,0 +1,11 @@
+#![allow(unused_imports)]
+use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+
+#[derive(Clone, Copy, Element)]
+#[repr(C)]
+struct Light {
+    strength: f32,
+    direction: Vec3,
+}
+
+fn main() {}

@@ -1,0 +1,10 @@
+#![allow(unused_imports)]
+use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+
+/// A sample.
+#[kernel(compute, threads(64))]
+fn sample(#[element] uv: Vec2, #[texture] map: Texture2d<'_>, #[sampler] sampler: Sampler) -> f32 {
+    map.sample(sampler, uv).x
+}
+
+fn main() {}

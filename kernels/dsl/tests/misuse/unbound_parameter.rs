@@ -1,0 +1,10 @@
+#![allow(unused_imports)]
+use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+
+/// Doubles.
+#[kernel(compute, threads(64))]
+fn double(x: f32) -> f32 {
+    2.0 * x
+}
+
+fn main() {}

@@ -1,0 +1,10 @@
+#![allow(unused_imports)]
+use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+
+/// Dangerous.
+#[kernel(compute, threads(64))]
+unsafe fn dangerous(#[element] x: f32) -> f32 {
+    x
+}
+
+fn main() {}
