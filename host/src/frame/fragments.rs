@@ -75,6 +75,13 @@ impl Fragments {
         self.count
     }
 
+    /// Share of the pixels whose samples do not all see the same.
+    #[must_use]
+    pub fn edges(&self) -> f64 {
+        let mixed = |p: &&Pixel| p.triangles.iter().any(|&t| t != p.triangles[0]);
+        self.pixels.iter().filter(mixed).count() as f64 / self.pixels.len().max(1) as f64
+    }
+
     /// Values at the fragments, interpolated with perspective at their pixels' centres.
     #[must_use]
     pub fn interpolate(&self, mesh: &Mesh, lens: &Lens, varyings: &[Varying]) -> Vec<Vec<f32>> {

@@ -99,6 +99,9 @@ pub struct Rendering {
     pub triangles: usize,
     /// Edge of the shadow map's texels in world units, along x and y.
     pub texel: [f32; 2],
+    /// Share of the pixels whose samples see different triangles, where that was counted
+    /// (natively): where rounding may decide what a sample sees.
+    pub edges: Option<f64>,
     /// What was done, and what was not.
     pub plan: Plan,
     /// How long it took, in order.

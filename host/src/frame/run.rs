@@ -45,6 +45,7 @@ pub(super) struct Frame<'a> {
     caster: Option<Caster<'a>>,
     timings: Vec<Timing>,
     made: Vec<TextureId>,
+    edges: Option<f64>,
 }
 
 /// The mesh on the device.
@@ -140,6 +141,7 @@ impl<'a> Frame<'a> {
             caster: native.then(|| Caster::new(mesh)),
             timings: vec![Timing::new("set-up", start.elapsed())],
             made: Vec::new(),
+            edges: None,
             device,
             scene,
             mesh,
@@ -234,6 +236,7 @@ impl<'a> Frame<'a> {
             device: self.device.name().into(),
             triangles: self.mesh.triangles.len(),
             texel: self.light.texel,
+            edges: self.edges,
             plan: self.plan,
             timings: self.timings,
         })
@@ -270,13 +273,13 @@ impl<'a> Frame<'a> {
         let uniform = transform(self.light.clip_from_world);
         if self.caster.is_some() {
             let outputs = self.vertices("light_depth", &[Bind::Bytes(bytes_of(&uniform))])?;
-            let clip: &[Vec4] = cast_slice(&outputs[0]);
+            let clip: Vec<Vec4> = bytemuck::pod_collect_to_vec(&outputs[0]);
             let Some(caster) = &self.caster else {
                 return Err(no_caster());
             };
             let lens = Lens::new(self.light.clip_from_world, size, size);
             let progress = &mut *self.progress;
-            let depths = caster.depths(&lens, clip, size, &mut |share| progress.advance(share));
+            let depths = caster.depths(&lens, &clip, size, &mut |share| progress.advance(share));
             let shape = TextureShape::d2(size, size, TexelFormat::R32Float).multisampled(samples);
             let map = self.texture("depth", &shape)?;
             self.device
@@ -454,6 +457,7 @@ impl<'a> Frame<'a> {
         let fragments = Fragments::find(caster, &lens, size, &mut |share| {
             progress.advance(share * 0.7)
         });
+        self.edges = Some(fragments.edges());
         let vertices = self.vertices("surface", &[camera])?;
         let surface = find(&self.entries, "surface")?.kernel.clone();
         let fragment = find(&self.entries, kernel)?.kernel.clone();
@@ -461,8 +465,8 @@ impl<'a> Frame<'a> {
         let values = fragments.interpolate(self.mesh, &lens, &varyings);
         let shaded = self.run_over(kernel, constants, &values, args, fragments.count());
         let shaded = shaded.map_err(during)?;
-        let colours: &[Vec4] = cast_slice(&shaded);
-        Ok(Shaded::Here(resolve(&fragments, colours)))
+        let colours: Vec<Vec4> = bytemuck::pod_collect_to_vec(&shaded);
+        Ok(Shaded::Here(resolve(&fragments, &colours)))
     }
 
     /// Runs the fragment kernel over arrays of varyings; gives its target's bytes.

@@ -23,7 +23,7 @@
 //! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1], for rgba16unorm
 //! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
 //! moment_bias = 6e-5
-//! depth_bias = 0.0
+//! depth_bias = 0.0                # default; hausdorff 0.001, pcf 0.002
 //! leak_cut = 0.02
 //!
 //! [output]
@@ -184,6 +184,24 @@ impl Shadow {
     #[must_use]
     pub const fn recommended_bias(depth_range: DepthRange, format: MapFormat) -> f32 {
         Self::published(depth_range, format).strength
+    }
+
+    /// The depth bias unless given.
+    ///
+    /// - Hamburger and variance: none. The moment bias spreads a single surface a little, which
+    ///   keeps it from shading itself.
+    /// - Hausdorff: 1e-3. The published biases put their weight at the ends of the depth range,
+    ///   where the Hausdorff problem discards it: a surface stays sharp, and what 16 bits round
+    ///   would decide between light and full shadow.
+    /// - Percentage-closer filtering: 2e-3. The comparison has no slack, and a slope would be
+    ///   shaded by its own texels.
+    #[must_use]
+    pub const fn default_depth_bias(technique: Technique) -> f32 {
+        match technique {
+            Technique::Hamburger | Technique::Vsm => 0.0,
+            Technique::Hausdorff => 1e-3,
+            Technique::Pcf => 2e-3,
+        }
     }
 
     /// The published bias for a map.

@@ -61,10 +61,24 @@ impl Loader<'_> {
                 ));
             }
         }
-        let Gltf { document, mut blob } = match Gltf::from_slice(bytes) {
-            Ok(gltf) => gltf,
-            Err(e) => return self.fail(format!("no valid glTF 2.0: {e}")),
+        let bad = |e: gltf::Error| SceneError::Model {
+            file: self.file.to_path_buf(),
+            problem: format!("no valid glTF 2.0: {e}"),
         };
+        let Gltf { document, mut blob } =
+            Gltf::from_slice_without_validation(bytes).map_err(bad)?;
+        let root = document.into_json();
+        // The validation that comes next takes this for granted.
+        for (i, mesh) in root.meshes.iter().enumerate() {
+            let attributes = mesh.primitives.iter().flat_map(|p| p.attributes.values());
+            if attributes
+                .into_iter()
+                .any(|a| a.value() >= root.accessors.len())
+            {
+                return self.fail(format!("mesh {i}: an attribute's accessor is missing"));
+            }
+        }
+        let document = gltf::Document::from_json(root).map_err(bad)?;
         let buffers = document
             .buffers()
             .map(|b| self.buffer(&b, &mut blob))

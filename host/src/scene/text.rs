@@ -290,15 +290,17 @@ impl Reader<'_> {
         if filter.is_multiple_of(2) {
             return self.refuse(filter_span, "shadow.filter", filter, "odd");
         }
+        let technique = s.technique.unwrap_or(d.technique);
         let bias = Shadow::recommended_bias(depth_range, format);
+        let depth_bias = Shadow::default_depth_bias(technique);
         Ok(Shadow {
-            technique: s.technique.unwrap_or(d.technique),
+            technique,
             size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,
             depth_range,
             format,
             filter,
             moment_bias: self.number("shadow.moment_bias", s.moment_bias, bias, 0.0..=0.1)?,
-            depth_bias: self.number("shadow.depth_bias", s.depth_bias, d.depth_bias, 0.0..=0.1)?,
+            depth_bias: self.number("shadow.depth_bias", s.depth_bias, depth_bias, 0.0..=0.1)?,
             leak_cut: self.number("shadow.leak_cut", s.leak_cut, d.leak_cut, 0.0..=0.9)?,
         })
     }

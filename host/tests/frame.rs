@@ -1,0 +1,324 @@
+//! The frame without a GPU: plans, and native pictures against rays.
+
+use std::path::Path;
+
+use hankel_dsl::glam::{DVec3, Vec3};
+use hankel_host::device::{Backend, open};
+use hankel_host::frame::cast::{Caster, Lens, Segment};
+use hankel_host::frame::{
+    FrameError, NoShaders, Pass, Picture, Plan, Progress, Quiet, render, render_on,
+};
+use hankel_host::scene::{CameraView, Procedural, Scene};
+
+fn scene(shadow: &str) -> Scene {
+    let text = format!(
+        r#"
+        [geometry]
+        procedural = "box"
+        [camera]
+        eye = [2.0, 6.0, 4.0]
+        target = [0.0, 0.2, 0.0]
+        [light]
+        direction = [1.0, -1.0, 0.4]
+        [shadow]
+        {shadow}
+        [output]
+        width = 192
+        height = 128
+        "#
+    );
+    Scene::parse(&text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn plan(shadow: &str) -> (Vec<String>, String) {
+    let plan = Plan::new(&scene(shadow));
+    let passes = plan.passes.iter().map(|p| p.name().to_string()).collect();
+    (passes, plan.to_string())
+}
+
+#[test]
+fn a_plan_holds_what_is_needed_and_says_what_is_not() {
+    let (passes, text) = plan("");
+    assert_eq!(
+        passes,
+        ["depth", "resolve", "blur rows", "blur columns", "shade"]
+    );
+    assert!(
+        text.contains("resolve_symmetric, 1024x1024, rgba16unorm"),
+        "{text}"
+    );
+    assert!(
+        text.contains("7 taps") && text.contains("shade_hamburger, 192x128"),
+        "{text}"
+    );
+
+    let (passes, text) = plan("filter = 1\ndepth_range = 'unit'\ntechnique = 'hausdorff'");
+    assert_eq!(passes, ["depth", "resolve", "shade"]);
+    assert!(
+        text.contains("no blur: the filter is one texel wide"),
+        "{text}"
+    );
+    assert!(
+        text.contains("resolve_unit") && text.contains("shade_hausdorff"),
+        "{text}"
+    );
+
+    let (passes, text) = plan("technique = 'pcf'");
+    assert_eq!(passes, ["depth", "shade"]);
+    assert!(
+        text.contains("no moments") && text.contains("no blur"),
+        "{text}"
+    );
+    assert!(!text.contains("no depth bias"), "{text}");
+
+    let (_, text) = plan("technique = 'vsm'\nformat = 'rgba32float'");
+    assert!(
+        text.contains("no quantisation") && text.contains("blur_rgba32float"),
+        "{text}"
+    );
+    assert!(
+        text.contains("resolve_plain") && text.contains("shade_variance"),
+        "{text}"
+    );
+}
+
+#[test]
+fn every_kernel_of_every_plan_exists() {
+    let entries = hankel_shadows::entries();
+    for technique in ["hamburger", "hausdorff", "vsm", "pcf"] {
+        for map in ["", "depth_range = 'unit'", "format = 'rgba32float'"] {
+            let plan = Plan::new(&scene(&format!("technique = '{technique}'\n{map}")));
+            for name in plan.kernels() {
+                assert!(entries.iter().any(|e| e.kernel.name == name), "{name}");
+            }
+        }
+    }
+}
+
+fn native(scene: &Scene) -> Picture {
+    render(scene, Backend::Native, &NoShaders, &mut Quiet)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .picture
+}
+
+/// What a pixel's centre sees, and whether a ray from there to the light is blocked.
+enum Truth {
+    Sky,
+    Ground { lit: bool },
+    Box,
+}
+
+fn truth(scene: &Scene) -> Vec<Truth> {
+    let mesh = scene.mesh().unwrap_or_else(|e| panic!("{e}"));
+    let caster = Caster::new(&mesh);
+    let view = CameraView::new(
+        &scene.camera,
+        &mesh,
+        scene.width as f32 / scene.height as f32,
+    );
+    let lens = Lens::new(view.clip_from_world, scene.width, scene.height);
+    let towards = -scene.light.as_dvec3() * 100.0;
+    (0..scene.width * scene.height)
+        .map(|i| {
+            let segment = lens.segment([i % scene.width, i / scene.width], [0.5, 0.5]);
+            let Some(hit) = caster.first(&segment) else {
+                return Truth::Sky;
+            };
+            let at = segment.at(hit.t);
+            if at.y.abs() > 1e-6 {
+                return Truth::Box;
+            }
+            let blocked = caster
+                .first(&Segment::new(at + DVec3::Y * 1e-6, towards))
+                .is_some();
+            Truth::Ground { lit: !blocked }
+        })
+        .collect()
+}
+
+/// Greys of ground pixels well inside of light, and well inside of shadow.
+fn ground(scene: &Scene, picture: &Picture, distance: i32) -> [Vec<u8>; 2] {
+    let truth = truth(scene);
+    let (width, height) = (scene.width as i32, scene.height as i32);
+    let mut greys = [Vec::new(), Vec::new()];
+    for y in distance..height - distance {
+        for x in distance..width - distance {
+            let Truth::Ground { lit } = truth[(y * width + x) as usize] else {
+                continue;
+            };
+            let alike = (-distance..=distance).all(|dy| {
+                (-distance..=distance).all(|dx| {
+                    let there = &truth[((y + dy) * width + x + dx) as usize];
+                    matches!(there, Truth::Ground { lit: l } if *l == lit)
+                })
+            });
+            if alike {
+                greys[usize::from(lit)].push(picture.pixels[(y * width + x) as usize][1]);
+            }
+        }
+    }
+    assert!(truth.iter().any(|t| matches!(t, Truth::Sky)));
+    assert!(truth.iter().any(|t| matches!(t, Truth::Box)));
+    greys
+}
+
+fn range(greys: &[u8]) -> [u8; 2] {
+    assert!(greys.len() > 100, "{}", greys.len());
+    [
+        greys.iter().copied().min().unwrap_or(0),
+        greys.iter().copied().max().unwrap_or(0),
+    ]
+}
+
+#[test]
+fn percentage_closer_filtering_is_what_rays_say() {
+    let scene = scene("technique = 'pcf'\nfilter = 3\nsize = 512\ndepth_bias = 0.003");
+    let [dark, bright] = ground(&scene, &native(&scene), 2);
+    let ([dark_low, dark_high], [bright_low, bright_high]) = (range(&dark), range(&bright));
+    // One grey each: no acne, no gap.
+    assert_eq!((dark_low, bright_low), (dark_high, bright_high));
+    assert!(bright_low > dark_high + 60, "{bright_low} {dark_high}");
+}
+
+/// Shadow of one box on one plane: two depths, which every technique resolves. The cut takes what
+/// bias and rounding leave.
+fn is_as_filtered_depths(technique: &str) {
+    let pcf = scene("technique = 'pcf'\nfilter = 3\nsize = 512\ndepth_bias = 0.003");
+    let wanted = ground(&pcf, &native(&pcf), 3).map(|g| i32::from(range(&g)[0]));
+    for map in ["", "depth_range = 'unit'", "format = 'rgba32float'"] {
+        let scene = scene(&format!(
+            "technique = '{technique}'\nfilter = 3\nsize = 512\n{map}"
+        ));
+        let greys = ground(&scene, &native(&scene), 3);
+        for (greys, wanted) in greys.iter().zip(wanted) {
+            let off = greys
+                .iter()
+                .filter(|&&g| (i32::from(g) - wanted).abs() > 3)
+                .count();
+            assert!(
+                off == 0,
+                "{technique} {map}: {off} of {} are not {wanted} but {:?}",
+                greys.len(),
+                range(greys)
+            );
+        }
+    }
+}
+
+#[test]
+fn hamburger_gives_the_same_light_and_shadow() {
+    is_as_filtered_depths("hamburger");
+}
+
+#[test]
+fn hausdorff_gives_the_same_light_and_shadow() {
+    is_as_filtered_depths("hausdorff");
+}
+
+#[test]
+fn variance_gives_the_same_light_and_shadow() {
+    is_as_filtered_depths("vsm");
+}
+
+#[test]
+fn the_picture_is_upright_and_not_mirrored() {
+    // The sun stands to the left, the shadow falls to the right; the sky is above.
+    let mut scene = scene("filter = 1\nsize = 256");
+    scene.camera.eye = Vec3::new(0.0, 2.0, 9.0);
+    scene.camera.target = Vec3::ZERO;
+    scene.light = Vec3::new(1.0, -1.0, 0.0).normalize();
+    let picture = native(&scene);
+    let at = |x: usize, y: usize| picture.pixels[y * 192 + x];
+    assert_eq!(at(10, 4), at(180, 4));
+    assert!(
+        at(10, 4)[2] > at(10, 4)[0] + 20,
+        "sky is blue: {:?}",
+        at(10, 4)
+    );
+    let row = 72;
+    assert!(
+        at(60, row)[1] > at(124, row)[1] + 60,
+        "{:?} {:?}",
+        at(60, row),
+        at(124, row)
+    );
+}
+
+#[test]
+fn progress_counts_up_and_timings_name_every_step() {
+    #[derive(Default)]
+    struct Log(Vec<(String, usize, usize)>, f32);
+    impl Progress for Log {
+        fn begin(&mut self, name: &str, step: usize, steps: usize) {
+            self.0.push((name.into(), step, steps));
+            self.1 = 0.0;
+        }
+        fn advance(&mut self, share: f32) {
+            assert!(share >= self.1 && share <= 1.0);
+            self.1 = share;
+        }
+    }
+    let scene = scene("size = 64");
+    let mut log = Log::default();
+    let rendering = render(&scene, Backend::Native, &NoShaders, &mut log).unwrap();
+    let names: Vec<&str> = log.0.iter().map(|(n, ..)| n.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "set-up",
+            "depth",
+            "resolve",
+            "blur rows",
+            "blur columns",
+            "shade"
+        ]
+    );
+    assert!(
+        log.0
+            .iter()
+            .enumerate()
+            .all(|(i, (_, step, steps))| *step == i && *steps == 6)
+    );
+    let timed: Vec<&str> = rendering.timings.iter().map(|t| &*t.name).collect();
+    assert_eq!(timed[..6], names[..]);
+    assert_eq!(timed[6], "read back");
+    assert_eq!(rendering.triangles, 14);
+    let edges = rendering.edges.unwrap();
+    assert!(edges > 0.01 && edges < 0.1, "{edges}");
+    assert!(matches!(
+        rendering.plan.passes.last(),
+        Some(Pass::Shade { width: 192, .. })
+    ));
+}
+
+#[test]
+fn any_valid_scene_renders() {
+    // Inside of the box, behind everything, light along the ground, one pixel.
+    for (eye, light, width, height) in [
+        (Vec3::new(0.0, 0.5, 0.1), Vec3::NEG_Y, 7, 5),
+        (Vec3::new(0.0, 50.0, 0.1), Vec3::Y, 3, 9),
+        (Vec3::new(40.0, 0.0, 0.0), Vec3::X, 9, 3),
+        (Vec3::new(3.0, 3.0, 3.0), Vec3::new(0.0, -1.0, 1e-5), 1, 1),
+    ] {
+        let mut scene = scene("size = 16\nfilter = 31");
+        scene.camera.eye = eye;
+        scene.camera.target = eye + Vec3::new(-1.0, 0.3, 0.2);
+        scene.light = light.normalize();
+        (scene.width, scene.height) = (width, height);
+        assert_eq!(native(&scene).pixels.len(), (width * height) as usize);
+    }
+}
+
+#[test]
+fn a_missing_shader_is_named() {
+    let scene = scene("");
+    let mesh = Procedural::Box.mesh();
+    let mut device = open(Backend::Vulkan).unwrap_or_else(|e| panic!("{e}"));
+    let e = render_on(&mut *device, &scene, &mesh, &NoShaders, &mut Quiet).unwrap_err();
+    assert!(matches!(e, FrameError::Kernel { .. }));
+    let text = e.to_string();
+    assert!(
+        text.contains("light_depth") && text.contains("build the shaders"),
+        "{text}"
+    );
+}

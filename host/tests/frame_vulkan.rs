@@ -1,0 +1,110 @@
+//! Both backends draw the same picture. The shaders are the committed SPIR-V of the built-in
+//! kernels.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hankel_host::frame::{Comparison, Quiet, compare};
+use hankel_host::scene::Scene;
+
+/// The committed SPIR-V.
+fn shaders() -> BTreeMap<String, Vec<u32>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../snapshots/spirv");
+    let modules: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
+        .map(|entry| entry.unwrap_or_else(|e| panic!("{e}")).path())
+        .filter(|path| path.extension().is_some_and(|e| e == "spv"))
+        .collect();
+    assert!(
+        !modules.is_empty(),
+        "there are no modules in {}",
+        folder.display()
+    );
+    modules
+        .iter()
+        .map(|path| {
+            let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+            let name = path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            (name, bytemuck::pod_collect_to_vec(&bytes))
+        })
+        .collect()
+}
+
+fn both(geometry: &str, shadow: &str) -> Comparison {
+    let text = format!(
+        r#"
+        [geometry]
+        procedural = "{geometry}"
+        [camera]
+        eye = [7.4, 6.2, 12.4]
+        target = [-0.5, 0.0, -0.9]
+        [light]
+        direction = [0.62, -0.62, 0.48]
+        [shadow]
+        size = 256
+        {shadow}
+        [output]
+        width = 240
+        height = 135
+        "#
+    );
+    let scene = Scene::parse(&text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"));
+    compare(&scene, &shaders(), 16, &mut Quiet).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The share of pixels that may differ visibly.
+///
+/// A rasteriser puts vertices on a grid of 1/256 pixel, rays do not. So an edge may be half a step
+/// and a rounding away from where the ray sees it, at most 1/256 pixel, and a sample sees another
+/// triangle only if it lies in a strip of that half-width along the edge. A strip crosses at most
+/// sqrt(2) of a pixel; four samples, none likelier than another to lie in it: of the pixels with
+/// an edge, at most 4 * sqrt(2) * 2/256 = 4.4 % have such a sample. The same happens to texels
+/// of the shadow map, where a changed sample is a quarter of one texel and the filter spreads it:
+/// its share of the picture is counted as once more as much.
+fn bound(edges: f64) -> f64 {
+    2.0 * 4.0 * 2.0_f64.sqrt() * 2.0 / 256.0 * edges
+}
+
+fn agree(geometry: &str, shadow: &str) {
+    let c = both(geometry, shadow);
+    let edges = c.native.edges.unwrap_or(0.0);
+    let what = format!("{geometry}, {shadow}: {}, edges {edges:.4}", c.difference);
+    assert!(edges > 0.01 && edges < 0.8, "{what}");
+    assert!(c.difference.over_8 <= bound(edges), "{what}");
+    // Elsewhere only rounding differs: of the sampler's weights to 8 bits, of the target to half
+    // precision, of the moments to 16 bits.
+    assert!(c.difference.over_1 <= bound(edges) + 0.01, "{what}");
+    // The picture shows something: not all of one colour.
+    let first = c.vulkan.picture.pixels[0];
+    let other = c
+        .vulkan
+        .picture
+        .pixels
+        .iter()
+        .filter(|p| **p != first)
+        .count();
+    assert!(other * 4 > c.vulkan.picture.pixels.len(), "{what}");
+}
+
+#[test]
+fn every_technique_agrees_on_a_box() {
+    for technique in ["hamburger", "hausdorff", "vsm", "pcf"] {
+        agree("box", &format!("technique = '{technique}'"));
+    }
+}
+
+#[test]
+fn every_map_agrees_in_the_yard() {
+    for map in [
+        "",
+        "depth_range = 'unit'",
+        "format = 'rgba32float'",
+        "filter = 1",
+    ] {
+        agree("yard", map);
+    }
+}

@@ -1,0 +1,480 @@
+//! Scene files and models as users write them, good and bad.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use base64::Engine;
+use hankel_dsl::glam::Vec3;
+use hankel_host::scene::{
+    DepthRange, Geometry, MapFormat, Mesh, Procedural, Scene, SceneError, Shadow, Technique,
+};
+
+const LEAST: &str = r#"
+[geometry]
+procedural = "box"
+[camera]
+eye = [3, 4, 5]
+target = [0, 0, 0]
+[light]
+direction = [-1, -2, -1]
+"#;
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(text, Path::new("folder/scene.toml"))
+}
+
+fn refused(text: &str) -> String {
+    match parse(text) {
+        Ok(scene) => panic!("accepted:\n{text}\n{scene:?}"),
+        Err(e) => e.to_string(),
+    }
+}
+
+#[test]
+fn the_least_scene_has_the_documented_defaults() {
+    let scene = parse(LEAST).unwrap();
+    assert_eq!(scene.geometry, Geometry::Procedural(Procedural::Box));
+    assert_eq!(scene.camera.up, Vec3::Y);
+    assert_eq!(scene.camera.fov, 40.0);
+    assert!((scene.light.length() - 1.0).abs() < 1e-6);
+    assert_eq!((scene.width, scene.height), (960, 540));
+    assert_eq!(scene.shadow, Shadow::default());
+    assert_eq!(scene.shadow.moment_bias, 6e-5);
+    let pcf = parse(&format!("{LEAST}[shadow]\ntechnique = 'pcf'")).unwrap();
+    assert_eq!(pcf.shadow.depth_bias, 2e-3);
+    let hausdorff = parse(&format!("{LEAST}[shadow]\ntechnique = 'hausdorff'")).unwrap();
+    assert_eq!(hausdorff.shadow.depth_bias, 1e-3);
+    let unit = parse(&format!("{LEAST}[shadow]\ndepth_range = 'unit'")).unwrap();
+    assert_eq!(unit.shadow.moment_bias, 3e-5);
+    let float = parse(&format!("{LEAST}[shadow]\nformat = 'rgba32float'")).unwrap();
+    assert_eq!(float.shadow.moment_bias, 5e-7);
+}
+
+#[test]
+fn every_field_is_read() {
+    let scene = parse(
+        r#"
+        [geometry]
+        model = "models/a.glb"
+        ground = 2.5
+        [camera]
+        eye = [1.0, 2.0, 3.0]
+        target = [0.0, 0.5, 0.0]
+        up = [0.0, 0.0, 2.0]
+        fov = 55.5
+        [light]
+        direction = [0.0, -3.0, 0.0]
+        [shadow]
+        technique = "hausdorff"
+        size = 512
+        depth_range = "unit"
+        format = "rgba16unorm"
+        filter = 9
+        moment_bias = 1e-4
+        depth_bias = 0.001
+        leak_cut = 0.1
+        [output]
+        width = 320
+        height = 200
+        "#,
+    )
+    .unwrap();
+    let file = PathBuf::from("folder/models/a.glb");
+    assert_eq!(scene.geometry, Geometry::Model { file, ground: 2.5 });
+    assert_eq!(scene.camera.up, Vec3::Z);
+    assert_eq!(scene.light, Vec3::NEG_Y);
+    assert_eq!(
+        scene.shadow,
+        Shadow {
+            technique: Technique::Hausdorff,
+            size: 512,
+            depth_range: DepthRange::Unit,
+            format: MapFormat::Rgba16unorm,
+            filter: 9,
+            moment_bias: 1e-4,
+            depth_bias: 0.001,
+            leak_cut: 0.1,
+        }
+    );
+    assert_eq!((scene.width, scene.height), (320, 200));
+}
+
+#[test]
+fn errors_name_the_place_the_field_and_what_is_allowed() {
+    let with = |more: &str| format!("{LEAST}{more}");
+    let cases: &[(String, &[&str])] = &[
+        (
+            with("[shadow]\nsize = 0"),
+            &["scene.toml:10:8", "`shadow.size` is 0", "16 to 8192"],
+        ),
+        (with("[shadow]\nsize = -5"), &["`shadow.size` is -5"]),
+        (
+            with("[shadow]\nsize = 99999999999"),
+            &["`shadow.size` is 99999999999"],
+        ),
+        (
+            with("[shadow]\nsize = 'big'"),
+            &["scene.toml:10:8", "shadow.size", "string"],
+        ),
+        (
+            with("[shadow]\nfilter = 4"),
+            &["`shadow.filter` is 4", "odd"],
+        ),
+        (
+            with("[shadow]\nfilter = 33"),
+            &["`shadow.filter` is 33", "1 to 31"],
+        ),
+        (
+            with("[shadow]\nmoment_bias = nan"),
+            &["`shadow.moment_bias` is NaN", "0 to 0.1"],
+        ),
+        (
+            with("[shadow]\ndepth_bias = inf"),
+            &["`shadow.depth_bias` is inf"],
+        ),
+        (
+            with("[shadow]\nleak_cut = 1.0"),
+            &["`shadow.leak_cut` is 1", "0 to 0.9"],
+        ),
+        (
+            with("[shadow]\ntechnique = 'esm'"),
+            &[
+                "shadow.technique",
+                "`esm`",
+                "hamburger",
+                "hausdorff",
+                "vsm",
+                "pcf",
+            ],
+        ),
+        (
+            with("[shadow]\nformat = 'rgba8unorm'"),
+            &["rgba16unorm", "rgba32float"],
+        ),
+        (
+            with("[shadow]\nformat = 'rgba32float'\ndepth_range = 'unit'"),
+            &[
+                "scene.toml:11:15",
+                "`shadow.depth_range` is unit",
+                "symmetric",
+            ],
+        ),
+        (
+            with("[shadow]\nsise = 3"),
+            &["scene.toml:10:1", "sise", "size", "filter"],
+        ),
+        (with("[shade]"), &["shade", "shadow"]),
+        (
+            with("[output]\nwidth = 0"),
+            &["`output.width` is 0", "1 to 8192"],
+        ),
+        (
+            with("[output]\nheight = 10000"),
+            &["`output.height` is 10000"],
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "[0, 0, 0]"),
+            &["`camera.target`", "another point"],
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "[0, 9, 0]"),
+            &["`camera.up`", "not along the view"],
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "[nan, 4, 5]"),
+            &["scene.toml:5:7", "`camera.eye`", "finite"],
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "[3, 4]"),
+            &["scene.toml:5", "camera.eye"],
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "[3, 4, 1e30]"),
+            &["`camera.eye`", "1000000"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[0, 0, 0]"),
+            &["`light.direction`", "zero"],
+        ),
+        (
+            LEAST.replace("\"box\"", "\"castle\""),
+            &["castle", "yard", "box"],
+        ),
+        (
+            LEAST.replace("procedural = \"box\"", ""),
+            &["`geometry` is neither", "model"],
+        ),
+        (
+            LEAST.replace("\"box\"", "\"box\"\nmodel = 'a.glb'"),
+            &["`geometry` is both"],
+        ),
+        (
+            LEAST.replace("\"box\"", "\"box\"\nground = 2"),
+            &["`geometry.ground`", "left out"],
+        ),
+        (
+            LEAST.replace("eye = [3, 4, 5]", "fov = 0.5\neye = [3, 4, 5]"),
+            &["`camera.fov` is 0.5"],
+        ),
+        (LEAST.replace("[light]", ""), &["direction"]),
+        ("geometry = ".into(), &["scene.toml:1"]),
+        (String::new(), &["geometry"]),
+    ];
+    for (text, parts) in cases {
+        let message = refused(text);
+        for part in *parts {
+            assert!(
+                message.contains(part),
+                "`{part}` is not in `{message}`, from\n{text}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let e = Scene::read(Path::new("nowhere/s.toml"))
+        .unwrap_err()
+        .to_string();
+    assert!(e.contains("nowhere/s.toml"), "{e}");
+    let scene = parse(&LEAST.replace("procedural = \"box\"", "model = 'none.glb'")).unwrap();
+    let e = scene.mesh().unwrap_err().to_string();
+    assert!(e.contains("folder/none.glb"), "{e}");
+}
+
+/// A glTF document with one buffer of positions and 16-bit indices; `edit` may spoil it.
+struct Model {
+    folder: tempfile::TempDir,
+    json: serde_json::Value,
+    buffer: Vec<u8>,
+}
+
+impl Model {
+    fn new() -> Self {
+        let points: [[f32; 3]; 4] = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
+        let indices: [u16; 12] = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
+        let mut buffer: Vec<u8> = points
+            .as_flattened()
+            .iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect();
+        buffer.extend(indices.iter().flat_map(|i| i.to_le_bytes()));
+        let json = serde_json::json!({
+            "asset": { "version": "2.0" },
+            "scene": 0,
+            "scenes": [{ "nodes": [0, 1] }],
+            "nodes": [
+                { "mesh": 0, "translation": [10.0, 0.0, 0.0] },
+                { "children": [2], "scale": [2.0, 2.0, 2.0] },
+                { "mesh": 0, "scale": [-1.0, 1.0, 1.0] },
+            ],
+            "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+            "accessors": [
+                {
+                    "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+                    "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, 1.0],
+                },
+                { "bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR" },
+            ],
+            "bufferViews": [
+                { "buffer": 0, "byteOffset": 0, "byteLength": 48 },
+                { "buffer": 0, "byteOffset": 48, "byteLength": 24 },
+            ],
+            "buffers": [{ "byteLength": 72, "uri": "data%20file.bin" }],
+        });
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+            json,
+            buffer,
+        }
+    }
+
+    fn load(&self) -> Result<Mesh, SceneError> {
+        fs::write(self.folder.path().join("data file.bin"), &self.buffer).unwrap();
+        self.load_bytes(self.json.to_string().as_bytes())
+    }
+
+    fn load_bytes(&self, bytes: &[u8]) -> Result<Mesh, SceneError> {
+        let file = self.folder.path().join("m.gltf");
+        fs::write(&file, bytes).unwrap();
+        let mut scene = parse(LEAST).unwrap();
+        scene.geometry = Geometry::Model { file, ground: 0.0 };
+        scene.mesh()
+    }
+
+    fn refused(&self) -> String {
+        self.load().unwrap_err().to_string()
+    }
+
+    fn glb(&self) -> Vec<u8> {
+        let mut json = self.json.clone();
+        json["buffers"][0].as_object_mut().unwrap().remove("uri");
+        let mut text = json.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let length = 12 + 8 + text.len() + 8 + self.buffer.len();
+        let word = |n: usize| (n as u32).to_le_bytes();
+        [
+            b"glTF".as_slice(),
+            &word(2),
+            &word(length),
+            &word(text.len()),
+            b"JSON",
+            &text,
+            &word(self.buffer.len()),
+            b"BIN\0",
+            &self.buffer,
+        ]
+        .concat()
+    }
+}
+
+#[test]
+fn a_model_comes_with_its_transforms_and_normals() {
+    let model = Model::new();
+    let mesh = model.load().unwrap();
+    assert_eq!(mesh.triangles.len(), 8);
+    let bounds = mesh.bounds().unwrap();
+    assert_eq!(bounds.low, Vec3::new(-2.0, 0.0, 0.0));
+    assert_eq!(bounds.high, Vec3::new(11.0, 2.0, 2.0));
+    // Both tetrahedra face outwards, also the one that a mirror moved.
+    for t in 0..8 {
+        let [a, b, c] = mesh.corners(t);
+        let inside = if a.x >= 5.0 {
+            Vec3::new(10.2, 0.2, 0.2)
+        } else {
+            Vec3::new(-0.4, 0.4, 0.4)
+        };
+        assert!((b - a).cross(c - a).dot(a - inside) > 0.0, "triangle {t}");
+    }
+    for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+        let inside = if p.x >= 5.0 {
+            Vec3::new(10.2, 0.2, 0.2)
+        } else {
+            Vec3::new(-0.4, 0.4, 0.4)
+        };
+        assert!((n.length() - 1.0).abs() < 1e-5 && n.dot(*p - inside) > 0.0);
+    }
+    assert_eq!(model.load_bytes(&model.glb()).unwrap(), mesh);
+    let mut inline = Model::new();
+    let text = base64::engine::general_purpose::STANDARD.encode(&model.buffer);
+    inline.json["buffers"][0]["uri"] =
+        format!("data:application/octet-stream;base64,{text}").into();
+    assert_eq!(inline.load().unwrap(), mesh);
+}
+
+#[test]
+fn bad_models_are_refused_with_the_place() {
+    let case = |spoil: &dyn Fn(&mut Model), parts: &[&str]| {
+        let mut model = Model::new();
+        spoil(&mut model);
+        let message = model.refused();
+        for part in parts.iter().chain(&["m.gltf"]) {
+            assert!(message.contains(part), "`{part}` is not in `{message}`");
+        }
+    };
+    case(
+        &|m| m.json["buffers"][0]["uri"] = "gone.bin".into(),
+        &["buffer 0", "gone.bin"],
+    );
+    case(
+        &|m| m.json["buffers"][0]["uri"] = "data:;base64,!!".into(),
+        &["buffer 0", "base64"],
+    );
+    case(
+        &|m| m.json["buffers"][0]["uri"] = "http://x.org/b".into(),
+        &["buffer 0", "only files"],
+    );
+    case(
+        &|m| m.buffer.truncate(50),
+        &["buffer 0 has 50 bytes, 72 were announced"],
+    );
+    case(
+        &|m| m.buffer[48] = 200,
+        &[
+            "mesh 0, primitive 0",
+            "index 200 is out of range",
+            "4 vertices",
+        ],
+    );
+    case(
+        &|m| m.buffer[..4].copy_from_slice(&f32::NAN.to_le_bytes()),
+        &["element 0 is not finite"],
+    );
+    case(
+        &|m| m.json["accessors"][0]["count"] = 5.into(),
+        &["positions", "buffer view 0"],
+    );
+    case(
+        &|m| m.json["accessors"][0]["byteOffset"] = (u64::MAX / 2).into(),
+        &["positions", "buffer view 0"],
+    );
+    case(
+        &|m| m.json["bufferViews"][0]["byteOffset"] = 4000.into(),
+        &["buffer view 0"],
+    );
+    case(
+        &|m| m.json["accessors"][1]["count"] = 11.into(),
+        &["11 indices"],
+    );
+    case(
+        &|m| m.json["accessors"][0]["type"] = "VEC4".into(),
+        &["three 32-bit floats"],
+    );
+    case(
+        &|m| m.json["nodes"][2]["children"] = serde_json::json!([1]),
+        &["its own ancestor"],
+    );
+    case(
+        &|m| m.json["nodes"][0]["mesh"] = 7.into(),
+        &["no valid glTF"],
+    );
+    case(
+        &|m| m.json["accessors"] = serde_json::json!([]),
+        &["mesh 0", "accessor is missing"],
+    );
+    case(&|m| m.json["scenes"] = serde_json::json!([]), &["glTF"]);
+    case(
+        &|m| m.json["scenes"][0]["nodes"] = serde_json::json!([]),
+        &["no triangles"],
+    );
+    case(&|m| m.buffer[..48].fill(0), &["no triangles"]);
+}
+
+#[test]
+fn a_truncated_model_is_refused_wherever_it_ends() {
+    let model = Model::new();
+    let whole = model.glb();
+    assert!(model.load_bytes(&whole).is_ok());
+    for length in (0..whole.len()).step_by(7).chain([4, 8, 11, 12, 20]) {
+        assert!(
+            model.load_bytes(&whole[..length]).is_err(),
+            "{length} bytes"
+        );
+    }
+    for at in 0..whole.len() {
+        let mut spoilt = whole.clone();
+        spoilt[at] ^= 0x55;
+        // Some bytes may change without harm; none may end the program.
+        let _ = model.load_bytes(&spoilt);
+    }
+}
+
+#[test]
+fn the_scenes_that_come_along_can_be_loaded() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut count = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let file = entry.unwrap().path();
+        let scene = Scene::read(&file).unwrap_or_else(|e| panic!("{e}"));
+        let mesh = scene.mesh().unwrap_or_else(|e| panic!("{e}"));
+        assert!(mesh.triangles.len() > 1000, "{}", file.display());
+        assert_eq!(mesh.positions.len(), mesh.colours.len());
+        count += 1;
+    }
+    assert!(count >= 2);
+}
