@@ -56,8 +56,11 @@ pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
         return Err(fail(format!("`{name}` is another crate's name")));
     }
     match std::fs::read_dir(&folder_path) {
-        Ok(mut entries) if entries.next().is_some() => return Err(fail("it is not empty".into())),
-        Ok(_) => {}
+        Ok(entries) => {
+            if entries.into_iter().next().is_some() {
+                return Err(fail("it is not empty".into()));
+            }
+        }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(fail(error.to_string())),
     }

@@ -27,6 +27,7 @@ pub fn spirv(name: &str) -> Vec<u8> {
         "exchange" => include_str!("../fixtures/exchange.spvasm"),
         "fullscreen" => include_str!("../fixtures/fullscreen.spvasm"),
         "tint" => include_str!("../fixtures/tint.spvasm"),
+        "total" => include_str!("../fixtures/total.spvasm"),
         "wide_f64" => include_str!("../fixtures/wide.spvasm"),
         other => panic!("no fixture `{other}`"),
     })
@@ -214,6 +215,26 @@ pub fn exchange() -> Kernel {
     )
 }
 
+pub fn total() -> Kernel {
+    let number = || plain(Scalar::F32, "f32", 4);
+    kernel(
+        "total",
+        compute([64, 1, 1], 1),
+        vec![param(
+            "terms",
+            Role::Storage {
+                binding: 0,
+                layout: number(),
+            },
+        )],
+        vec![Output::Buffer {
+            binding: 1,
+            layout: number(),
+            per_group: false,
+        }],
+    )
+}
+
 pub fn fullscreen() -> Kernel {
     let attribute = Role::Attribute {
         location: 0,
@@ -280,4 +301,30 @@ pub fn wide() -> Kernel {
     wide.function = "wide".into();
     wide.precision = Some(Precision::F64);
     wide
+}
+
+/// Raw modules of all hand-made kernels.
+pub fn modules() -> hankel_codegen::build::Modules {
+    hankel_codegen::build::Modules::Raw(
+        all()
+            .iter()
+            .map(|kernel| (kernel.name.clone(), spirv(&kernel.name)))
+            .collect(),
+    )
+}
+
+/// A request for all of them in every language.
+pub fn request() -> hankel_codegen::build::Request {
+    hankel_codegen::build::Request {
+        crate_name: "by-hand".into(),
+        kernels: all(),
+        filter: Vec::new(),
+        targets: Vec::new(),
+        options: hankel_codegen::translate::Options {
+            shader_model: "6.2".parse().unwrap(),
+            ..Default::default()
+        },
+        source_sha256: "0".repeat(64),
+        rust_gpu: "0.10.0".into(),
+    }
 }
