@@ -213,10 +213,12 @@ struct Target {
 #[derive(Deserialize)]
 #[serde(tag = "reason", rename_all = "kebab-case")]
 enum Message {
-    CompilerMessage {
+    #[serde(rename = "compiler-message")]
+    Compiler {
         message: Diagnostic,
     },
-    CompilerArtifact {
+    #[serde(rename = "compiler-artifact")]
+    Artifact {
         manifest_path: PathBuf,
         target: ArtifactTarget,
         filenames: Vec<PathBuf>,
@@ -389,10 +391,10 @@ impl Package {
         let mut library = None;
         for line in messages.split(|&b| b == b'\n').filter(|l| !l.is_empty()) {
             match serde_json::from_slice(line) {
-                Ok(Message::CompilerMessage { message }) if message.level == "error" => {
+                Ok(Message::Compiler { message }) if message.level == "error" => {
                     diagnostics.push_str(&message.rendered.unwrap_or_default());
                 }
-                Ok(Message::CompilerArtifact {
+                Ok(Message::Artifact {
                     manifest_path,
                     target,
                     filenames,

@@ -89,14 +89,35 @@ const STAGE_ELEMENTS: usize = 1009;
 const FLAT: [u32; 3] = [61, 37, 1];
 /// Texels of a three-dimensional run.
 const VOLUME: [u32; 3] = [13, 11, 7];
+/// Elements of a buffer that is read anywhere, by kernels that do not run over rows.
+const TABLE: usize = 7;
 /// Counters.
 const COUNTERS: usize = 256;
 
-/// Whether a kernel's stage may flush subnormal numbers, so that none are given to it: Vulkan
-/// lets every stage do so, and lavapipe does where it draws.
+/// Whether a kernel's stage may flush subnormal numbers: Vulkan lets every stage do so, and
+/// lavapipe does where it draws.
 #[must_use]
 pub fn flushes(kernel: &Kernel) -> bool {
     matches!(kernel.stage, Stage::Vertex | Stage::Fragment)
+}
+
+/// The magnitudes of a kernel's hostile inputs. All there are, except where the result would
+/// depend on what nobody promises:
+/// - a stage that flushes subnormal numbers gets none so small that a product of a few is one;
+/// - a kernel that writes a normalised format gets none so large that it overflows on the way:
+///   what becomes of a NaN there is not defined.
+fn magnitudes(kernel: &Kernel) -> (f64, f64) {
+    let least = if flushes(kernel) { 1e-5 } else { 0.0 };
+    let normalised = kernel.outputs.iter().any(|o| {
+        matches!(
+            o,
+            Output::Texture {
+                format: TexelFormat::Rgba16Unorm | TexelFormat::Rgba8Unorm,
+                ..
+            }
+        )
+    });
+    (least, if normalised { 1e8 } else { f64::MAX })
 }
 
 /// The cases of a kernel, several for uniforms to vary: they hold one value for a whole run.
@@ -122,11 +143,10 @@ pub fn cases(kernel: &Kernel, seed: u64) -> Vec<Case> {
 }
 
 fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
-    let subnormal = !flushes(kernel);
     let mut values = Values {
         rng,
         class,
-        subnormal,
+        magnitudes: magnitudes(kernel),
     };
     let slots = slots::slots(kernel);
     let size = texels(kernel);
@@ -134,13 +154,19 @@ fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
         Stage::Compute { .. } => ELEMENTS,
         Stage::Vertex | Stage::Fragment => STAGE_ELEMENTS,
     };
+    // What is read beside texels, vertices or fragments is a short table that each of them may
+    // walk through; over rows it has a row for each.
+    let table = match kernel.stage {
+        Stage::Compute { dimensions: 1, .. } => ELEMENTS,
+        _ => TABLE,
+    };
     let threads = match kernel.stage {
         Stage::Compute { threads, .. } => threads[0].max(1) as usize,
         Stage::Vertex | Stage::Fragment => 1,
     };
     let args: Vec<Input> = slots
         .iter()
-        .map(|s| input(s, &mut values, elements, threads, size))
+        .map(|s| input(s, &mut values, elements, table, threads, size))
         .collect();
     let invocations = match kernel.outputs.first() {
         Some(Output::Texture { .. }) => size.iter().map(|&n| n as usize).product(),
@@ -165,6 +191,7 @@ fn input(
     slot: &Slot<'_>,
     values: &mut Values,
     elements: usize,
+    table: usize,
     threads: usize,
     size: [u32; 3],
 ) -> Input {
@@ -172,9 +199,8 @@ fn input(
         |count: usize| Input::Bytes(vec![0; count * slot.role.element_bytes().unwrap_or(0)]);
     match slot.role {
         Use::Uniform(layout) => Input::Bytes(filled(values, &slot.name, layout, 1, true)),
-        Use::Element(layout) | Use::Storage(layout) => {
-            Input::Bytes(filled(values, &slot.name, layout, elements, false))
-        }
+        Use::Element(layout) => Input::Bytes(filled(values, &slot.name, layout, elements, false)),
+        Use::Storage(layout) => Input::Bytes(filled(values, &slot.name, layout, table, false)),
         Use::Attribute(_, ty) | Use::Varying(_, ty) => {
             let leaves = flat::type_leaves(ty);
             let stride = slots::type_bytes(ty);

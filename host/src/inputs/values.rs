@@ -15,8 +15,8 @@ pub struct Values {
     pub rng: Rng,
     /// What they are like.
     pub class: Class,
-    /// Whether there may be subnormal numbers.
-    pub subnormal: bool,
+    /// The smallest and the largest magnitude of absurd numbers other than zero.
+    pub magnitudes: (f64, f64),
 }
 
 /// What a number is like.
@@ -41,6 +41,8 @@ pub fn by_name(path: &str) -> Option<Domain> {
         "bias" | "strength" => Domain::Magnitude(1e-7, 1e-2),
         "depth" | "receiver" | "visibility" | "shadow" | "weight" | "leak" | "cut"
         | "intensity" | "reduction" | "uv" | "opacity" | "alpha" => Domain::Range(0.0, 1.0),
+        // A list of weights sums to about one.
+        "weights" => Domain::Range(0.0, 0.15),
         "radius" | "taps" => Domain::Range(0.0, 4.0),
         "sigma" => Domain::Range(0.5, 4.0),
         "scale" | "size" | "width" | "height" => Domain::Range(0.5, 2.0),
@@ -204,20 +206,16 @@ impl Values {
 
     /// Any finite number, the extreme ones often.
     fn absurd(&mut self, double: bool) -> f64 {
+        let (least, most) = self.magnitudes;
         loop {
-            let x = self.absurd_or_subnormal(double);
-            let small = if double {
-                f64::MIN_POSITIVE
-            } else {
-                f32::MIN_POSITIVE.into()
-            };
-            if self.subnormal || x == 0.0 || x.abs() >= small {
+            let x = self.any_absurd(double);
+            if x == 0.0 || (least..=most).contains(&x.abs()) {
                 return x;
             }
         }
     }
 
-    fn absurd_or_subnormal(&mut self, double: bool) -> f64 {
+    fn any_absurd(&mut self, double: bool) -> f64 {
         let (largest, normal, least) = if double {
             (f64::MAX, f64::MIN_POSITIVE, f64::from_bits(1))
         } else {
@@ -237,7 +235,7 @@ impl Values {
             5 => largest * self.rng.f64(),
             6 => 1e30,
             7 => 1e-30,
-            8 => 1.0,
+            8 => 1e6 * self.rng.f64(),
             9 => self.rng.f64(),
             _ => loop {
                 let x = if double {
@@ -310,7 +308,7 @@ mod tests {
         Values {
             rng: Rng::with_seed(7),
             class,
-            subnormal: true,
+            magnitudes: (0.0, f64::MAX),
         }
     }
 

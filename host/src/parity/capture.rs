@@ -142,9 +142,7 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
     point
         .operands
         .extend([new_position, new_size].map(Operand::IdRef));
-    if existing_index.is_none() {
-        point.operands.push(Operand::IdRef(index));
-    } else if !interface.contains(&index) {
+    if !interface.contains(&index) {
         point.operands.push(Operand::IdRef(index));
     }
     Ok(Captured {

@@ -5,6 +5,7 @@
 use std::sync::atomic::Ordering;
 
 use hankel_dsl::Texture3d;
+use hankel_dsl::glam::Vec3;
 use hankel_dsl::native::describe::*;
 use hankel_dsl::native::{Arg, Call, CallError};
 use hankel_host::crates::KernelEntry;
@@ -448,7 +449,7 @@ pub fn image() -> Sample {
         };
         let samples = f32s(ms.bytes);
         let (volume, sampler) = (Texture3d::new(*volume), hankel_dsl::Sampler::new(*sampler));
-        let filtered = volume.sample(sampler, hankel_dsl::glam::Vec3::splat(0.25));
+        let filtered = volume.sample(sampler, Vec3::splat(0.25));
         for (i, texel) in out.bytes.chunks_exact_mut(8).enumerate() {
             let s = &samples[i * 4..i * 4 + 4];
             let mut v = filtered;
