@@ -92,6 +92,41 @@ fn doubles_run_on_both() {
 }
 
 #[test]
+fn constants_reach_every_kind_of_code_but_wgsl() {
+    let kernel = mixed();
+    let settings = bytes(&[0.0f64, 1.0]);
+    let mut row = bytes(&[6.0f64]);
+    row.extend(bytes(&[2u32, 0]));
+    let run = |device: &mut dyn Device, way: Way, constants: &[u32]| {
+        let out = device.buffer("out", 24)?;
+        let program = Program {
+            constants,
+            ..kernel.program(way)
+        };
+        let args = [Bind::Bytes(&settings), Bind::Bytes(&row), Bind::Buffer(out)];
+        device.dispatch(&program, &args)?;
+        let bytes = device.read_buffer(out)?;
+        Ok::<f64, DeviceError>(bytemuck::pod_read_unaligned(&bytes[..8]))
+    };
+    let mut gpu = vulkan();
+    for (constants, expected) in [(&[][..], 3.0), (&[0], 3.0), (&[1], 2.0), (&[10], 0.5)] {
+        assert_eq!(
+            run(&mut NativeDevice::new(), Way::Wgsl, constants).unwrap(),
+            expected
+        );
+        for way in [Way::Passthrough, Way::Naga] {
+            assert_eq!(run(&mut gpu, way, constants).unwrap(), expected, "{way:?}");
+        }
+    }
+    assert_eq!(run(&mut gpu, Way::Wgsl, &[0]).unwrap(), 3.0);
+    let text = run(&mut gpu, Way::Wgsl, &[1]).unwrap_err().to_string();
+    assert!(
+        text.contains("`mixed_f64`") && text.contains("part of its WGSL"),
+        "{text}"
+    );
+}
+
+#[test]
 fn atomics_and_workgroups_run_on_both() {
     let values: Vec<u32> = (0..1000u32)
         .map(|i| i.wrapping_mul(2_654_435_761) >> 7)
