@@ -89,6 +89,20 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
             }
         }
     }
+    let group = kernel
+        .params
+        .iter()
+        .find(|param| matches!(param.role, Role::Group));
+    let group = group.map_or("group", |param| param.name.as_str());
+    let shared: Vec<Word> = in_class(module, StorageClass::Workgroup).collect();
+    for (index, variable) in shared.iter().enumerate() {
+        let number = if shared.len() == 1 {
+            String::new()
+        } else {
+            format!("_{}", (b'a' + (index % 26) as u8) as char)
+        };
+        names.set(*variable, &format!("{group}{number}"));
+    }
     for (built_in_number, name) in INPUTS {
         if let Some(variable) = built_in(module, built_in_number) {
             names.set(variable, name);
@@ -195,6 +209,13 @@ fn located(module: &Module, class: StorageClass, location: u32) -> Option<Word> 
         decoration(module, *variable, Decoration::Location) == Some(location)
             && global(module, *variable).and_then(|it| it.operands.first())
                 == Some(&Operand::StorageClass(class))
+    })
+}
+
+fn in_class(module: &Module, class: StorageClass) -> impl Iterator<Item = Word> + '_ {
+    variables(module).filter(move |variable| {
+        global(module, *variable).and_then(|it| it.operands.first())
+            == Some(&Operand::StorageClass(class))
     })
 }
 

@@ -37,7 +37,11 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Failure, Step, guarded};
 use crate::{Error, Language, VERSION};
 
-/// What to do about an index that is out of range.
+/// What to do about an index that is out of range, beyond the kernel's own guard.
+///
+/// As far as naga's writers go: MSL checks everything; GLSL checks reads of textures; HLSL
+/// restricts indices into arrays and vectors (Direct3D itself checks buffers). SPIR-V and WGSL are
+/// the same under every choice: their implementations check.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BoundsChecks {

@@ -39,6 +39,7 @@ pub fn all() -> Vec<Kernel> {
         bound(),
         resample(),
         exchange(),
+        total(),
         fullscreen(),
         tint(),
         wide(),
