@@ -35,13 +35,18 @@ fn shaders() -> BTreeMap<String, Vec<u32>> {
 }
 
 fn both(geometry: &str, shadow: &str) -> Comparison {
+    let eye = if geometry == "box" {
+        "[1.9, 1.6, 3.1]"
+    } else {
+        "[7.4, 6.2, 12.4]"
+    };
     let text = format!(
         r#"
         [geometry]
         procedural = "{geometry}"
         [camera]
-        eye = [7.4, 6.2, 12.4]
-        target = [-0.5, 0.0, -0.9]
+        eye = {eye}
+        target = [-0.2, 0.2, -0.3]
         [light]
         direction = [0.62, -0.62, 0.48]
         [shadow]

@@ -427,7 +427,7 @@ fn bad_models_are_refused_with_the_place() {
     );
     case(
         &|m| m.json["nodes"][2]["children"] = serde_json::json!([1]),
-        &["its own ancestor"],
+        &["reached twice"],
     );
     case(
         &|m| m.json["nodes"][0]["mesh"] = 7.into(),
@@ -443,6 +443,14 @@ fn bad_models_are_refused_with_the_place() {
         &["no triangles"],
     );
     case(&|m| m.buffer[..48].fill(0), &["no triangles"]);
+    case(
+        &|m| m.json["nodes"][0]["scale"] = serde_json::json!([1e8, 1.0, 1.0]),
+        &["scale it"],
+    );
+    case(
+        &|m| m.json["nodes"][0]["translation"] = serde_json::json!([1e39, 0.0, 0.0]),
+        &["node 0", "not finite"],
+    );
 }
 
 #[test]

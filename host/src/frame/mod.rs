@@ -88,10 +88,11 @@ impl Timing {
     }
 }
 
-/// A picture and how it came about.
-#[derive(Clone, Debug)]
+/// A picture and how it came about. All but the picture can be serialised.
+#[derive(Clone, Debug, Serialize)]
 pub struct Rendering {
     /// The picture.
+    #[serde(skip)]
     pub picture: Picture,
     /// Which device made it.
     pub device: String,
@@ -117,7 +118,7 @@ impl Rendering {
 }
 
 /// Both pictures of a scene.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// From this machine's processor.
     pub native: Rendering,

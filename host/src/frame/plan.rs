@@ -3,12 +3,14 @@
 use std::fmt;
 
 use hankel_dsl::native::describe::TexelFormat;
+use serde::Serialize;
 
 use super::cast::SAMPLES;
 use crate::scene::{DepthRange, MapFormat, Scene, Technique};
 
 /// A pass of the frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "pass")]
 pub enum Pass {
     /// Depth as the light sees it.
     Depth {
@@ -53,7 +55,7 @@ pub enum Pass {
 }
 
 /// A pass that was left out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Omission {
     /// What.
     pub what: &'static str,
@@ -62,7 +64,7 @@ pub struct Omission {
 }
 
 /// The passes of a frame in their order, and what was left out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// What is done.
     pub passes: Vec<Pass>,

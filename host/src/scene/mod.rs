@@ -55,6 +55,9 @@ pub use model::MAX_TRIANGLES;
 pub use procedural::Procedural;
 pub use view::{CameraView, LightView};
 
+/// Coordinates beyond this lose the precision that depths need.
+const FAR_OFF: f32 = 1e6;
+
 /// A scene whose values are all in range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {

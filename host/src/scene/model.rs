@@ -10,6 +10,7 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Semantic};
 use hankel_dsl::glam::{Affine3A, Mat4, Vec3};
 
+use super::FAR_OFF;
 use super::error::{Result, SceneError};
 use super::mesh::Mesh;
 
@@ -87,12 +88,16 @@ impl Loader<'_> {
             .default_scene()
             .or_else(|| document.scenes().next());
         let mut open: Vec<_> = match scene {
-            Some(scene) => scene.nodes().map(|n| (n, Mat4::IDENTITY, 0)).collect(),
+            Some(scene) => scene.nodes().map(|n| (n, Mat4::IDENTITY)).collect(),
             None => return self.fail("it has no scene"),
         };
-        while let Some((node, parent, depth)) = open.pop() {
-            if depth > document.nodes().count() {
-                return self.fail(format!("node {} is its own ancestor", node.index()));
+        let mut seen = vec![false; document.nodes().count()];
+        while let Some((node, parent)) = open.pop() {
+            if std::mem::replace(&mut seen[node.index()], true) {
+                return self.fail(format!(
+                    "node {} is reached twice: nodes must form a tree",
+                    node.index()
+                ));
             }
             let matrix = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
             if !matrix.is_finite() {
@@ -112,7 +117,14 @@ impl Loader<'_> {
                     }
                 }
             }
-            open.extend(node.children().map(|n| (n, matrix, depth + 1)));
+            open.extend(node.children().map(|n| (n, matrix)));
+        }
+        let far_off = |p: &&Vec3| !(p.abs().max_element() <= FAR_OFF);
+        if let Some(p) = self.mesh.positions.iter().find(far_off) {
+            return self.fail(format!(
+                "it reaches to {p}, beyond ±{FAR_OFF}, where single precision is too coarse: \
+                 scale it or move it to the origin"
+            ));
         }
         self.mesh.drop_degenerate();
         if self.mesh.triangles.is_empty() {

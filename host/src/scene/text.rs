@@ -9,7 +9,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
-use super::{Camera, DepthRange, Geometry, MapFormat, Procedural, Scene, Shadow, Technique};
+use super::{
+    Camera, DepthRange, FAR_OFF, Geometry, MapFormat, Procedural, Scene, Shadow, Technique,
+};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -65,9 +67,6 @@ struct OutputText {
     width: Option<Spanned<i64>>,
     height: Option<Spanned<i64>>,
 }
-
-/// Coordinates beyond this lose the precision that depths need.
-const FAR_OFF: f32 = 1e6;
 
 pub(super) fn parse(text: &str, file: &Path) -> Result<Scene> {
     let reader = Reader { text, file };
