@@ -241,7 +241,7 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
         .par_iter()
         .map(|kernel| one(kernel, modules, &targets, &layouts, &request.options))
         .collect();
-    let made: Vec<(KernelEntry, Vec<(String, Vec<u8>)>)> = collect(results)?;
+    let made: Vec<(KernelEntry, Files)> = collect(results)?;
     let mut files = BTreeMap::new();
     let mut kernels = BTreeMap::new();
     for (kernel, (entry, texts)) in chosen.iter().zip(made) {
@@ -277,6 +277,9 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
     Ok(Generated { manifest, files })
 }
 
+/// Paths and contents.
+type Files = Vec<(String, Vec<u8>)>;
+
 /// One kernel in every language.
 fn one(
     kernel: &Kernel,
@@ -284,7 +287,7 @@ fn one(
     targets: &BTreeSet<Language>,
     layouts: &Layouts,
     options: &Options,
-) -> Result<(KernelEntry, Vec<(String, Vec<u8>)>), Failure> {
+) -> Result<(KernelEntry, Files), Failure> {
     let open = open_module(kernel, modules, options)?;
     let mut entry = manifest::entry(kernel, layouts, options, open.cost);
     let mut files = Vec::new();
@@ -416,15 +419,16 @@ pub fn build(
 ) -> Result<Report> {
     let chosen = request.chosen()?;
     let before = read_manifest(out);
-    if let Some(before) = &before {
-        if before.inputs_sha256 == request.inputs_sha256(&chosen) && is_whole(before, out) {
-            return Ok(report(
-                before,
-                Vec::new(),
-                before.files.len() + 1,
-                Vec::new(),
-            ));
-        }
+    if let Some(before) = &before
+        && before.inputs_sha256 == request.inputs_sha256(&chosen)
+        && is_whole(before, out)
+    {
+        return Ok(report(
+            before,
+            Vec::new(),
+            before.files.len() + 1,
+            Vec::new(),
+        ));
     }
     let generated = generate(request, &modules()?)?;
     let (changed, unchanged) = compare(&generated, before.as_ref(), out, force)?;

@@ -16,10 +16,7 @@ use super::{global, id, literal, op};
 /// Knows those that Hankel enables for a whole crate; others stay. spirv-val, which runs
 /// afterwards, would tell of one too few.
 pub fn capabilities(module: &mut Module) {
-    let used: HashSet<Capability> = module
-        .all_inst_iter()
-        .filter_map(|instruction| needs(instruction))
-        .collect();
+    let used: HashSet<Capability> = module.all_inst_iter().filter_map(needs).collect();
     module
         .capabilities
         .retain(|instruction| match instruction.operands.first() {
