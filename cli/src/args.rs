@@ -1,0 +1,354 @@
+//! The arguments, as clap reads them.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Shaders for every language from kernels written once in Rust.
+///
+/// Exit codes: 0 fine; 1 a check failed or a kernel does not compile; 2 misuse: wrong arguments or
+/// input files; 3 the machine lacks something: a compiler, a driver, space, permission.
+#[derive(Debug, Parser)]
+#[command(
+    name = "hankel",
+    version,
+    about,
+    long_about,
+    after_help = "\
+Examples:
+  hankel build --out shaders              all built-in kernels in every language
+  hankel list                             what there is, and what it costs
+  hankel parity                           does every backend compute the same?
+  hankel render scenes/scan.toml --out scan.png --compare"
+)]
+pub struct Arguments {
+    /// Print nothing but results and errors.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Generate shaders, headers and a manifest.
+    Build(Build),
+    /// Fail if committed shaders no longer follow from their sources.
+    Check(Check),
+    /// Show kernels, their bindings and what they cost.
+    List(List),
+    /// Make a kernel crate.
+    New(New),
+    /// Run every kernel on every backend and compare.
+    Parity(Parity),
+    /// Run a kernel on the rows of a table.
+    Eval(Eval),
+    /// Render a scene with shadows.
+    Render(Render),
+    /// Find or install rust-gpu's compiler.
+    Toolchain(Toolchain),
+    /// Print a completion script for a shell.
+    Completions(Completions),
+}
+
+/// Which kernels.
+#[derive(Debug, Args)]
+pub struct Source {
+    /// Cargo.toml of a kernel crate; without it, the built-in kernels.
+    #[arg(long, value_name = "FILE")]
+    pub manifest_path: Option<PathBuf>,
+}
+
+/// What is generated, and how.
+#[derive(Debug, Args)]
+pub struct Generate {
+    #[command(flatten)]
+    pub source: Source,
+    /// Only this language; may be repeated [spirv, wgsl, hlsl, msl, glsl, essl310, essl300].
+    #[arg(long = "target", value_name = "LANGUAGE")]
+    pub targets: Vec<String>,
+    /// Only this kernel, by its own name or its function's; `*` stands for any letters; may be
+    /// repeated.
+    #[arg(long = "kernel", value_name = "NAME")]
+    pub kernels: Vec<String>,
+    /// Fix a specialisation constant's value in every language; may be repeated.
+    #[arg(long = "set", value_name = "CONSTANT=VALUE")]
+    pub set: Vec<String>,
+    /// Bounds checks in HLSL, MSL and GLSL beyond the one guard of each invocation
+    /// [unchecked, restrict, readzwrite].
+    #[arg(long, value_name = "POLICY", default_value = "unchecked")]
+    pub bounds_checks: String,
+    /// HLSL's shader model [5.1, 6.0 to 6.9].
+    #[arg(long, value_name = "VERSION", default_value = "6.0")]
+    pub shader_model: String,
+    /// Metal's language version [1.0 to 4.0].
+    #[arg(long, value_name = "VERSION", default_value = "2.4")]
+    pub msl_version: String,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel build --out shaders
+  hankel build --out shaders --target hlsl --shader-model 5.1 --kernel 'shade_*'
+  hankel build --out shaders --set encoding=1 --kernel shade_hamburger
+  hankel build --out shaders --manifest-path my-kernels/Cargo.toml
+
+The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. It is left alone if nothing
+has changed.")]
+pub struct Build {
+    #[command(flatten)]
+    pub generate: Generate,
+    /// Folder for what is generated.
+    #[arg(long, value_name = "FOLDER", default_value = "shaders")]
+    pub out: PathBuf,
+    /// Overwrite files that hankel did not write or that were edited since.
+    #[arg(long)]
+    pub force: bool,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel check shaders
+  hankel check shaders --budget hankel.toml --format json
+
+A budget is a TOML file:
+  [budget]
+  branches = 4
+  [budget.kernels.hamburger_4msm]
+  operations = 120
+
+Give the options that the folder was built with.")]
+pub struct Check {
+    /// The committed folder.
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+    #[command(flatten)]
+    pub generate: Generate,
+    /// Limits of the kernels' cost [default: hankel.toml in the present folder, if there is one].
+    #[arg(long, value_name = "FILE")]
+    pub budget: Option<PathBuf>,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel list
+  hankel list --kernel hamburger_4msm --bindings
+  hankel list --format json")]
+pub struct List {
+    #[command(flatten)]
+    pub source: Source,
+    /// Only this kernel; `*` stands for any letters; may be repeated.
+    #[arg(long = "kernel", value_name = "NAME")]
+    pub kernels: Vec<String>,
+    /// Show bindings and layouts too.
+    #[arg(long)]
+    pub bindings: bool,
+    /// How the list is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  hankel new my-kernels
+  cd my-kernels && cargo test && hankel build --manifest-path Cargo.toml")]
+pub struct New {
+    /// Folder to make; its name is the crate's.
+    #[arg(value_name = "PATH")]
+    pub path: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel parity
+  hankel parity --kernel 'hamburger*' --seed 7
+  hankel parity --manifest-path my-kernels/Cargo.toml --format json
+
+VK_DRIVER_FILES chooses among several Vulkan drivers; HANKEL_SIMD the lanes' instruction set.")]
+pub struct Parity {
+    #[command(flatten)]
+    pub source: Source,
+    /// Only this kernel; `*` stands for any letters; may be repeated.
+    #[arg(long = "kernel", value_name = "NAME")]
+    pub kernels: Vec<String>,
+    /// Seed of the generated inputs.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel eval hamburger_4msm --input rows.csv --output shadows.csv --set moment_bias=3e-5
+  hankel eval hamburger_4msm --input rows.csv --output shadows.csv --backend vulkan
+  hankel eval vsm --input rows.csv --output shadows.csv --precision f64
+
+The table's columns are the input's fields; `hankel list --kernel NAME --bindings` shows them.")]
+pub struct Eval {
+    /// The kernel, or its function.
+    #[arg(value_name = "KERNEL")]
+    pub kernel: String,
+    #[command(flatten)]
+    pub source: Source,
+    /// Table to read: CSV with a header.
+    #[arg(long, value_name = "FILE")]
+    pub input: PathBuf,
+    /// Table to write.
+    #[arg(long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Where to run it.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// In which precision [default: the kernel's first].
+    #[arg(long, value_enum)]
+    pub precision: Option<Precision>,
+    /// A uniform's field or a specialisation constant; may be repeated.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel render scenes/scan.toml --out scan.png
+  hankel render scenes/hard.toml --out hard.png --backend vulkan
+  hankel render scenes/scan.toml --out scan.png --compare
+
+With --compare, OUT is the native picture; OUT-vulkan and OUT-difference are written beside it.")]
+pub struct Render {
+    /// Scene file (TOML).
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Picture to write (PNG).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Where to render.
+    #[arg(long, value_enum, default_value_t, conflicts_with = "compare")]
+    pub backend: Backend,
+    /// Render on both backends and compare.
+    #[arg(long)]
+    pub compare: bool,
+    /// How much the difference picture is amplified.
+    #[arg(long, value_name = "FACTOR", default_value_t = hankel_host::frame::AMPLIFICATION)]
+    pub amplify: u32,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct Toolchain {
+    #[command(subcommand)]
+    pub command: ToolchainCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum ToolchainCommand {
+    /// Show which compiler would be used, why, and what is missing.
+    #[command(after_help = "\
+Environment:
+  HANKEL_TOOLCHAIN          folder of a toolchain to use, whatever else there is
+  HANKEL_TOOLCHAIN_ARCHIVE  archive to unpack when nothing is installed
+  HANKEL_CACHE              folder for what is kept between runs")]
+    Status(ToolchainStatus),
+    /// Install the compiler, from an archive, through rustup or from source.
+    #[command(after_help = "\
+Examples:
+  hankel toolchain install                      the first way that is possible
+  hankel toolchain install --from FILE.tar.zst  from an archive
+  hankel toolchain install --method source      from Debian's rust-src and crates.io, without LLVM")]
+    Install(ToolchainInstall),
+    /// Pack an installed compiler into an archive, to share it.
+    Pack(ToolchainPack),
+}
+
+#[derive(Debug, Args)]
+pub struct ToolchainStatus {
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct ToolchainInstall {
+    /// Archive to install from.
+    #[arg(long, value_name = "FILE")]
+    pub from: Option<PathBuf>,
+    /// SHA-256 of the archive, for one that hankel does not know.
+    #[arg(long, value_name = "HEX", requires = "from")]
+    pub sha256: Option<String>,
+    /// How to install [default: the first that is possible].
+    #[arg(long, value_enum, conflicts_with = "from")]
+    pub method: Option<Method>,
+}
+
+#[derive(Debug, Args)]
+pub struct ToolchainPack {
+    /// Folder for the archive.
+    #[arg(value_name = "FOLDER")]
+    pub folder: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// The shell.
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// For programs.
+    Json,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// This machine's processor.
+    #[default]
+    Native,
+    /// A Vulkan device.
+    Vulkan,
+}
+
+impl From<Backend> for hankel_host::device::Backend {
+    fn from(backend: Backend) -> Self {
+        match backend {
+            Backend::Native => Self::Native,
+            Backend::Vulkan => Self::Vulkan,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Precision {
+    /// 32 bits.
+    F32,
+    /// 64 bits.
+    F64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// A nightly with rustc-dev, and rust-gpu's backend built with it.
+    Rustup,
+    /// The compiler without LLVM, from Debian's rust-src package and crates.io.
+    Source,
+}

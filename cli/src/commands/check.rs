@@ -1,0 +1,38 @@
+use std::path::Path;
+
+use hankel_codegen::build::generate;
+use hankel_codegen::check::{Config, check};
+
+use super::print_json;
+use crate::args::{Check, Format};
+use crate::failure::{Failure, Outcome, Result};
+use crate::session::Session;
+
+/// The budget that is used without being named.
+const DEFAULT_BUDGET: &str = "hankel.toml";
+
+pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
+    if !args.folder.is_dir() {
+        return Err(Failure::input(
+            format!("{}: there is no such folder", args.folder.display()),
+            "Give the folder that `hankel build --out` made and that is committed.",
+        ));
+    }
+    let budget = match &args.budget {
+        Some(file) => Config::read(file)?.budget,
+        None if Path::new(DEFAULT_BUDGET).is_file() => {
+            Config::read(Path::new(DEFAULT_BUDGET))?.budget
+        }
+        None => Config::default().budget,
+    };
+    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
+    let request = session.request(&args.generate)?;
+    let generated = generate(&request, &session.modules()?)?;
+    let report = check(&generated, &args.folder, &budget)?;
+    if args.format == Format::Json {
+        print_json(&report);
+    } else if !quiet || !report.is_fine() {
+        println!("{report}");
+    }
+    Ok(Outcome::of(report.is_fine()))
+}

@@ -1,0 +1,48 @@
+use hankel_dsl::native::describe;
+use hankel_host::device::{Backend, Shader, open};
+use hankel_host::eval::{Job, parse_setting, select};
+
+use crate::args::{Eval, Precision};
+use crate::failure::{Outcome, Result};
+use crate::progress::Progress;
+use crate::session::Session;
+
+pub fn run(args: &Eval, quiet: bool) -> Result<Outcome> {
+    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let precision = args.precision.map(|p| match p {
+        Precision::F32 => describe::Precision::F32,
+        Precision::F64 => describe::Precision::F64,
+    });
+    let entry = select(&session.krate, &args.kernel, precision)?;
+    let settings = args
+        .set
+        .iter()
+        .map(|s| parse_setting(s))
+        .collect::<std::result::Result<Vec<_>, _>>()?;
+    let backend = Backend::from(args.backend);
+    let words = match backend {
+        Backend::Native => None,
+        Backend::Vulkan => Some(session.words(&entry.kernel.name)?),
+    };
+    let mut device = open(backend)?;
+    let job = Job {
+        entry,
+        shader: words.as_deref().map(Shader::SpirvThroughNaga),
+        settings: &settings,
+        input: &args.input,
+        output: &args.output,
+    };
+    let progress = Progress::new(quiet);
+    let rows = hankel_host::eval::run(&mut *device, &job, &mut |rows| {
+        progress.detail(&format!("{rows} rows"));
+    })?;
+    drop(progress);
+    if !quiet {
+        println!(
+            "{rows} rows through {} on {}",
+            entry.kernel.name,
+            device.name()
+        );
+    }
+    Ok(Outcome::Fine)
+}

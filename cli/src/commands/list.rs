@@ -1,0 +1,152 @@
+use hankel_codegen::Language;
+use hankel_codegen::build::generate;
+use hankel_codegen::manifest::KernelEntry;
+use hankel_codegen::translate::Options;
+use hankel_dsl::native::describe::{Kernel, Output, Precision, Role, Stage, Type};
+
+use super::print_json;
+use crate::args::{Format, List};
+use crate::failure::{Outcome, Result};
+use crate::session::Session;
+
+pub fn run(args: &List, quiet: bool) -> Result<Outcome> {
+    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let request = session.request_for(
+        args.kernels.clone(),
+        vec![Language::Spirv],
+        Options::default(),
+    );
+    let generated = generate(&request, &session.modules()?)?;
+    if args.format == Format::Json {
+        print_json(&generated.manifest.kernels);
+        return Ok(Outcome::Fine);
+    }
+    println!(
+        "{:<26} {:<9} {:>10} {:>10} {:>8} {:>7} {:>7}  summary",
+        "kernel", "stage", "operations", "arithmetic", "branches", "memory", "texture"
+    );
+    for kernel in &session.kernels() {
+        let Some(entry) = generated.manifest.kernels.get(&kernel.name) else {
+            continue;
+        };
+        row(kernel, entry);
+        if args.bindings {
+            bindings(kernel);
+        }
+    }
+    Ok(Outcome::Fine)
+}
+
+fn row(kernel: &Kernel, entry: &KernelEntry) {
+    let stage = match &kernel.stage {
+        Stage::Compute {
+            dimensions,
+            phases: 0,
+            ..
+        } => format!("map {dimensions}-D"),
+        Stage::Compute { .. } => "workgroup".into(),
+        Stage::Vertex => "vertex".into(),
+        Stage::Fragment => "fragment".into(),
+    };
+    let c = &entry.cost;
+    println!(
+        "{:<26} {:<9} {:>10} {:>10} {:>8} {:>7} {:>7}  {}",
+        kernel.name,
+        stage,
+        c.operations,
+        c.arithmetic,
+        c.branches,
+        c.memory,
+        c.texture,
+        kernel.summary
+    );
+}
+
+fn bindings(kernel: &Kernel) {
+    if let Some(p) = kernel.precision {
+        println!(
+            "    precision {}",
+            if p == Precision::F32 { "f32" } else { "f64" }
+        );
+    }
+    for p in &kernel.params {
+        let what = match &p.role {
+            Role::Uniform { binding, layout } => {
+                format!("binding {binding}: uniform {}", shape(&layout.name, layout))
+            }
+            Role::Element { binding, layout } => {
+                format!(
+                    "binding {binding}: element of {}",
+                    shape(&layout.name, layout)
+                )
+            }
+            Role::Storage { binding, layout } => {
+                format!(
+                    "binding {binding}: buffer of {}",
+                    shape(&layout.name, layout)
+                )
+            }
+            Role::Atomic { binding } => format!("binding {binding}: counters"),
+            Role::Texture { binding, texture } => format!("binding {binding}: {texture:?}"),
+            Role::Sampler { binding } => format!("binding {binding}: sampler"),
+            Role::Constant { id, default } => format!("constant {id}, default {default}"),
+            Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
+            Role::Varying { location, ty } => format!("varying {location}: {}", spell(ty)),
+            Role::Index => "the invocation's index".into(),
+            Role::Group => "workgroup memory".into(),
+            Role::Phase => "the phase".into(),
+        };
+        println!("    {:<12} {what}", p.name);
+    }
+    for o in &kernel.outputs {
+        let what = match o {
+            Output::Buffer {
+                binding,
+                layout,
+                per_group,
+            } => format!(
+                "binding {binding}: {}{}",
+                shape(&layout.name, layout),
+                if *per_group {
+                    ", one for each workgroup"
+                } else {
+                    ""
+                }
+            ),
+            Output::Texture {
+                binding, format, ..
+            } => {
+                format!("binding {binding}: texture {}", format.name())
+            }
+            Output::Position => "clip-space position".into(),
+            Output::Varying { location, ty } => format!("varying {location}: {}", spell(ty)),
+            Output::Target { location, ty } => format!("target {location}: {}", spell(ty)),
+        };
+        println!("    {:<12} {what}", "output");
+    }
+}
+
+fn shape(name: &str, layout: &hankel_dsl::native::describe::Layout) -> String {
+    let fields: Vec<String> = layout
+        .fields
+        .iter()
+        .filter(|f| !f.name.is_empty())
+        .map(|f| format!("{} {} @{}", f.name, spell(&f.ty), f.offset))
+        .collect();
+    if fields.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name} {{ {} }}, {} bytes", fields.join(", "), layout.size)
+    }
+}
+
+fn spell(ty: &Type) -> String {
+    match ty {
+        Type::Scalar { scalar } => format!("{scalar:?}").to_lowercase(),
+        Type::Vector { scalar, size } => format!("{scalar:?}x{size}").to_lowercase(),
+        Type::Array {
+            element, length, ..
+        } => format!("[{}; {length}]", spell(element)),
+        Type::Struct { layout } => layout.name.clone(),
+    }
+}

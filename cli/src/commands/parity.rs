@@ -1,0 +1,68 @@
+use std::collections::BTreeMap;
+
+use hankel_codegen::Language;
+use hankel_codegen::build::generate;
+use hankel_codegen::translate::Options;
+use hankel_host::device::VulkanDevice;
+use hankel_host::parity::{Subject, Wgsl};
+
+use super::print_json;
+use crate::args::{Format, Parity};
+use crate::failure::{Outcome, Result};
+use crate::progress::Progress;
+use crate::session::{Session, words};
+
+pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
+    // Whether there is a driver shows before the long work starts.
+    let mut vulkan = VulkanDevice::new()?;
+    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let targets = vec![Language::Spirv, Language::Wgsl];
+    let request = session.request_for(args.kernels.clone(), targets, Options::default());
+    let generated = generate(&request, &session.modules()?)?;
+
+    let mut codes = BTreeMap::new();
+    for (name, entry) in &generated.manifest.kernels {
+        let text = |language: Language| {
+            let there = entry.languages.get(&language);
+            there
+                .and_then(|l| Some((generated.files.get(&l.file)?, l.entry_point.as_str())))
+                .ok_or_else(|| {
+                    let why = entry.unsupported.get(&language).cloned();
+                    why.unwrap_or_else(|| format!("there is no {language}"))
+                })
+        };
+        let spirv = text(Language::Spirv).map(|(bytes, _)| words(bytes));
+        let wgsl = text(Language::Wgsl)
+            .map(|(bytes, entry_point)| (String::from_utf8_lossy(bytes).into_owned(), entry_point));
+        codes.insert(name.as_str(), (spirv, wgsl));
+    }
+    let subjects: Vec<Subject<'_>> = session
+        .krate
+        .entries
+        .iter()
+        .filter_map(|entry| {
+            let (spirv, wgsl) = codes.get(entry.kernel.name.as_str())?;
+            Some(Subject {
+                entry,
+                spirv: spirv.as_deref().map_err(Clone::clone),
+                wgsl: match wgsl {
+                    Ok((text, entry_point)) => Ok(Wgsl { text, entry_point }),
+                    Err(why) => Err(why.clone()),
+                },
+            })
+        })
+        .collect();
+
+    let progress = Progress::new(quiet);
+    progress.begin(&format!("Comparing {} kernels", subjects.len()));
+    let report = hankel_host::parity::run(&mut vulkan, &subjects, args.seed, &mut |kernel| {
+        progress.detail(kernel);
+    });
+    drop(progress);
+    if args.format == Format::Json {
+        print_json(&report);
+    } else {
+        println!("{report}");
+    }
+    Ok(Outcome::of(report.passed))
+}

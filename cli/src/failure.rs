@@ -1,0 +1,187 @@
+//! How a command ends, and its exit code.
+
+use std::fmt;
+
+use hankel_codegen as codegen;
+use hankel_host::crates::CrateError;
+use hankel_host::device::DeviceError;
+use hankel_host::eval::EvalError;
+use hankel_host::frame::FrameError;
+use hankel_host::scene::SceneError;
+use miette::Diagnostic;
+
+/// How a command that ran to its end ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Exit code 0.
+    Fine,
+    /// Exit code 1: what was checked is not as it should be.
+    CheckFailed,
+}
+
+impl Outcome {
+    pub const fn of(fine: bool) -> Self {
+        if fine { Self::Fine } else { Self::CheckFailed }
+    }
+}
+
+/// Whose turn it is, which is the exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Blame {
+    /// 1: a kernel does not compile, or does not pass through the tools.
+    Kernel,
+    /// 2: the command's arguments or the files that they name.
+    Input,
+    /// 3: something that the machine lacks.
+    Machine,
+}
+
+/// Why a command did not run to its end.
+#[derive(Debug)]
+pub struct Failure {
+    blame: Blame,
+    message: String,
+    help: Option<String>,
+}
+
+pub type Result<T> = std::result::Result<T, Failure>;
+
+impl Failure {
+    fn new(blame: Blame, error: &dyn std::error::Error, help: Option<String>) -> Self {
+        let mut message = error.to_string();
+        let mut source = error.source();
+        while let Some(cause) = source {
+            let text = cause.to_string();
+            // Some errors print their source themselves.
+            if !message.contains(&text) {
+                message.push_str(": ");
+                message.push_str(&text);
+            }
+            source = cause.source();
+        }
+        Self {
+            blame,
+            message,
+            help,
+        }
+    }
+
+    /// What the arguments, or files that they name, got wrong.
+    pub fn input(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self {
+            blame: Blame::Input,
+            message: message.into(),
+            help: Some(help.into()),
+        }
+    }
+
+    /// What the machine lacks.
+    pub fn machine(message: impl Into<String>, help: Option<String>) -> Self {
+        Self {
+            blame: Blame::Machine,
+            message: message.into(),
+            help,
+        }
+    }
+
+    pub const fn code(&self) -> u8 {
+        match self.blame {
+            Blame::Kernel => 1,
+            Blame::Input => 2,
+            Blame::Machine => 3,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl Diagnostic for Failure {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as _)
+    }
+}
+
+impl From<codegen::Error> for Failure {
+    fn from(error: codegen::Error) -> Self {
+        use codegen::Error as E;
+        let blame = match &error {
+            E::Compile { .. } | E::NoEntryPoint { .. } | E::Kernel(_) | E::Kernels(_) => {
+                Blame::Kernel
+            }
+            E::DuplicateKernel { .. } | E::DuplicateLayout { .. } => Blame::Kernel,
+            E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } => Blame::Machine,
+            _ => Blame::Input,
+        };
+        Self::new(blame, &error, error.advice())
+    }
+}
+
+impl From<CrateError> for Failure {
+    fn from(error: CrateError) -> Self {
+        let blame = match &error {
+            CrateError::Build { .. } => Blame::Kernel,
+            CrateError::NoCargo { .. } | CrateError::Plugin(_) => Blame::Machine,
+            _ => Blame::Input,
+        };
+        Self::new(blame, &error, None)
+    }
+}
+
+/// A device's own troubles are the machine's; calls that it refuses are a kernel's.
+fn blame_of(error: &DeviceError) -> Blame {
+    match error {
+        DeviceError::NoDriver { .. }
+        | DeviceError::NoDevice { .. }
+        | DeviceError::Missing { .. }
+        | DeviceError::Lost { .. }
+        | DeviceError::OutOfMemory { .. }
+        | DeviceError::Limit { .. } => Blame::Machine,
+        _ => Blame::Kernel,
+    }
+}
+
+impl From<DeviceError> for Failure {
+    fn from(error: DeviceError) -> Self {
+        Self::new(blame_of(&error), &error, None)
+    }
+}
+
+impl From<EvalError> for Failure {
+    fn from(error: EvalError) -> Self {
+        let blame = match &error {
+            EvalError::Device(error) => blame_of(error),
+            _ => Blame::Input,
+        };
+        Self::new(blame, &error, None)
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Self::new(Blame::Input, &error, None)
+    }
+}
+
+impl From<FrameError> for Failure {
+    fn from(error: FrameError) -> Self {
+        let blame = match &error {
+            FrameError::Scene(_) | FrameError::Sizes { .. } => Blame::Input,
+            FrameError::Device { source, .. } => blame_of(source),
+            FrameError::Kernel { .. } => Blame::Kernel,
+            FrameError::Write { .. } => Blame::Machine,
+        };
+        Self::new(blame, &error, None)
+    }
+}
+
+impl From<hankel_toolchain::Error> for Failure {
+    fn from(error: hankel_toolchain::Error) -> Self {
+        Self::new(Blame::Machine, &error, None)
+    }
+}

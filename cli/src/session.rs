@@ -1,0 +1,285 @@
+//! Which kernels a command works on, and where their SPIR-V comes from.
+//!
+//! The built-in kernels are linked into this program, and their SPIR-V is embedded in it. Inside
+//! a checkout whose kernels were edited since, or for anybody's crate, the crate is built as a
+//! plug-in, and its SPIR-V is made with rust-gpu's compiler and kept under cargo's target folder
+//! for as long as the sources' hash holds. SPIR-V of other sources is never used.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::str::FromStr;
+
+use hankel_codegen::build::{Modules, Request, finish_all};
+use hankel_codegen::bundle::Bundle;
+use hankel_codegen::compile::{Compiler, compile};
+use hankel_codegen::source_hash::{Sources, hash};
+use hankel_codegen::translate::Options;
+use hankel_codegen::{Error, Language};
+use hankel_dsl::native::describe::Kernel;
+use hankel_host::crates::KernelCrate;
+use hankel_toolchain::pinned::RUST_GPU_VERSION;
+
+use crate::args::Generate;
+use crate::failure::{Failure, Result};
+use crate::progress::Progress;
+
+/// The built-in kernel crate within a checkout.
+const BUILT_IN: &str = "kernels/shadows/Cargo.toml";
+
+/// The committed SPIR-V within a checkout.
+const COMMITTED: &str = "snapshots/spirv";
+
+/// A kernel crate, with its native code.
+pub struct Session {
+    pub krate: KernelCrate,
+    /// Hash of the sources.
+    source_sha256: String,
+    /// The sources on disk; `None` for the built-in kernels outside of a checkout.
+    sources: Option<(PathBuf, Sources)>,
+    quiet: bool,
+}
+
+impl Session {
+    /// Opens the crate at `manifest`, or else the built-in one.
+    pub fn open(manifest: Option<&Path>, quiet: bool) -> Result<Self> {
+        let manifest = match manifest {
+            Some(path) if path.is_dir() => Some(path.join("Cargo.toml")),
+            Some(path) => Some(path.to_owned()),
+            None => checkout().map(|root| root.join(BUILT_IN)),
+        };
+        let Some(manifest) = manifest else {
+            return Ok(Self {
+                krate: built_in(),
+                source_sha256: hankel_embedded::SOURCE_SHA256.into(),
+                sources: None,
+                quiet,
+            });
+        };
+        if !manifest.is_file() {
+            return Err(Failure::input(
+                format!("{}: there is no such file", manifest.display()),
+                "Give the path of a kernel crate's Cargo.toml.",
+            ));
+        }
+        let sources = hash(&manifest).map_err(Error::from)?;
+        let same = sources.sha256 == hankel_embedded::SOURCE_SHA256
+            && sources.name == hankel_embedded::CRATE_NAME;
+        let krate = if same {
+            built_in()
+        } else {
+            let progress = Progress::new(quiet);
+            progress.begin(&format!("Building {} for this machine", sources.name));
+            KernelCrate::load(&manifest, &mut |line| progress.detail(line))?
+        };
+        Ok(Self {
+            krate,
+            source_sha256: sources.sha256.clone(),
+            sources: Some((manifest, sources)),
+            quiet,
+        })
+    }
+
+    /// Descriptions of all entry points.
+    pub fn kernels(&self) -> Vec<Kernel> {
+        self.krate
+            .entries
+            .iter()
+            .map(|e| e.kernel.clone())
+            .collect()
+    }
+
+    /// A request for what `args` ask for.
+    pub fn request(&self, args: &Generate) -> Result<Request> {
+        let targets = args
+            .targets
+            .iter()
+            .map(|t| Language::from_str(t))
+            .collect::<std::result::Result<_, _>>()?;
+        let options = Options {
+            bounds_checks: args.bounds_checks.parse()?,
+            shader_model: args.shader_model.parse()?,
+            msl_version: args.msl_version.parse()?,
+            constants: constants(&args.set)?,
+        };
+        Ok(self.request_for(args.kernels.clone(), targets, options))
+    }
+
+    /// A request for some kernels (none: all) in some languages (none: all).
+    pub fn request_for(
+        &self,
+        filter: Vec<String>,
+        targets: Vec<Language>,
+        options: Options,
+    ) -> Request {
+        Request {
+            crate_name: self.krate.name.clone(),
+            kernels: self.kernels(),
+            filter,
+            targets,
+            options,
+            source_sha256: self.source_sha256.clone(),
+            rust_gpu: RUST_GPU_VERSION.into(),
+        }
+    }
+
+    /// Final SPIR-V of all entry points.
+    pub fn modules(&self) -> std::result::Result<Modules, Failure> {
+        Ok(Modules::Final(self.bundle()?.modules))
+    }
+
+    fn bundle(&self) -> Result<Bundle> {
+        let wanted = self.source_sha256.as_str();
+        if wanted == hankel_embedded::SOURCE_SHA256 && !hankel_embedded::FILES.is_empty() {
+            let embedded = Bundle::from_files(hankel_embedded::FILES)?;
+            if embedded.check_current(wanted).is_ok() {
+                return Ok(embedded);
+            }
+        }
+        let Some((manifest, sources)) = &self.sources else {
+            return Err(Failure::machine(
+                "this program was built without SPIR-V of its own kernels",
+                Some("Run it inside of its repository, with rust-gpu's compiler installed.".into()),
+            ));
+        };
+        let target = target_folder(manifest)?;
+        let kept = target.join("hankel/final").join(&sources.name);
+        let committed = checkout().map(|root| root.join(COMMITTED));
+        for folder in committed.iter().chain([&kept]) {
+            if let Ok(bundle) = Bundle::read(folder) {
+                if bundle.origin.crate_name == sources.name && bundle.check_current(wanted).is_ok()
+                {
+                    return Ok(bundle);
+                }
+            }
+        }
+        let raw = self.compile(manifest, &target)?;
+        let kernels = self.kernels();
+        let bundle = Bundle::new(sources, RUST_GPU_VERSION, finish_all(&raw, &kernels)?);
+        bundle.write(&kept)?;
+        Ok(bundle)
+    }
+
+    /// Raw SPIR-V from rust-gpu.
+    fn compile(&self, manifest: &Path, target: &Path) -> Result<BTreeMap<String, Vec<u8>>> {
+        let mut progress = Progress::new(self.quiet);
+        let options = hankel_toolchain::Options::from_env();
+        let toolchain = hankel_toolchain::ensure(&options, &mut progress).map_err(|error| {
+            let why = match error {
+                hankel_toolchain::Error::NotInstalled { .. } => String::new(),
+                other => format!(": {other}"),
+            };
+            Failure::machine(
+                format!(
+                    "{} has no SPIR-V that belongs to its present sources, and there is no rust-gpu compiler to make it{why}",
+                    self.krate.name
+                ),
+                Some("`hankel toolchain install` installs one; `hankel toolchain status` says what it takes.".into()),
+            )
+        })?;
+        let compiler = Compiler {
+            backend: toolchain.backend,
+            bin: toolchain.bin,
+            channel: toolchain.channel,
+        };
+        progress.begin(&format!(
+            "Compiling {} to SPIR-V (half a minute the first time, then about a second)",
+            self.krate.name
+        ));
+        let names: Vec<&str> = self
+            .krate
+            .entries
+            .iter()
+            .map(|e| e.kernel.name.as_str())
+            .collect();
+        // Called from another thread: only the text is handed over.
+        let line = |line: &str| progress.detail(line);
+        Ok(compile(manifest, &compiler, target, &names, &mut { line })?)
+    }
+}
+
+/// The kernels that are linked into this program.
+fn built_in() -> KernelCrate {
+    KernelCrate::from_entries(hankel_embedded::CRATE_NAME, hankel_shadows::entries())
+}
+
+/// The checkout that the present folder belongs to.
+fn checkout() -> Option<PathBuf> {
+    let here = std::env::current_dir().ok()?;
+    here.ancestors()
+        .find(|folder| folder.join(BUILT_IN).is_file())
+        .map(Path::to_owned)
+}
+
+/// cargo's target folder for a crate.
+fn target_folder(manifest: &Path) -> Result<PathBuf> {
+    let fail = |problem: String| Failure::machine(problem, None);
+    let output = Command::new("cargo")
+        .args([
+            "metadata",
+            "--no-deps",
+            "--format-version",
+            "1",
+            "--manifest-path",
+        ])
+        .arg(manifest)
+        .output()
+        .map_err(|e| fail(format!("cannot run `cargo`: {e}")))?;
+    if !output.status.success() {
+        let text = String::from_utf8_lossy(&output.stderr);
+        return Err(fail(format!("{}: {}", manifest.display(), text.trim())));
+    }
+    serde_json::from_slice::<serde_json::Value>(&output.stdout)
+        .ok()
+        .and_then(|v| v.get("target_directory")?.as_str().map(PathBuf::from))
+        .ok_or_else(|| fail("`cargo metadata` names no target folder".into()))
+}
+
+/// `CONSTANT=VALUE` pairs.
+fn constants(pairs: &[String]) -> Result<BTreeMap<String, u32>> {
+    pairs
+        .iter()
+        .map(|pair| {
+            pair.split_once('=')
+                .and_then(|(name, value)| {
+                    Some((name.trim().to_owned(), value.trim().parse().ok()?))
+                })
+                .ok_or_else(|| {
+                    Failure::input(
+                        format!("--set {pair}: a specialisation constant is set to a whole number"),
+                        "Write --set NAME=NUMBER.",
+                    )
+                })
+        })
+        .collect()
+}
+
+/// A module's words.
+pub fn words(bytes: &[u8]) -> Vec<u32> {
+    bytes
+        .chunks_exact(4)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect()
+}
+
+impl Session {
+    /// SPIR-V of one entry point.
+    pub fn words(&self, kernel: &str) -> Result<Vec<u32>> {
+        let bundle = self.bundle()?;
+        bundle
+            .modules
+            .get(kernel)
+            .map(|bytes| words(bytes))
+            .ok_or_else(|| Failure::machine(format!("`{kernel}` has no SPIR-V"), None))
+    }
+
+    /// SPIR-V of every entry point.
+    pub fn all_words(&self) -> Result<BTreeMap<String, Vec<u32>>> {
+        Ok(self
+            .bundle()?
+            .modules
+            .iter()
+            .map(|(name, bytes)| (name.clone(), words(bytes)))
+            .collect())
+    }
+}
