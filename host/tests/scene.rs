@@ -105,7 +105,7 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
     let cases: &[(String, &[&str])] = &[
         (
             with("[shadow]\nsize = 0"),
-            &["scene.toml:10:8", "`shadow.size` is 0", "16 to 8192"],
+            &["scene.toml:10:8", "`shadow.size` is 0", "16 to 4096"],
         ),
         (with("[shadow]\nsize = -5"), &["`shadow.size` is -5"]),
         (
@@ -166,7 +166,7 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (with("[shade]"), &["shade", "shadow"]),
         (
             with("[output]\nwidth = 0"),
-            &["`output.width` is 0", "1 to 8192"],
+            &["`output.width` is 0", "1 to 4096"],
         ),
         (
             with("[output]\nheight = 10000"),

@@ -235,9 +235,9 @@ impl Default for Shadow {
 
 impl Scene {
     /// Most pixels along an edge of the picture.
-    pub const MAX_OUTPUT: u32 = 8192;
+    pub const MAX_OUTPUT: u32 = 4096;
     /// Most texels along an edge of the map.
-    pub const MAX_MAP: u32 = 8192;
+    pub const MAX_MAP: u32 = 4096;
     /// Most taps of the filter along an axis.
     pub const MAX_FILTER: u32 = 31;
     /// Width and height of a picture unless given.

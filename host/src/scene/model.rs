@@ -119,7 +119,7 @@ impl Loader<'_> {
             }
             open.extend(node.children().map(|n| (n, matrix)));
         }
-        let far_off = |p: &&Vec3| !(p.abs().max_element() <= FAR_OFF);
+        let far_off = |p: &&Vec3| !p.is_finite() || p.abs().max_element() > FAR_OFF;
         if let Some(p) = self.mesh.positions.iter().find(far_off) {
             return self.fail(format!(
                 "it reaches to {p}, beyond ±{FAR_OFF}, where single precision is too coarse: \
