@@ -42,6 +42,46 @@ fn only_what_is_used_is_asked_for() {
 }
 
 #[test]
+fn atomics_do_not_need_the_newer_memory_model() {
+    // As rust-gpu does: the scope of the queue family, which the older model does not have.
+    let source = include_str!("fixtures/total.spvasm")
+        .replace(
+            "%block = OpTypeStruct %floats",
+            "%uints = OpTypeRuntimeArray %uint\n%block = OpTypeStruct %uints",
+        )
+        .replace("%floats ArrayStride", "%uints ArrayStride")
+        .replace("%floats = OpTypeRuntimeArray %float", "")
+        .replace(
+            "%to_float = OpTypePointer StorageBuffer %float",
+            "%to_uint = OpTypePointer StorageBuffer %uint\n%family = OpConstant %uint 5",
+        )
+        .replace(
+            "%at = OpAccessChain %to_float",
+            "%at = OpAccessChain %to_uint",
+        )
+        .replace(
+            "%to = OpAccessChain %to_float",
+            "%to = OpAccessChain %to_uint",
+        )
+        .replace(
+            "%term = OpLoad %float %at",
+            "%number = OpLoad %uint %at\n%term = OpConvertUToF %float %number",
+        )
+        .replace(
+            "OpStore %to %sum",
+            "%all = OpConvertFToU %uint %sum\n%old = OpAtomicIAdd %uint %to %family %zero %all",
+        );
+    let finished = finish(&support::assemble(&source), &support::total()).unwrap();
+    let text = rspirv::dr::load_bytes(&finished.spirv)
+        .unwrap()
+        .disassemble();
+    assert!(
+        text.contains("OpMemoryModel Logical GLSL450") && text.contains("OpAtomicIAdd"),
+        "{text}"
+    );
+}
+
+#[test]
 fn textures_that_are_only_written_say_so() {
     let text = disassembled("resample");
     assert_eq!(text.matches("NonReadable").count(), 1, "{text}");

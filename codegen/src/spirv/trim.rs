@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{
     AddressingModel, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel,
-    MemorySemantics, Op, StorageClass, Word,
+    MemorySemantics, Op, Scope, StorageClass, Word,
 };
 
 use super::{global, id, literal, op};
@@ -123,6 +123,7 @@ pub fn memory_model(module: &mut Module) {
     if says_more {
         return;
     }
+    device_scope(module);
     module.memory_model = Some(Instruction::new(
         Op::MemoryModel,
         None,
@@ -142,6 +143,56 @@ pub fn memory_model(module: &mut Module) {
                 "SPV_KHR_vulkan_memory_model".into(),
             ))
     });
+}
+
+/// Widens the scope `QueueFamily`, which only Vulkan's memory model has and which rust-gpu's
+/// atomics use, to `Device`.
+fn device_scope(module: &mut Module) {
+    let scope = |module: &Module, wanted: Scope| {
+        module.types_global_values.iter().find_map(|constant| {
+            let is_wanted =
+                op(constant) == Op::Constant && literal(constant, 0) == Some(wanted as u32);
+            let ty = global(module, constant.result_type?)?;
+            (is_wanted && op(ty) == Op::TypeInt).then_some(constant.result_id?)
+        })
+    };
+    let queue_family: HashSet<Word> = module
+        .types_global_values
+        .iter()
+        .filter(|it| op(it) == Op::Constant && literal(it, 0) == Some(Scope::QueueFamily as u32))
+        .filter_map(|it| it.result_id)
+        .collect();
+    let is_queue_family =
+        |operand: &Operand| matches!(operand, Operand::IdScope(id) if queue_family.contains(id));
+    let Some(&ty) = module
+        .all_inst_iter()
+        .find_map(|instruction| instruction.operands.iter().find(|it| is_queue_family(it)))
+        .and_then(|operand| match operand {
+            Operand::IdScope(id) => global(module, *id)?.result_type.as_ref(),
+            _ => None,
+        })
+    else {
+        return;
+    };
+    let device = match (scope(module, Scope::Device), &mut module.header) {
+        (Some(device), _) => device,
+        (None, Some(header)) => {
+            let id = header.bound;
+            header.bound += 1;
+            let value = vec![Operand::LiteralBit32(Scope::Device as u32)];
+            let made = Instruction::new(Op::Constant, Some(ty), Some(id), value);
+            module.types_global_values.push(made);
+            id
+        }
+        (None, None) => return,
+    };
+    for instruction in module.all_inst_iter_mut() {
+        for operand in &mut instruction.operands {
+            if is_queue_family(operand) {
+                *operand = Operand::IdScope(device);
+            }
+        }
+    }
 }
 
 /// Says of storage textures that are never read that they are not: WGSL, GLSL ES and Metal ask
