@@ -10,7 +10,7 @@
 //!   SPIR-V's implementations have checks of their own.
 //! - Specialisation constants stay overridable in SPIR-V and WGSL; the other writers cannot
 //!   express them and get the default, or the value that the options freeze.
-//! - What a language cannot express is [`Unsupported`], with the reason; what goes wrong is an
+//! - What a language cannot express is [`Written::Unsupported`], with the reason; what goes wrong is an
 //!   error.
 
 mod cleanup;
