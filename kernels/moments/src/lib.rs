@@ -19,6 +19,7 @@
 mod bias;
 mod hamburger;
 mod hausdorff;
+mod leak;
 mod moments;
 mod quantization;
 mod variance;
@@ -26,6 +27,7 @@ mod variance;
 pub use bias::{Bias, SYMMETRIC_16, SYMMETRIC_32, UNIT_16};
 pub use hamburger::hamburger_4;
 pub use hausdorff::hausdorff_4;
+pub use leak::cut_leak;
 pub use moments::Moments4;
 pub use quantization::{
     Quantized4, dequantize_symmetric, dequantize_unit, quantize_symmetric, quantize_unit,

@@ -2,7 +2,8 @@
 //! fill the unit cube, so that 16 bits for each channel suffice (\[MSM\], section 4.1 and section 8
 //! of the supplement: for depths in [0, 1] it gains 12.3 bits).
 //!
-//! All maps are affine, so filtering commutes with them.
+//! All maps are affine, so filtering commutes with them. Constant summands come first in a sum:
+//! drivers may move them there, which changes the rounding.
 
 use hankel_dsl::{Element, Real, lit};
 
@@ -22,6 +23,19 @@ pub struct Quantized4<R> {
     pub a: R,
 }
 
+impl<R: Real> Quantized4<R> {
+    /// Each channel in [0, 1], where those of valid moments lie anyway.
+    #[inline(always)]
+    pub fn saturated(self) -> Self {
+        Self {
+            r: self.r.saturate(),
+            g: self.g.saturate(),
+            b: self.b.saturate(),
+            a: self.a.saturate(),
+        }
+    }
+}
+
 /// \[MSM\] adds this to the first channel.
 macro_rules! unit_offset {
     () => {
@@ -35,10 +49,9 @@ macro_rules! unit_offset {
 pub fn quantize_unit<R: Real>(m: Moments4<R>) -> Quantized4<R> {
     let Moments4 { b1, b2, b3, b4 } = m;
     Quantized4 {
-        r: b1 * lit!(-2.072_246_399_676) + b2 * lit!(32.237_037_479_455)
+        r: b1 * lit!(-2.072_246_399_676) + unit_offset!() + b2 * lit!(32.237_037_479_455)
             - b3 * lit!(68.571_074_247_410)
-            + b4 * lit!(39.370_327_278_740)
-            + unit_offset!(),
+            + b4 * lit!(39.370_327_278_740),
         g: b1 * lit!(13.794_885_600_594) - b2 * lit!(59.468_397_163_472)
             + b3 * lit!(82.035_974_564_713)
             - b4 * lit!(35.364_903_080_483),
@@ -76,10 +89,10 @@ pub fn dequantize_unit<R: Real>(q: Quantized4<R>) -> Moments4<R> {
 pub fn quantize_symmetric<R: Real>(m: Moments4<R>) -> Quantized4<R> {
     let Moments4 { b1, b2, b3, b4 } = m;
     Quantized4 {
-        r: b1 * lit!(1.5) - b3 * lit!(2.0) + lit!(0.5),
+        r: b1 * lit!(1.5) + lit!(0.5) - b3 * lit!(2.0),
         g: (b2 - b4) * lit!(4.0),
         // sqrt(3) / 2 and sqrt(12) / 9.
-        b: b1 * lit!(0.866_025_403_784_438_6) - b3 * lit!(0.384_900_179_459_750_5) + lit!(0.5),
+        b: b1 * lit!(0.866_025_403_784_438_6) + lit!(0.5) - b3 * lit!(0.384_900_179_459_750_5),
         a: (b2 + b4) * lit!(0.5),
     }
 }

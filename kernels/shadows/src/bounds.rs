@@ -1,10 +1,10 @@
 //! Single functions as maps over rows: for other engines to take from the generated code, for
 //! `hankel eval`, and for parity in both precisions.
 
-use hankel_dsl::{Element, Real, kernel, lit};
+use hankel_dsl::{Element, Real, kernel};
 use hankel_moments::{
-    Moments4, Quantized4, dequantize_symmetric, dequantize_unit, hamburger_4, hausdorff_4,
-    quantize_symmetric, quantize_unit, variance_2,
+    Moments4, Quantized4, cut_leak, dequantize_symmetric, dequantize_unit, hamburger_4,
+    hausdorff_4, quantize_symmetric, quantize_unit, variance_2,
 };
 
 /// How a bound is turned into a shadow.
@@ -63,10 +63,8 @@ fn biased<R: Real>(settings: &Settings<R>, receiver: Receiver4<R>) -> (Moments4<
 
 #[inline(always)]
 fn cut<R: Real>(shadow: R, settings: &Settings<R>) -> Shadow<R> {
-    let one: R = lit!(1.0);
-    // A leak of 1 or more would divide by nothing.
     Shadow {
-        shadow: (shadow / (one - settings.light_leak).max(R::epsilon())).saturate(),
+        shadow: cut_leak(shadow, settings.light_leak),
     }
 }
 
@@ -108,23 +106,23 @@ pub fn vsm<R: Real>(
 /// Four moments of depths in [0, 1] to the basis optimised for 16 bits.
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn quantize_4_unit<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
-    quantize_unit(moments)
+    quantize_unit(moments.clamped())
 }
 
 /// The basis optimised for 16 bits to four moments of depths in [0, 1].
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn dequantize_4_unit<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
-    dequantize_unit(quantized)
+    dequantize_unit(quantized.saturated())
 }
 
 /// Four moments of depths in [-1, 1] to the basis optimised for 16 bits.
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn quantize_4_symmetric<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
-    quantize_symmetric(moments)
+    quantize_symmetric(moments.clamped())
 }
 
 /// The basis optimised for 16 bits to four moments of depths in [-1, 1].
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn dequantize_4_symmetric<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
-    dequantize_symmetric(quantized)
+    dequantize_symmetric(quantized.saturated())
 }

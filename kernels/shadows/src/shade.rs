@@ -4,8 +4,8 @@
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
 use hankel_moments::{
-    Moments4, Quantized4, dequantize_symmetric, dequantize_unit, hamburger_4, hausdorff_4,
-    variance_2,
+    Moments4, Quantized4, cut_leak, dequantize_symmetric, dequantize_unit, hamburger_4,
+    hausdorff_4, variance_2,
 };
 
 use crate::depth::{Transform, row_times_point};
@@ -62,7 +62,7 @@ fn dot(a: Vec3, b: Vec3) -> f32 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// Lambert's law with a shadow from 0 (lit) to 1, plus ambient light.
+/// Lambert's law with a shadow from 0 (lit) to 1, plus ambient light; each channel in [0, 65504].
 #[inline(always)]
 fn lit(light: &Light, normal: Vec3, colour: Vec3, shadow: f32) -> Vec4 {
     let toward = Vec3::new(light.toward.x, light.toward.y, light.toward.z);
@@ -70,7 +70,8 @@ fn lit(light: &Light, normal: Vec3, colour: Vec3, shadow: f32) -> Vec4 {
     let length = dot(normal, normal).sqrt().max_of(1e-20);
     let cosine = (dot(normal, toward) / length).max_of(0.0);
     let direct = cosine * light.toward.w * (1.0 - shadow);
-    let shade = |colour: f32, ambient: f32| colour * (direct + ambient);
+    // 65504 is the most that a 16-bit float target holds.
+    let shade = |colour: f32, ambient: f32| Real::clamp(colour * (direct + ambient), 0.0, 65504.0);
     Vec4::new(
         shade(colour.x, light.ambient.x),
         shade(colour.y, light.ambient.y),
@@ -91,16 +92,18 @@ impl MaxOf for f32 {
     }
 }
 
-/// A receiver in the map: coordinates and biased depth, from 0 to 1 inside.
+/// A receiver in the map: coordinates and biased depth, from 0 to 1 inside. What is far outside is
+/// moved nearer, which changes nothing but that it stays finite.
 #[inline(always)]
 fn receiver(light: &Light, world: Vec3) -> (Vec2, f32) {
+    let near = |x: f32| Real::clamp(x, -16.0, 16.0);
     let uv = Vec2::new(
-        row_times_point(light.row_u, world),
-        row_times_point(light.row_v, world),
+        near(row_times_point(light.row_u, world)),
+        near(row_times_point(light.row_v, world)),
     );
     (
         uv,
-        row_times_point(light.row_depth, world) - light.depth_bias,
+        near(row_times_point(light.row_depth, world) - light.depth_bias),
     )
 }
 
@@ -158,12 +161,6 @@ fn look_up(
     (m, in_range(z, how))
 }
 
-/// The cut that ends weak light leaking: shadow from `1 - leak` on is full (lecture).
-#[inline(always)]
-fn cut(shadow: f32, leak: f32) -> f32 {
-    Real::saturate(shadow / (1.0 - leak))
-}
-
 /// Shading with Hamburger four moment shadow mapping.
 #[kernel(
     fragment,
@@ -187,7 +184,7 @@ pub fn shade_hamburger(
         light,
         normal,
         colour,
-        cut(hamburger_4(m, z), light.light_leak),
+        cut_leak(hamburger_4(m, z), light.light_leak),
     )
 }
 
@@ -215,7 +212,7 @@ pub fn shade_hausdorff(
     } else {
         hausdorff_4(m.symmetric_to_unit(), 0.5 * z + 0.5)
     };
-    lit(light, normal, colour, cut(shadow, light.light_leak))
+    lit(light, normal, colour, cut_leak(shadow, light.light_leak))
 }
 
 /// Shading with variance shadow mapping, from the first two of four moments.
@@ -241,7 +238,7 @@ pub fn shade_variance(
         light,
         normal,
         colour,
-        cut(
+        cut_leak(
             variance_2(m.b1, m.b2, z, light.moment_bias),
             light.light_leak,
         ),

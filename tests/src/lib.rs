@@ -1,0 +1,109 @@
+//! What the tests of this folder share: kernel crates whose SPIR-V is committed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use hankel_codegen::build::{Generated, Modules, Request, generate};
+use hankel_codegen::bundle::Bundle;
+use hankel_codegen::source_hash::hash;
+use hankel_codegen::translate::Options;
+use hankel_dsl::native::Entry;
+
+/// The repository.
+#[must_use]
+pub fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent()
+        .expect("tests/ lies in the repository")
+        .to_owned()
+}
+
+/// A kernel crate of the repository.
+#[derive(Debug)]
+pub struct Crate {
+    /// Its entry points.
+    pub entries: Vec<Entry>,
+    /// Its committed SPIR-V.
+    pub bundle: Bundle,
+    /// Its Cargo.toml.
+    pub manifest: PathBuf,
+}
+
+impl Crate {
+    /// The built-in kernels.
+    #[must_use]
+    pub fn shadows() -> Self {
+        Self::new(
+            hankel_shadows::entries(),
+            "kernels/shadows",
+            "snapshots/spirv",
+        )
+    }
+
+    /// One kernel for each thing that a kernel can do.
+    #[must_use]
+    pub fn conformance() -> Self {
+        Self::new(
+            hankel_conformance::entries(),
+            "tests/conformance",
+            "snapshots/conformance",
+        )
+    }
+
+    /// The published form of four moment shadow mapping.
+    #[must_use]
+    pub fn listing() -> Self {
+        Self::new(
+            hankel_listing::entries(),
+            "tests/listing",
+            "snapshots/listing",
+        )
+    }
+
+    /// Reads the committed SPIR-V, which must belong to the sources.
+    fn new(entries: Vec<Entry>, folder: &str, snapshots: &str) -> Self {
+        let manifest = root().join(folder).join("Cargo.toml");
+        let bundle = Bundle::read(&root().join(snapshots)).unwrap_or_else(|e| panic!("{e}"));
+        let sources = hash(&manifest).unwrap_or_else(|e| panic!("{e}"));
+        bundle.check_current(&sources.sha256).unwrap_or_else(|e| {
+            panic!("{e}\nrun `cargo xtask spirv`, with rust-gpu's compiler installed")
+        });
+        Self {
+            entries,
+            bundle,
+            manifest,
+        }
+    }
+
+    /// Everything that is generated from it.
+    #[must_use]
+    pub fn generate(&self) -> Generated {
+        let request = Request {
+            crate_name: self.bundle.origin.crate_name.clone(),
+            kernels: self.entries.iter().map(|e| e.kernel.clone()).collect(),
+            filter: Vec::new(),
+            targets: Vec::new(),
+            options: Options::default(),
+            source_sha256: self.bundle.origin.source_sha256.clone(),
+            rust_gpu: self.bundle.origin.rust_gpu.clone(),
+        };
+        let modules = Modules::Final(self.bundle.modules.clone());
+        generate(&request, &modules).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// The modules as words.
+    #[must_use]
+    pub fn words(&self) -> BTreeMap<String, Vec<u32>> {
+        let words = |bytes: &[u8]| {
+            bytes
+                .chunks_exact(4)
+                .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                .collect()
+        };
+        self.bundle
+            .modules
+            .iter()
+            .map(|(name, bytes)| (name.clone(), words(bytes)))
+            .collect()
+    }
+}

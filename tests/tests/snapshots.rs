@@ -1,0 +1,28 @@
+//! Every generated text is under review: a change shows as a difference in `snapshots/text`.
+
+use hankel_tests::{Crate, root};
+
+#[test]
+fn every_text_in_every_language() {
+    let generated = Crate::shadows().generate();
+    let mut settings = insta::Settings::clone_current();
+    settings.set_snapshot_path(root().join("snapshots/text"));
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    settings.bind(|| {
+        for (path, bytes) in &generated.files {
+            if path.ends_with(".spv") {
+                continue;
+            }
+            let text = String::from_utf8(bytes.clone()).expect("texts are UTF-8");
+            insta::assert_snapshot!(path.replace('/', "."), text);
+        }
+    });
+}
+
+#[test]
+fn twice_gives_the_same_bytes() {
+    let (a, b) = (Crate::shadows().generate(), Crate::shadows().generate());
+    assert_eq!(a.files, b.files);
+    assert!(a.files.len() > 100, "{}", a.files.len());
+}

@@ -1,0 +1,147 @@
+//! Chores of this repository. `cargo xtask spirv` writes the committed SPIR-V anew, of the built-in
+//! kernels and of the crates that tests use; `cargo xtask spirv --check` fails unless it is what
+//! their sources give, byte for byte.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use hankel_codegen::build::finish_all;
+use hankel_codegen::bundle::Bundle;
+use hankel_codegen::compile::{Compiler, compile};
+use hankel_codegen::source_hash::hash;
+use hankel_dsl::native::Entry;
+use hankel_dsl::native::describe::Kernel;
+use hankel_toolchain::pinned::RUST_GPU_VERSION;
+
+const USAGE: &str = "usage: cargo xtask spirv [--check]";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match arguments[..] {
+        ["spirv"] => write(),
+        ["spirv", "--check"] => check(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(text) => {
+            println!("{text}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_owned()
+}
+
+/// A crate whose SPIR-V is committed.
+struct Committed {
+    manifest: &'static str,
+    folder: &'static str,
+    kernels: Vec<Kernel>,
+}
+
+fn committed() -> [Committed; 3] {
+    let kernels = |entries: Vec<Entry>| entries.into_iter().map(|e| e.kernel).collect();
+    [
+        Committed {
+            manifest: "kernels/shadows/Cargo.toml",
+            folder: "snapshots/spirv",
+            kernels: kernels(hankel_shadows::entries()),
+        },
+        Committed {
+            manifest: "tests/conformance/Cargo.toml",
+            folder: "snapshots/conformance",
+            kernels: kernels(hankel_conformance::entries()),
+        },
+        Committed {
+            manifest: "tests/listing/Cargo.toml",
+            folder: "snapshots/listing",
+            kernels: kernels(hankel_listing::entries()),
+        },
+    ]
+}
+
+impl Committed {
+    /// A bundle from the sources as they are.
+    fn fresh(&self) -> Result<Bundle, Box<dyn Error>> {
+        let options = hankel_toolchain::Options::from_env();
+        let toolchain = hankel_toolchain::ensure(&options, &mut hankel_toolchain::Silent)?;
+        let compiler = Compiler {
+            backend: toolchain.backend,
+            bin: toolchain.bin,
+            channel: toolchain.channel,
+        };
+        let manifest = root().join(self.manifest);
+        let sources = hash(&manifest)?;
+        let names: Vec<&str> = self.kernels.iter().map(|k| k.name.as_str()).collect();
+        let raw = compile(
+            &manifest,
+            &compiler,
+            &root().join("target"),
+            &names,
+            &mut |_| {},
+        )?;
+        Ok(Bundle::new(
+            &sources,
+            RUST_GPU_VERSION,
+            finish_all(&raw, &self.kernels)?,
+        ))
+    }
+}
+
+fn write() -> Result<String, Box<dyn Error>> {
+    let mut lines = Vec::new();
+    for one in committed() {
+        let bundle = one.fresh()?;
+        bundle.write(&root().join(one.folder))?;
+        lines.push(format!("{}: {} modules", one.folder, bundle.modules.len()));
+    }
+    Ok(lines.join("\n"))
+}
+
+fn check() -> Result<String, Box<dyn Error>> {
+    let mut lines = Vec::new();
+    for one in committed() {
+        let (fresh, committed) = (one.fresh()?, Bundle::read(&root().join(one.folder))?);
+        if fresh != committed {
+            return Err(complaint(one.folder, &fresh, &committed).into());
+        }
+        lines.push(format!(
+            "{}: {} modules rebuilt from source, the same bytes as committed",
+            one.folder,
+            fresh.modules.len()
+        ));
+    }
+    Ok(lines.join("\n"))
+}
+
+fn complaint(folder: &str, fresh: &Bundle, committed: &Bundle) -> String {
+    let differing = |a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>| -> Vec<String> {
+        a.iter()
+            .filter(|(name, bytes)| b.get(*name) != Some(bytes))
+            .map(|(n, _)| n.clone())
+            .collect()
+    };
+    let mut names = differing(&fresh.modules, &committed.modules);
+    names.extend(differing(&committed.modules, &fresh.modules));
+    names.sort();
+    names.dedup();
+    let what = if names.is_empty() {
+        "only its record differs".into()
+    } else {
+        names.join(", ")
+    };
+    format!("{folder} is not what the sources give ({what}): run `cargo xtask spirv`")
+}
