@@ -67,10 +67,7 @@ fn a_kernel_crate_is_built_loaded_and_run() {
     assert!(lines.iter().any(|l| l.contains("Finished")), "{lines:?}");
     assert_eq!(loaded.name, "parabola");
     let text = loaded.entry("parabla").unwrap_err().to_string();
-    assert!(
-        text.contains("parabola, parabola_f64, beyond"),
-        "{text}"
-    );
+    assert!(text.contains("parabola, parabola_f64, beyond"), "{text}");
 
     let mut device = NativeDevice::new();
     let points: Vec<u8> = (0..100).flat_map(|i| (i as f32).to_le_bytes()).collect();

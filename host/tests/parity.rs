@@ -4,6 +4,7 @@ mod common;
 
 use common::*;
 use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::{Arg, CallError};
 use hankel_host::crates::KernelEntry;
 use hankel_host::inputs::{self, Class};
 use hankel_host::parity::{self, KernelReport, Outcome, Path, Report, Subject, Wgsl};
@@ -180,7 +181,7 @@ fn what_does_not_run_is_an_error_and_what_is_not_there_is_said() {
             ..sample.kernel.clone()
         },
         |_| {
-            Err(hankel_dsl::native::CallError::Panic {
+            Err(CallError::Panic {
                 message: "index 7 of 3".into(),
             })
         },
@@ -232,5 +233,43 @@ fn absurd_inputs_of_a_kernel_with_a_tolerance_must_still_give_finite_results() {
     assert_eq!(
         run("/ p.y * (1.0 + p.x * 0.0) + p.x * p.x * 1e-30;"),
         Outcome::Failed
+    );
+}
+
+#[test]
+fn the_driver_does_not_reorder_what_naga_wrote() {
+    let mut sample = affine();
+    // lavapipe would factor the sum out of these products.
+    let sums = "p.x * settings.scale + p.y * settings.scale + p.x * 0.3";
+    sample.wgsl = sample
+        .wgsl
+        .replace("(p.x * settings.scale + settings.offset) / p.y", sums);
+    sample.spirv = spirv(&sample.wgsl);
+    sample.native = |call| {
+        let [Arg::Bytes(s), Arg::Bytes(pairs), Arg::BytesMut(out)] = &mut call.args[..] else {
+            return Err(CallError::Count {
+                expected: 3,
+                got: call.args.len(),
+            });
+        };
+        let (s, pairs): (&[f32], &[f32]) = (bytemuck::cast_slice(s), bytemuck::cast_slice(pairs));
+        for (o, p) in bytemuck::cast_slice_mut::<u8, f32>(out)
+            .iter_mut()
+            .zip(pairs.chunks(2))
+        {
+            *o = p[0] * s[0] + p[1] * s[0] + p[0] * 0.3;
+        }
+        Ok(())
+    };
+    let report = compare(&[sample], inputs::SEED);
+    assert_eq!(
+        *outcome(&report.kernels[0], Path::SpirvThroughNaga),
+        Outcome::Passed,
+        "{report}"
+    );
+    assert_eq!(
+        *outcome(&report.kernels[0], Path::Wgsl),
+        Outcome::Passed,
+        "{report}"
     );
 }

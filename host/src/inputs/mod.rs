@@ -105,7 +105,8 @@ pub fn flushes(kernel: &Kernel) -> bool {
 /// depend on what nobody promises:
 /// - a stage that flushes subnormal numbers gets none so small that a product of a few is one;
 /// - a kernel that writes a normalised format gets none so large that it overflows on the way:
-///   what becomes of a NaN there is not defined.
+///   what becomes of a NaN there is not defined;
+/// - a kernel with a sampler gets none that filtering could overflow with.
 fn magnitudes(kernel: &Kernel) -> (f64, f64) {
     let least = if flushes(kernel) { 1e-5 } else { 0.0 };
     let normalised = kernel.outputs.iter().any(|o| {
@@ -117,7 +118,16 @@ fn magnitudes(kernel: &Kernel) -> (f64, f64) {
             }
         )
     });
-    (least, if normalised { 1e8 } else { f64::MAX })
+    let samples = kernel
+        .params
+        .iter()
+        .any(|p| matches!(p.role, Role::Sampler { .. }));
+    let most = match (normalised, samples) {
+        (true, _) => 1e8,
+        (false, true) => 1e12,
+        (false, false) => f64::MAX,
+    };
+    (least, most)
 }
 
 /// The cases of a kernel, several for uniforms to vary: they hold one value for a whole run.

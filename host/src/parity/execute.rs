@@ -130,7 +130,7 @@ fn upload<'a>(
 }
 
 /// Runs a case on Vulkan, whatever its stage: vertices and fragments are drawn as points, each in
-/// a pixel of its own.
+/// a pixel of its own. What goes through naga is strict ([`super::translate`]).
 ///
 /// # Errors
 /// The device's, and [`ExecuteError::Stage`] for an interface that targets cannot hold.
@@ -139,7 +139,26 @@ pub fn on_vulkan(
     program: &Program<'_>,
     case: &Case,
 ) -> Result<Written, ExecuteError> {
-    match program.kernel.stage {
+    let kernel = program.kernel;
+    let translated = match program.shader {
+        Some(Shader::SpirvThroughNaga(words)) => Some(super::translate::spirv_to_spirv(words)),
+        Some(Shader::Wgsl { text, entry_point }) => Some(super::translate::wgsl_to_spirv(
+            text,
+            entry_point,
+            &kernel.name,
+        )),
+        Some(Shader::SpirvPassthrough(_)) | None => None,
+    };
+    let translated = translated.transpose().map_err(|e| bad(kernel, e))?;
+    let strict = Program {
+        shader: translated
+            .as_deref()
+            .map(Shader::SpirvPassthrough)
+            .or(program.shader),
+        ..*program
+    };
+    let program = &strict;
+    match kernel.stage {
         Stage::Compute { .. } => Ok(dispatch(device, program, case)?),
         Stage::Fragment | Stage::Vertex => {
             let mut held = Held::default();
@@ -354,20 +373,10 @@ fn vertex(
 ) -> Result<Written, ExecuteError> {
     let kernel = program.kernel;
     let height = (case.invocations as u32).div_ceil(WIDTH);
-    let shader = program
-        .shader
-        .ok_or_else(|| bad(kernel, "it has no shader"))?;
-    let words = match shader {
-        Shader::SpirvPassthrough(words) => words.to_vec(),
-        Shader::SpirvThroughNaga(words) => {
-            super::translate::spirv_to_spirv(words).map_err(|e| bad(kernel, e))?
-        }
-        Shader::Wgsl { text, entry_point } => {
-            super::translate::wgsl_to_spirv(text, entry_point, &kernel.name)
-                .map_err(|e| bad(kernel, e))?
-        }
+    let Some(Shader::SpirvPassthrough(words)) = program.shader else {
+        return Err(bad(kernel, "it has no shader"));
     };
-    let captured = capture::capture(&words, &kernel.name, WIDTH, height)
+    let captured = capture::capture(words, &kernel.name, WIDTH, height)
         .map_err(|problem| bad(kernel, problem))?;
     let slots = slots::slots(kernel);
     let binds = upload(device, &slots, &case.args, held)?;

@@ -2,7 +2,8 @@
 //!
 //! The reference is the native run on one thread, invocation by invocation, without SIMD lanes.
 //! Against it: the native run on lanes and all cores; the SPIR-V handed to the driver as it is;
-//! the same SPIR-V read and written anew by naga; and the WGSL. A difference that the first of
+//! the same SPIR-V read and written anew by naga; and the WGSL, read by naga. The driver is
+//! forbidden to reorder what naga wrote ([`translate`]). A difference that the first of
 //! these shows comes from rust-gpu or the driver, one that only the others show from naga.
 //!
 //! A kernel without tolerance gives the same bits for all inputs. A tolerance is for inputs as in

@@ -1,23 +1,27 @@
-//! Through naga to SPIR-V, the way wgpu does it, for the one thing that wgpu cannot be asked for:
-//! the words themselves.
+//! Through naga to SPIR-V, the way wgpu does it, but with the driver forbidden to fuse, factor or
+//! reorder float arithmetic. No language that naga writes can forbid that, and lavapipe does all
+//! three; left to it, parity would measure the driver's liberties, not what naga made of the code.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use naga::back::pipeline_constants::process_overrides;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-/// SPIR-V read and written anew by naga.
+use crate::device::vulkan::words;
+
+/// SPIR-V read and written anew by naga, with its specialisation constants at their defaults.
 ///
 /// # Errors
 /// naga's words.
-pub fn spirv_to_spirv(words: &[u32]) -> Result<Vec<u32>, String> {
+pub fn spirv_to_spirv(code: &[u32]) -> Result<Vec<u32>, String> {
     guarded(|| {
         let options = naga::front::spv::Options {
             adjust_coordinate_space: false,
             strict_capabilities: false,
             block_ctx_dump_prefix: None,
         };
-        let module = naga::front::spv::Frontend::new(words.iter().copied(), &options)
+        let module = naga::front::spv::Frontend::new(code.iter().copied(), &options)
             .parse()
             .map_err(|e| format!("naga cannot read its SPIR-V: {e}"))?;
         write(&module)
@@ -45,12 +49,16 @@ fn write(module: &naga::Module) -> Result<Vec<u32>, String> {
     let info = Validator::new(ValidationFlags::all(), Capabilities::all())
         .validate(module)
         .map_err(|e| format!("naga finds it invalid: {}", e.into_inner()))?;
+    let (module, info) = process_overrides(module, &info, None, &Default::default())
+        .map_err(|e| format!("naga cannot set its constants: {e}"))?;
     let options = spv::Options {
         lang_version: (1, 3),
         flags: spv::WriterFlags::empty(),
         ..Default::default()
     };
-    spv::write_vec(module, &info, &options, None).map_err(|e| format!("naga cannot write it: {e}"))
+    let written = spv::write_vec(&module, &info, &options, None)
+        .map_err(|e| format!("naga cannot write it: {e}"))?;
+    words::forbid_reordering(&written)
 }
 
 fn guarded(work: impl FnOnce() -> Result<Vec<u32>, String>) -> Result<Vec<u32>, String> {

@@ -7,6 +7,15 @@ use std::collections::HashSet;
 const ENTRY_POINT: u16 = 15;
 /// `OpCapability`.
 const CAPABILITY: u16 = 17;
+/// `OpTypeVoid`, the first of the types.
+const TYPE_VOID: u16 = 19;
+/// `OpVariable`, the last of the declarations.
+const VARIABLE: u16 = 59;
+/// Float arithmetic: negation, sum, difference, product, quotient, remainders, and what multiplies
+/// vectors and matrices.
+const ARITHMETIC: [u16; 14] = [
+    127, 129, 131, 133, 136, 140, 141, 142, 143, 144, 145, 146, 147, 148,
+];
 /// `OpSpecConstant`.
 const SPEC_CONSTANT: u16 = 50;
 /// `OpFunction`.
@@ -20,6 +29,8 @@ const DECORATE: u16 = 71;
 const SPEC_ID: u32 = 1;
 /// Decoration `NonReadable`.
 const NON_READABLE: u32 = 25;
+/// Decoration `NoContraction`.
+const NO_CONTRACTION: u32 = 42;
 /// Decoration `Binding`.
 const BINDING: u32 = 33;
 /// Decoration `DescriptorSet`.
@@ -149,6 +160,38 @@ pub fn move_to_set(words: &[u32], set: u32) -> Result<Vec<u32>, String> {
     Ok(changed)
 }
 
+/// The module with all its float arithmetic decorated `NoContraction`, which forbids a driver to
+/// fuse, factor or reorder it. What has the decoration already keeps it once.
+pub fn forbid_reordering(words: &[u32]) -> Result<Vec<u32>, String> {
+    let all = instructions(words)?;
+    let already: HashSet<u32> = all
+        .iter()
+        .filter_map(|i| match (i.opcode, i.operands) {
+            (DECORATE, [target, NO_CONTRACTION]) => Some(*target),
+            _ => None,
+        })
+        .collect();
+    let results = all.iter().filter_map(|i| match i.operands {
+        [_, result, ..] if ARITHMETIC.contains(&i.opcode) => Some(*result),
+        _ => None,
+    });
+    let added: Vec<u32> = results
+        .filter(|id| !already.contains(id))
+        .flat_map(|id| [3 << 16 | u32::from(DECORATE), id, NO_CONTRACTION])
+        .collect();
+    // Decorations stand together, before the first type, constant or variable.
+    let Some(at) = all
+        .iter()
+        .find(|i| (TYPE_VOID..=VARIABLE).contains(&i.opcode))
+        .map(|i| i.at)
+    else {
+        return Err("it declares no types".into());
+    };
+    let mut changed = words.to_vec();
+    changed.splice(at..at, added);
+    Ok(changed)
+}
+
 /// The module with the variables at `bindings` declared as never read, which naga needs to know of
 /// a storage texture that is only written.
 pub fn write_only(words: &[u32], bindings: &[u32]) -> Result<Vec<u32>, String> {
@@ -226,6 +269,26 @@ mod tests {
             (&w[..at], &w[at + 1..]),
             (&module()[..at], &module()[at + 1..])
         );
+    }
+
+    #[test]
+    fn arithmetic_is_decorated_once() {
+        let mut w = module();
+        let mut op = |opcode: u16, operands: &[u32]| {
+            let mut i = vec![(operands.len() as u32 + 1) << 16 | u32::from(opcode)];
+            i.extend_from_slice(operands);
+            let end = w.len() - 1;
+            w.splice(end..end, i);
+        };
+        op(129, &[4, 11, 12, 13]);
+        // An integer's sum is none of it.
+        op(128, &[4, 14, 12, 13]);
+        let once = forbid_reordering(&w).unwrap();
+        assert_eq!(once.len(), w.len() + 3);
+        let added = [3 << 16 | u32::from(DECORATE), 11, NO_CONTRACTION];
+        assert!(once.windows(3).any(|x| x == added));
+        assert_eq!(summary(&once), summary(&w));
+        assert_eq!(forbid_reordering(&once).unwrap(), once);
     }
 
     #[test]
