@@ -19,7 +19,7 @@ fn show(args: &ToolchainStatus) -> Result<Outcome> {
     if args.format == Format::Json {
         print_json(&status);
     } else {
-        print!("{status}");
+        println!("{status}");
     }
     Ok(Outcome::of(status.used.is_some()))
 }

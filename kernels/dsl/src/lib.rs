@@ -63,7 +63,7 @@ mod texture;
 pub use glam;
 pub use hankel_macros::{Element, kernel, kernels};
 pub use memory::{Atomics, Buffer, Group};
-pub use real::{Mask, Real};
+pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]
 pub use spirv_std;

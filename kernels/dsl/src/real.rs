@@ -104,6 +104,18 @@ pub trait Real:
     }
 }
 
+/// `x` without its fraction. It must be within the range of `i32`: clamp first. Unlike `as`, this is
+/// one instruction in a shader, without tests for what is out of range.
+#[inline(always)]
+#[must_use]
+pub fn to_i32(x: f32) -> i32 {
+    #[cfg(target_arch = "spirv")]
+    // SAFETY: the caller clamps; out of range, SPIR-V's conversion gives some number.
+    return unsafe { x.to_int_unchecked() };
+    #[cfg(not(target_arch = "spirv"))]
+    return x as i32;
+}
+
 /// A number of the [`Real`] type that the context asks for, rounded from the `f64` given:
 /// `x * lit!(0.1)`.
 ///

@@ -3,6 +3,8 @@
 use hankel_dsl::glam::{IVec2, UVec2, Vec4};
 use hankel_dsl::{Buffer, Element, Texture2d, kernel};
 
+use crate::grid::within;
+
 /// The direction of a filter pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
 #[repr(C)]
@@ -30,11 +32,11 @@ pub fn blur(
     #[storage] weights: Buffer<'_, f32>,
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
-    let last = source.size().as_ivec2() - IVec2::ONE;
+    let size = source.size();
     let at = at.as_ivec2();
     let tap = |offset: IVec2| {
         let p = at + offset;
-        source.load(UVec2::new(within(p.x, last.x), within(p.y, last.y)))
+        source.load(UVec2::new(within(p.x, size.x), within(p.y, size.y)))
     };
     let mut sum = tap(IVec2::ZERO) * weights.get(0);
     let mut offset = direction.step;
@@ -45,11 +47,4 @@ pub fn blur(
         i += 1;
     }
     sum
-}
-
-/// `i` moved to the nearest of 0 to `last`.
-#[inline(always)]
-fn within(i: i32, last: i32) -> u32 {
-    let i = if i < 0 { 0 } else { i };
-    (if i > last { last } else { i }) as u32
 }

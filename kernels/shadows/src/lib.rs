@@ -13,6 +13,7 @@
 pub mod blur;
 pub mod bounds;
 pub mod depth;
+mod grid;
 pub mod resolve;
 pub mod shade;
 

@@ -2,10 +2,10 @@
 //! texel stores their mean (\[BHS\], lecture, "Generate a moment shadow map", step 2).
 
 use hankel_dsl::glam::{UVec2, Vec4};
-use hankel_dsl::{Texture2dMultisampled, kernel};
+use hankel_dsl::{Real, Texture2dMultisampled, kernel};
 use hankel_moments::{Moments4, Quantized4, quantize_symmetric, quantize_unit};
 
-/// The mean of what the samples of a texel give.
+/// The mean of what the samples of a texel give; depths beyond [0, 1] are moved to its ends.
 #[inline(always)]
 fn mean(
     depth: Texture2dMultisampled<'_>,
@@ -13,10 +13,11 @@ fn mean(
     samples: u32,
     moments: impl Fn(f32) -> Vec4,
 ) -> Vec4 {
-    let mut sum = moments(depth.load(at, 0).x);
+    let sample = |i: u32| moments(Real::saturate(depth.load(at, i).x));
+    let mut sum = sample(0);
     let mut i = 1;
     while i < samples {
-        sum += moments(depth.load(at, i).x);
+        sum += sample(i);
         i += 1;
     }
     sum / samples as f32

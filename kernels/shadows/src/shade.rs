@@ -2,13 +2,14 @@
 //! uniforms and map.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel, to_i32};
 use hankel_moments::{
     Moments4, Quantized4, cut_leak, dequantize_symmetric, dequantize_unit, hamburger_4,
     hausdorff_4, variance_2,
 };
 
 use crate::depth::{Transform, row_times_point};
+use crate::grid::within;
 
 /// How the map holds moments: values of the specialisation constant `encoding`.
 pub mod encoding {
@@ -67,8 +68,8 @@ fn dot(a: Vec3, b: Vec3) -> f32 {
 fn lit(light: &Light, normal: Vec3, colour: Vec3, shadow: f32) -> Vec4 {
     let toward = Vec3::new(light.toward.x, light.toward.y, light.toward.z);
     // A normal interpolated to nothing has no direction; the floor keeps it finite.
-    let length = dot(normal, normal).sqrt().max_of(1e-20);
-    let cosine = (dot(normal, toward) / length).max_of(0.0);
+    let length = Real::max(Real::sqrt(dot(normal, normal)), 1e-20);
+    let cosine = Real::max(dot(normal, toward) / length, 0.0);
     let direct = cosine * light.toward.w * (1.0 - shadow);
     // 65504 is the most that a 16-bit float target holds.
     let shade = |colour: f32, ambient: f32| Real::clamp(colour * (direct + ambient), 0.0, 65504.0);
@@ -78,18 +79,6 @@ fn lit(light: &Light, normal: Vec3, colour: Vec3, shadow: f32) -> Vec4 {
         shade(colour.z, light.ambient.z),
         1.0,
     )
-}
-
-/// `Real`'s maximum under another name: `f32` has one of its own, which tests for NaN.
-trait MaxOf {
-    fn max_of(self, other: Self) -> Self;
-}
-
-impl MaxOf for f32 {
-    #[inline(always)]
-    fn max_of(self, other: Self) -> Self {
-        Real::max(self, other)
-    }
 }
 
 /// A receiver in the map: coordinates and biased depth, from 0 to 1 inside. What is far outside is
@@ -259,7 +248,8 @@ pub fn shade_pcf(
     let size = depth.size();
     let nearest = |t: f32, size: u32| {
         let last = (size - 1) as f32;
-        Real::clamp((t * size as f32).floor_of(), 0.0, last) as i32
+        // Not negative, so that cutting the fraction off is rounding down.
+        to_i32(Real::clamp(t * size as f32, 0.0, last))
     };
     let (x, y) = (nearest(uv.x, size.x), nearest(uv.y, size.y));
     let radius = light.filter_radius as i32;
@@ -276,23 +266,4 @@ pub fn shade_pcf(
     }
     let width = (2 * radius + 1) as f32;
     lit(light, normal, colour, shadowed / (width * width))
-}
-
-trait FloorOf {
-    fn floor_of(self) -> Self;
-}
-
-impl FloorOf for f32 {
-    #[inline(always)]
-    fn floor_of(self) -> Self {
-        Real::floor(self)
-    }
-}
-
-/// `i` moved to the nearest of 0 to `size - 1`.
-#[inline(always)]
-fn within(i: i32, size: u32) -> u32 {
-    let last = size as i32 - 1;
-    let i = if i < 0 { 0 } else { i };
-    (if i > last { last } else { i }) as u32
 }

@@ -236,10 +236,11 @@ pub fn corner(
     )
 }
 
-/// A colour times a uniform's, and its luminance to a second target.
+/// A colour times a uniform's, and the sum of its channels to a second target.
 #[kernel(fragment)]
 pub fn tint(#[varying] colour: Vec4, #[uniform] map: &Affine<f32>) -> (Vec4, Vec4) {
     let tinted = colour * map.scale;
-    let sum = tinted.x + tinted.y + tinted.z;
+    // Of the colour itself: drivers may take a common factor out of a sum.
+    let sum = colour.x + colour.y + colour.z;
     (tinted, Vec4::new(sum, map.offset, 0.0, 1.0))
 }

@@ -1,0 +1,447 @@
+//! The command line as a user types it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("cli/ lies in the repository")
+}
+
+/// A folder outside of the repository, where a test works.
+struct Desk(TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.path(name);
+        fs::write(&path, text).expect("the desk can be written");
+        path
+    }
+
+    /// `hankel` with these words.
+    fn hankel(&self, line: &str) -> Run {
+        let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
+            .args(line.split_whitespace())
+            .current_dir(self.0.path())
+            // No compiler, wherever the test runs.
+            .env("HANKEL_CACHE", self.path("no-cache"))
+            .env_remove("HANKEL_TOOLCHAIN")
+            .env_remove("HANKEL_TOOLCHAIN_ARCHIVE")
+            .output()
+            .expect("hankel starts");
+        Run(output)
+    }
+}
+
+struct Run(Output);
+
+impl Run {
+    fn out(&self) -> String {
+        String::from_utf8_lossy(&self.0.stdout).into_owned()
+    }
+
+    /// The error stream, with its line breaks undone.
+    fn err(&self) -> String {
+        String::from_utf8_lossy(&self.0.stderr)
+            .replace(['│', '\n'], " ")
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
+    }
+
+    fn code(&self, expected: i32) -> &Self {
+        assert_eq!(
+            self.0.status.code(),
+            Some(expected),
+            "{}\n{}",
+            self.out(),
+            self.err()
+        );
+        self
+    }
+
+    /// Fails with a code and words.
+    fn fails(&self, code: i32, words: &[&str]) {
+        self.code(code);
+        for word in words {
+            assert!(self.err().contains(word), "no `{word}` in: {}", self.err());
+        }
+        assert!(!self.err().contains("panicked"), "{}", self.err());
+    }
+}
+
+#[test]
+fn help_has_examples_and_exit_codes() {
+    let desk = Desk::new();
+    let help = desk.hankel("--help").code(0).out();
+    for word in ["Examples:", "Exit codes", "build", "parity", "completions"] {
+        assert!(help.contains(word), "{help}");
+    }
+    for command in [
+        "build",
+        "check",
+        "list",
+        "new",
+        "parity",
+        "eval",
+        "render",
+        "toolchain install",
+    ] {
+        let help = desk.hankel(&format!("{command} --help")).code(0).out();
+        assert!(help.contains("Example"), "{command}: {help}");
+    }
+    desk.hankel("frobnicate")
+        .fails(2, &["unrecognized subcommand"]);
+    desk.hankel("build --frobnicate")
+        .fails(2, &["unexpected argument"]);
+}
+
+#[test]
+fn completions_are_scripts() {
+    let desk = Desk::new();
+    assert!(
+        desk.hankel("completions bash")
+            .code(0)
+            .out()
+            .contains("_hankel()")
+    );
+    assert!(
+        desk.hankel("completions fish")
+            .code(0)
+            .out()
+            .contains("complete -c hankel")
+    );
+}
+
+#[test]
+fn a_build_is_whole_and_then_left_alone() {
+    let desk = Desk::new();
+    let first = desk.hankel("build --out shaders").code(0).out();
+    assert!(first.contains("25 kernels"), "{first}");
+    for file in [
+        "wgsl/hamburger_4msm.wgsl",
+        "hlsl/shade_hamburger.hlsl",
+        "msl/surface.metal",
+        "glsl/vsm.comp",
+        "spirv/vsm.spv",
+        "manifest.json",
+        "include/hankel.h",
+        "include/hankel.rs",
+    ] {
+        assert!(desk.path("shaders").join(file).is_file(), "{file}");
+    }
+    let before = fs::metadata(desk.path("shaders/manifest.json"))
+        .and_then(|m| m.modified())
+        .ok();
+    let second = desk.hankel("build --out shaders").code(0).out();
+    assert!(second.contains("0 files written"), "{second}");
+    let after = fs::metadata(desk.path("shaders/manifest.json"))
+        .and_then(|m| m.modified())
+        .ok();
+    assert_eq!(before, after);
+    assert_eq!(desk.hankel("--quiet build --out shaders").code(0).out(), "");
+}
+
+#[test]
+fn a_build_can_be_narrowed() {
+    let desk = Desk::new();
+    let json = desk
+        .hankel("build --out s --target hlsl --shader-model 5.1 --kernel quantize_* --format json")
+        .code(0)
+        .out();
+    assert!(json.contains("\"kernels\": 4"), "{json}");
+    assert!(desk.path("s/hlsl/quantize_4_unit.hlsl").is_file());
+    assert!(!desk.path("s/wgsl").exists());
+}
+
+#[test]
+fn misuse_of_build_is_explained() {
+    let desk = Desk::new();
+    desk.hankel("build --target cobol")
+        .fails(2, &["no target is named `cobol`", "wgsl"]);
+    desk.hankel("build --kernel nosuch")
+        .fails(2, &["no kernel is named `nosuch`", "hamburger_4msm"]);
+    desk.hankel("build --shader-model 4.0")
+        .fails(2, &["shader model `4.0`", "5.1"]);
+    desk.hankel("build --msl-version 9")
+        .fails(2, &["MSL version `9`"]);
+    desk.hankel("build --bounds-checks some")
+        .fails(2, &["bounds checks `some`"]);
+    desk.hankel("build --set encoding=unit")
+        .fails(2, &["whole number"]);
+    desk.hankel("build --set nosuch=1").fails(2, &["nosuch"]);
+    desk.hankel("build --manifest-path nowhere/Cargo.toml")
+        .fails(2, &["nowhere", "no such file"]);
+    desk.hankel("check nowhere")
+        .fails(2, &["nowhere", "no such folder"]);
+}
+
+#[test]
+fn files_of_ones_own_are_not_overwritten() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("s/wgsl")).expect("the desk can be written");
+    let own = desk.write("s/wgsl/vsm.wgsl", "// mine\n");
+    desk.hankel("build --out s --kernel vsm")
+        .fails(2, &["in the way", "--force"]);
+    assert_eq!(fs::read_to_string(&own).ok().as_deref(), Some("// mine\n"));
+    assert!(
+        !desk.path("s/manifest.json").exists(),
+        "nothing is half-written"
+    );
+    desk.hankel("build --out s --kernel vsm --force").code(0);
+}
+
+#[test]
+fn check_finds_what_does_not_follow() {
+    let desk = Desk::new();
+    desk.hankel("build --out s --kernel vsm").code(0);
+    desk.hankel("check s --kernel vsm").code(0);
+    let file = desk.path("s/wgsl/vsm.wgsl");
+    let text = fs::read_to_string(&file).expect("it was built");
+    fs::write(&file, text.replacen("1f", "2f", 1)).expect("the desk can be written");
+    let run = desk.hankel("check s --kernel vsm");
+    let out = run.code(1).out();
+    for word in ["--- ", "+++ ", "vsm.wgsl", "-", "+"] {
+        assert!(out.contains(word), "{out}");
+    }
+    let json = desk
+        .hankel("check s --kernel vsm --format json")
+        .code(1)
+        .out();
+    assert!(json.contains("\"changed\""), "{json}");
+    fs::write(&file, &text).expect("the desk can be written");
+    desk.write("hankel.toml", "[budget.kernels.vsm]\noperations = 3\n");
+    let out = desk.hankel("check s --kernel vsm").code(1).out();
+    assert!(out.contains("operations"), "{out}");
+    desk.write("hankel.toml", "[budget]\noperatoins = 3\n");
+    desk.hankel("check s --kernel vsm")
+        .fails(2, &["hankel.toml", "operatoins"]);
+}
+
+#[test]
+fn the_list_shows_bindings_and_cost() {
+    let desk = Desk::new();
+    let out = desk
+        .hankel("list --kernel hamburger_4msm --bindings")
+        .code(0)
+        .out();
+    for word in ["map 1-D", "moment_bias f32 @16", "binding 2: Shadow"] {
+        assert!(out.contains(word), "{out}");
+    }
+    let json = desk.hankel("list --kernel vsm --format json").code(0).out();
+    assert!(json.contains("\"operations\""), "{json}");
+}
+
+const ROWS: &str = "depth,b1,b2,b3,b4\n0.5,0.5,0.34,0.26,0.2056\n0.9,0.5,0.34,0.26,0.2056\n0.1,0.5,0.34,0.26,0.2056\n";
+
+#[test]
+fn eval_runs_rows_alike_on_both_backends() {
+    let desk = Desk::new();
+    let header = desk
+        .hankel("list --kernel hamburger_4msm --bindings")
+        .code(0)
+        .out();
+    assert!(header.contains("depth"), "{header}");
+    // Columns are the fields, nested ones by their path.
+    let rows = ROWS.replace("b1,b2,b3,b4", "moments.b1,moments.b2,moments.b3,moments.b4");
+    desk.write("rows.csv", &rows);
+    desk.hankel("eval hamburger_4msm --input rows.csv --output native.csv --set moment_bias=0")
+        .code(0);
+    desk.hankel("eval hamburger_4msm --input rows.csv --output vulkan.csv --backend vulkan")
+        .code(0);
+    let (a, b) = (
+        fs::read_to_string(desk.path("native.csv")).expect("it was written"),
+        fs::read_to_string(desk.path("vulkan.csv")).expect("it was written"),
+    );
+    assert_eq!(a, b);
+    // Two surfaces at 0.2 and 0.8, half each: half the shadow between them.
+    let shadows: Vec<f32> = a
+        .lines()
+        .skip(1)
+        .map(|l| l.parse().expect("a number"))
+        .collect();
+    assert_eq!(a.lines().next(), Some("shadow"));
+    assert!(
+        (shadows[0] - 0.5).abs() < 1e-3 && shadows[1] > 0.99 && shadows[2] < 0.01,
+        "{shadows:?}"
+    );
+    desk.hankel("eval hamburger_4msm --input rows.csv --output f64.csv --precision f64")
+        .code(0);
+    desk.hankel(
+        "eval hamburger_4msm --input rows.csv --output f64v.csv --precision f64 --backend vulkan",
+    )
+    .code(0);
+    assert_eq!(
+        fs::read(desk.path("f64.csv")).ok(),
+        fs::read(desk.path("f64v.csv")).ok()
+    );
+}
+
+#[test]
+fn eval_explains_bad_tables_and_writes_nothing() {
+    let desk = Desk::new();
+    let good = "b1,b2,depth\n0.5,0.3,0.2\n";
+    for (name, table, words) in [
+        (
+            "text.csv",
+            "b1,b2,depth\n0.5,0.3,0.2\n0.5,x,0.2\n",
+            &["row 2", "b2", "x"][..],
+        ),
+        (
+            "nan.csv",
+            "b1,b2,depth\n0.5,NaN,0.2\n",
+            &["row 1", "b2"][..],
+        ),
+        ("missing.csv", "b1,depth\n0.5,0.2\n", &["b2"][..]),
+        ("extra.csv", "b1,b2,depth,b9\n0.5,0.3,0.2,1\n", &["b9"][..]),
+        ("short.csv", "b1,b2,depth\n0.5,0.3\n", &["row 1"][..]),
+        ("empty.csv", "", &["empty.csv"][..]),
+    ] {
+        desk.write(name, table);
+        desk.hankel(&format!("eval vsm --input {name} --output out.csv"))
+            .fails(2, words);
+        assert!(!desk.path("out.csv").exists(), "{name}");
+    }
+    desk.hankel("eval vsm --input nowhere.csv --output out.csv")
+        .fails(2, &["nowhere.csv"]);
+    desk.write("good.csv", good);
+    desk.hankel("eval vsm --input good.csv --output out.csv --set nosuch=1")
+        .fails(2, &["nosuch", "least_variance"]);
+    desk.hankel("eval shade_pcf --input good.csv --output out.csv")
+        .fails(2, &["shade_pcf"]);
+    desk.hankel("eval vsm --input good.csv --output nowhere/out.csv")
+        .fails(2, &["nowhere"]);
+    assert!(!desk.path("out.csv").exists());
+    desk.hankel("eval vsm --input good.csv --output out.csv")
+        .code(0);
+}
+
+#[test]
+fn parity_reports_and_filters() {
+    let desk = Desk::new();
+    let out = desk.hankel("parity --kernel quantize_4_unit").code(0).out();
+    for word in [
+        "native lanes",
+        "SPIR-V via naga",
+        "WGSL",
+        "bit for bit",
+        "pass",
+    ] {
+        assert!(out.contains(word), "{out}");
+    }
+    let json = desk
+        .hankel("parity --kernel vsm --seed 5 --format json")
+        .code(0)
+        .out();
+    assert!(json.contains("\"seed\": 5"), "{json}");
+    desk.hankel("parity --kernel nosuch").fails(2, &["nosuch"]);
+}
+
+#[test]
+fn without_a_driver_vulkan_says_how_to_get_one() {
+    let desk = Desk::new();
+    let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
+        .arg("parity")
+        .current_dir(desk.0.path())
+        .env("VK_DRIVER_FILES", "/nowhere.json")
+        .env("VK_ICD_FILENAMES", "/nowhere.json")
+        .output()
+        .expect("hankel starts");
+    Run(output).fails(3, &["no Vulkan device", "libvulkan1"]);
+}
+
+const SCENE: &str = r#"
+[geometry]
+procedural = "box"
+[output]
+width = 64
+height = 36
+"#;
+
+#[test]
+fn a_scene_is_rendered_and_compared() {
+    let desk = Desk::new();
+    desk.write("scene.toml", SCENE);
+    let out = desk
+        .hankel("render scene.toml --out a.png --compare --format json")
+        .code(0)
+        .out();
+    assert!(out.contains("\"psnr\""), "{out}");
+    for file in ["a.png", "a-vulkan.png", "a-difference.png"] {
+        let bytes = fs::read(desk.path(file)).expect("it was written");
+        assert_eq!(&bytes[1..4], b"PNG", "{file}");
+    }
+    desk.hankel("render nowhere.toml --out b.png")
+        .fails(2, &["nowhere.toml"]);
+    desk.write("bad.toml", &SCENE.replace("64", "0"));
+    desk.hankel("render bad.toml --out b.png")
+        .fails(2, &["bad.toml", "width"]);
+    assert!(!desk.path("b.png").exists());
+}
+
+/// A crate of one's own, outside of the repository, through the plug-in.
+#[test]
+fn a_new_crate_builds_at_once() {
+    let desk = Desk::new();
+    // Inside of the checkout's target folder, so that it takes the DSL from the checkout.
+    let here = root().join("target/tmp-new-crate");
+    let _ = fs::remove_dir_all(&here);
+    fs::create_dir_all(&here).expect("target/ can be written");
+    let path = here.join("my-kernels");
+    let out = desk
+        .hankel(&format!("new {}", path.display()))
+        .code(0)
+        .out();
+    assert!(
+        out.contains("Cargo.toml") && out.contains("README.md"),
+        "{out}"
+    );
+    desk.hankel(&format!("new {}", path.display()))
+        .fails(2, &["not empty"]);
+    desk.hankel("new Bad-Name")
+        .fails(2, &["Bad-Name", "letters"]);
+    // The same versions as the repository's, so that nothing is fetched.
+    fs::copy(root().join("Cargo.lock"), path.join("Cargo.lock")).expect("a copy");
+    let run = desk.hankel(&format!(
+        "list --manifest-path {}",
+        path.join("Cargo.toml").display()
+    ));
+    // Its native side was built and asked; its SPIR-V needs a compiler, which is not here.
+    run.fails(3, &["my-kernels", "hankel toolchain install"]);
+    let test = Command::new("cargo")
+        .args(["test", "--release"])
+        .current_dir(&path)
+        .env("CARGO_TARGET_DIR", here.join("target"))
+        .output()
+        .expect("cargo starts");
+    assert!(
+        test.status.success(),
+        "{}",
+        String::from_utf8_lossy(&test.stderr)
+    );
+}
+
+#[test]
+fn toolchain_status_says_what_there_is() {
+    let desk = Desk::new();
+    let out = desk.hankel("toolchain status").out();
+    for word in ["rust-gpu 0.10.0", "cache", "archive", "rustup", "source"] {
+        assert!(out.contains(word), "{out}");
+    }
+    let json = desk.hankel("toolchain status --format json").out();
+    assert!(json.contains("\"ways\""), "{json}");
+    desk.hankel("toolchain install --from nowhere.tar.zst")
+        .fails(3, &["nowhere.tar.zst"]);
+}
