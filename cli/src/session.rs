@@ -146,11 +146,11 @@ impl Session {
         let kept = target.join("hankel/final").join(&sources.name);
         let committed = checkout().map(|root| root.join(COMMITTED));
         for folder in committed.iter().chain([&kept]) {
-            if let Ok(bundle) = Bundle::read(folder) {
-                if bundle.origin.crate_name == sources.name && bundle.check_current(wanted).is_ok()
-                {
-                    return Ok(bundle);
-                }
+            if let Ok(bundle) = Bundle::read(folder)
+                && bundle.origin.crate_name == sources.name
+                && bundle.check_current(wanted).is_ok()
+            {
+                return Ok(bundle);
             }
         }
         let raw = self.compile(manifest, &target)?;

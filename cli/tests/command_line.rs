@@ -365,6 +365,11 @@ fn without_a_driver_vulkan_says_how_to_get_one() {
 const SCENE: &str = r#"
 [geometry]
 procedural = "box"
+[camera]
+eye = [3.0, 3.0, 4.0]
+target = [0.0, 0.5, 0.0]
+[light]
+direction = [-1.0, -2.0, -0.5]
 [output]
 width = 64
 height = 36

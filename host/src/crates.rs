@@ -92,7 +92,7 @@ pub enum CrateError {
         path: PathBuf,
     },
     /// cargo does not start.
-    #[error("cannot run `cargo` ({detail}); Rust comes from https://rustup.rs")]
+    #[error("cannot run `cargo` ({detail}): install Rust with rustup or from your distribution")]
     NoCargo {
         /// What the system said.
         detail: String,
@@ -214,9 +214,7 @@ struct Target {
 #[serde(tag = "reason", rename_all = "kebab-case")]
 enum Message {
     #[serde(rename = "compiler-message")]
-    Compiler {
-        message: Diagnostic,
-    },
+    Compiler { message: Diagnostic },
     #[serde(rename = "compiler-artifact")]
     Artifact {
         manifest_path: PathBuf,

@@ -17,7 +17,7 @@ pub struct Settings<R> {
     pub moment_bias: R,
     /// What is taken off the receiver's depth.
     pub depth_bias: R,
-    /// A shadow of 1 minus this is full (0.02 in the lecture).
+    /// A shadow of 1 minus this is full: from 0 to 0.5, 0.02 in the lecture.
     pub light_leak: R,
     /// The least variance of variance shadow mapping.
     pub least_variance: R,

@@ -41,7 +41,7 @@ pub struct Light {
     pub moment_bias: f32,
     /// What is taken off a receiver's depth, in the map's range of 0 to 1.
     pub depth_bias: f32,
-    /// The share of shadow that is taken for full shadow is 1 minus this (0.02 in the lecture).
+    /// A shadow of 1 minus this is full: from 0 to 0.5, 0.02 in the lecture.
     pub light_leak: f32,
     /// Texels of the percentage-closer filter to each side of the receiver's own.
     pub filter_radius: u32,
