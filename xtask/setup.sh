@@ -37,3 +37,6 @@ if ! command -v cargo >/dev/null 2>&1; then
     echo "Rust is missing: install a stable toolchain of 1.89 or later, with rustup or from your distribution" >&2
     exit 3
 fi
+
+# Mesa's layer for choosing among several GPUs complains on a machine without a desktop.
+export NODEVICE_SELECT=1

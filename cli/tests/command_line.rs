@@ -349,6 +349,22 @@ fn parity_reports_and_filters() {
     desk.hankel("parity --kernel nosuch").fails(2, &["nosuch"]);
 }
 
+/// Whatever the processor's instruction set: lanes give the scalar bits.
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let desk = Desk::new();
+    for level in ["avx512", "avx2", "sse4.2", "neon", "baseline"] {
+        let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
+            .args(["parity", "--kernel", "*4msm*", "--kernel", "quantize*", "--format", "json"])
+            .current_dir(desk.0.path())
+            .env("HANKEL_SIMD", level)
+            .output()
+            .expect("hankel starts");
+        let json = Run(output).code(0).out();
+        assert!(json.contains("\"native_lanes\""), "{level}: {json}");
+    }
+}
+
 #[test]
 fn without_a_driver_vulkan_says_how_to_get_one() {
     let desk = Desk::new();

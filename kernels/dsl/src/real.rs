@@ -4,6 +4,10 @@
 //! no `mix`, no `smoothstep` and no library transcendental: their results differ between
 //! implementations. `min`, `max` and `select` are single instructions, without the NaN tests that
 //! `core`'s carry; a kernel is built never to make a NaN, so none is needed.
+//!
+//! Shader compilers may still reorder a sum unless they are told not to, which not every language
+//! can. They move constant summands to the front and take common factors out, so a kernel that
+//! must agree to the bit is written that way: `x * a + c + y * b`, and `s * (x + y)`.
 
 use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
