@@ -355,7 +355,15 @@ fn every_instruction_set_gives_the_same_bits() {
     let desk = Desk::new();
     for level in ["avx512", "avx2", "sse4.2", "neon", "baseline"] {
         let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
-            .args(["parity", "--kernel", "*4msm*", "--kernel", "quantize*", "--format", "json"])
+            .args([
+                "parity",
+                "--kernel",
+                "*4msm*",
+                "--kernel",
+                "quantize*",
+                "--format",
+                "json",
+            ])
             .current_dir(desk.0.path())
             .env("HANKEL_SIMD", level)
             .output()
@@ -416,11 +424,7 @@ fn a_scene_is_rendered_and_compared() {
 #[test]
 fn a_new_crate_builds_at_once() {
     let desk = Desk::new();
-    // Inside of the checkout's target folder, so that it takes the DSL from the checkout.
-    let here = root().join("target/tmp-new-crate");
-    let _ = fs::remove_dir_all(&here);
-    fs::create_dir_all(&here).expect("target/ can be written");
-    let path = here.join("my-kernels");
+    let path = desk.path("my-kernels");
     let out = desk
         .hankel(&format!("new {}", path.display()))
         .code(0)
@@ -444,7 +448,7 @@ fn a_new_crate_builds_at_once() {
     let test = Command::new("cargo")
         .args(["test", "--release"])
         .current_dir(&path)
-        .env("CARGO_TARGET_DIR", here.join("target"))
+        .env("CARGO_TARGET_DIR", desk.path("target"))
         .output()
         .expect("cargo starts");
     assert!(

@@ -51,7 +51,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         name: name.into(),
         function: name.into(),
         summary: "Does what a test\nneeds.".into(),
-        file: "/home/somebody/kernels/src/lib.rs".into(),
+        file: "/elsewhere/kernels/src/lib.rs".into(),
         line: 7,
         stage,
         precision: None,
