@@ -15,9 +15,17 @@ fn every_text_in_every_language() {
                 continue;
             }
             let text = String::from_utf8(bytes.clone()).expect("texts are UTF-8");
+            let text = without_hash_of_inputs(&text);
             insta::assert_snapshot!(path.replace('/', "."), text);
         }
     });
+}
+
+/// The manifest's hash of all that it follows from changes with every comment in a kernel.
+fn without_hash_of_inputs(text: &str) -> String {
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.retain(|line| !line.trim_start().starts_with("\"inputs_sha256\""));
+    lines.join("\n")
 }
 
 #[test]
