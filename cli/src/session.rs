@@ -62,7 +62,7 @@ impl Session {
                 "Give the path of a kernel crate's Cargo.toml.",
             ));
         }
-        let sources = hash(&manifest).map_err(Error::from)?;
+        let mut sources = hash(&manifest).map_err(Error::from)?;
         let same = sources.sha256 == hankel_embedded::SOURCE_SHA256
             && sources.name == hankel_embedded::CRATE_NAME;
         let krate = if same {
@@ -70,7 +70,10 @@ impl Session {
         } else {
             let progress = Progress::new(quiet);
             progress.begin(&format!("Building {} for this machine", sources.name));
-            KernelCrate::load(&manifest, &mut |line| progress.detail(line))?
+            let krate = KernelCrate::load(&manifest, &mut |line| progress.detail(line))?;
+            // cargo may have written the lock file just now, which is part of the sources.
+            sources = hash(&manifest).map_err(Error::from)?;
+            krate
         };
         Ok(Self {
             krate,

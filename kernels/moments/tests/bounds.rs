@@ -216,7 +216,7 @@ fn single_precision_is_no_worse_than_published() {
         hamburger_4,
     );
     let robust = errors(hamburger_4, hamburger_4);
-    for q in [0.5, 0.9, 0.99, 0.999] {
+    for q in [0.5, 0.9, 0.99, 0.999, 0.9999] {
         let at = (q * (robust.len() - 1) as f64) as usize;
         println!(
             "{q}: robust {:.1e}, published {:.1e}",
