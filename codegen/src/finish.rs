@@ -10,14 +10,14 @@ use spirv_tools::val::Validator;
 
 use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
-use crate::spirv::{self, exact, names, trim};
+use crate::spirv::{self, exact, names, split, trim};
 
 /// What the modules are for.
 const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
 
 /// Number of what this module does to SPIR-V. To be raised with every change that gives other
 /// bytes: committed SPIR-V of another number counts as stale.
-pub const PIPELINE: u32 = 1;
+pub const PIPELINE: u32 = 2;
 
 /// A finished module.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +41,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);
     trim::write_only_textures(&mut module);
+    split::apply(&mut module, kernel);
     names::apply(&mut module, kernel)?;
     let words = spirv::store(&module);
     validate(&words, name)?;

@@ -21,6 +21,19 @@ fn every_text_in_every_language() {
     });
 }
 
+/// Structures with the same members are one type to rust-gpu; the texts tell them apart again.
+#[test]
+fn an_output_has_its_own_names() {
+    let files = Crate::shadows().generate().files;
+    let text = |path: &str| String::from_utf8(files[path].clone()).expect("texts are UTF-8");
+    let (there, back) = (
+        text("wgsl/quantize_4_unit.wgsl"),
+        text("wgsl/dequantize_4_unit.wgsl"),
+    );
+    assert!(there.contains("moments: array<Moments4>") && there.contains("out: array<Quantized4>"));
+    assert!(back.contains("quantized: array<Quantized4>") && back.contains("out: array<Moments4>"));
+}
+
 /// The manifest's hash of all that it follows from changes with every comment in a kernel.
 fn without_hash_of_inputs(text: &str) -> String {
     let mut lines: Vec<&str> = text.lines().collect();

@@ -2,6 +2,7 @@
 
 pub mod exact;
 pub mod names;
+pub mod split;
 pub mod trim;
 
 use rspirv::binary::Assemble;

@@ -197,7 +197,7 @@ fn entry_point(module: &Module, kernel: &Kernel) -> Result<(), Failure> {
 }
 
 /// The variable at a binding of set 0; unused ones are gone.
-fn bound(module: &Module, binding: u32) -> Option<Word> {
+pub(super) fn bound(module: &Module, binding: u32) -> Option<Word> {
     variables(module).find(|variable| {
         decoration(module, *variable, Decoration::Binding) == Some(binding)
             && decoration(module, *variable, Decoration::DescriptorSet) == Some(0)
