@@ -1,4 +1,5 @@
-# Sourced by ./demo and ./check: installs what is missing, and says so.
+# Sourced by ./demo and ./check: installs what is missing, and says so. `for_tests=yes` asks for what
+# only the tests need.
 
 need() { # need COMMAND-OR-FILE PACKAGE
     command -v "$1" >/dev/null 2>&1 || [ -e "$1" ] || missing="$missing $2"
@@ -17,7 +18,7 @@ if ! ldconfig -p 2>/dev/null | grep -q libvulkan.so.1; then missing="$missing li
 if [ -z "$(first /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json)" ]; then
     missing="$missing mesa-vulkan-drivers"
 fi
-if [ "${1:-}" = tests ]; then need glslangValidator glslang-tools; fi
+if [ "${for_tests:-no}" = yes ]; then need glslangValidator glslang-tools; fi
 
 if [ -n "$missing" ]; then
     if command -v apt-get >/dev/null 2>&1; then
