@@ -92,11 +92,8 @@ impl Kernel {
         };
         let params = self.describe_params(variant);
         let outputs = self.describe_outputs(variant);
-        let (ulp, absolute, why) = (
-            self.tolerance.ulp,
-            self.tolerance.absolute,
-            &self.tolerance.why,
-        );
+        let tolerance = self.tolerance.of(variant);
+        let (ulp, absolute, why) = (tolerance.ulp, tolerance.absolute, &tolerance.why);
         quote! {
             describe::Kernel {
                 name: #entry.into(),

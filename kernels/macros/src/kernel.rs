@@ -83,10 +83,33 @@ const FORMATS: [Format; 7] = [
     },
 ];
 
+#[derive(Clone)]
 pub struct Tolerance {
     pub ulp: u32,
     pub absolute: f64,
     pub why: String,
+    /// Texel formats that it does not concern: they hold what was computed.
+    pub exact: Vec<Ident>,
+}
+
+impl Tolerance {
+    /// None: the same bits everywhere.
+    fn none() -> Self {
+        Self {
+            ulp: 0,
+            absolute: 0.0,
+            why: "only correctly rounded operations, comparisons and selections: the same bits everywhere".into(),
+            exact: Vec::new(),
+        }
+    }
+
+    /// What concerns one entry point.
+    pub fn of(&self, variant: &Variant) -> Self {
+        match variant.format {
+            Some(format) if self.exact.iter().any(|f| f == format.name) => Self::none(),
+            _ => self.clone(),
+        }
+    }
 }
 
 pub struct Param {
@@ -609,18 +632,30 @@ fn parity(input: ParseStream<'_>, span: Span) -> syn::Result<Tolerance> {
     let content;
     syn::parenthesized!(content in input);
     let mut tolerance = Tolerance {
-        ulp: 0,
-        absolute: 0.0,
         why: String::new(),
+        ..Tolerance::none()
     };
     while !content.is_empty() {
         let key: Ident = content.parse()?;
+        if key == "exact" {
+            tolerance.exact = idents(&content)?;
+            if content.is_empty() {
+                break;
+            }
+            content.parse::<Token![,]>()?;
+            continue;
+        }
         content.parse::<Token![=]>()?;
         match key.to_string().as_str() {
             "ulp" => tolerance.ulp = content.parse::<LitInt>()?.base10_parse()?,
             "absolute" => tolerance.absolute = content.parse::<LitFloat>()?.base10_parse()?,
             "why" => tolerance.why = content.parse::<LitStr>()?.value(),
-            _ => return Err(syn::Error::new(key.span(), "expected ulp, absolute or why")),
+            _ => {
+                return Err(syn::Error::new(
+                    key.span(),
+                    "expected ulp, absolute, why or exact",
+                ));
+            }
         }
         if content.is_empty() {
             break;
@@ -738,11 +773,7 @@ impl Args {
                     "hardware may round a sampler's weights: state `parity(ulp = …, absolute = …, why = \"…\")`",
                 ));
             }
-            None => Tolerance {
-                ulp: 0,
-                absolute: 0.0,
-                why: "only correctly rounded operations, comparisons and selections: the same bits everywhere".into(),
-            },
+            None => Tolerance::none(),
         };
         Ok((stage, tolerance))
     }

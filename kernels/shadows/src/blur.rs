@@ -23,7 +23,8 @@ pub struct Direction {
     parity(
         ulp = 0,
         absolute = 1.6e-5,
-        why = "sums and products only; a 16-bit target then rounds to 1/65535, where drivers may round a tie either way, which is one step"
+        exact(rgba32float),
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
     )
 )]
 pub fn blur(
