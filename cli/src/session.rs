@@ -14,6 +14,7 @@ use hankel_codegen::build::{Modules, Request, finish_all};
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiler, compile};
 use hankel_codegen::source_hash::{Sources, hash};
+use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
 use hankel_dsl::native::describe::Kernel;
@@ -129,6 +130,27 @@ impl Session {
     /// Final SPIR-V of all entry points.
     pub fn modules(&self) -> std::result::Result<Modules, Failure> {
         Ok(Modules::Final(self.bundle()?.modules))
+    }
+
+    /// SPIR-V of one entry point.
+    pub fn words(&self, kernel: &str) -> Result<Vec<u32>> {
+        let bundle = self.bundle()?;
+        let bytes = bundle
+            .modules
+            .get(kernel)
+            .ok_or_else(|| Failure::machine(format!("`{kernel}` has no SPIR-V"), None))?;
+        Ok(words(bytes, kernel).map_err(Error::from)?)
+    }
+
+    /// SPIR-V of every entry point.
+    pub fn all_words(&self) -> Result<BTreeMap<String, Vec<u32>>> {
+        let bundle = self.bundle()?;
+        let all: std::result::Result<_, _> = bundle
+            .modules
+            .iter()
+            .map(|(name, bytes)| Ok((name.clone(), words(bytes, name)?)))
+            .collect();
+        Ok(all.map_err(|failure: hankel_codegen::Failure| Error::from(failure))?)
     }
 
     fn bundle(&self) -> Result<Bundle> {
@@ -255,34 +277,4 @@ fn constants(pairs: &[String]) -> Result<BTreeMap<String, u32>> {
                 })
         })
         .collect()
-}
-
-/// A module's words.
-pub fn words(bytes: &[u8]) -> Vec<u32> {
-    bytes
-        .chunks_exact(4)
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect()
-}
-
-impl Session {
-    /// SPIR-V of one entry point.
-    pub fn words(&self, kernel: &str) -> Result<Vec<u32>> {
-        let bundle = self.bundle()?;
-        bundle
-            .modules
-            .get(kernel)
-            .map(|bytes| words(bytes))
-            .ok_or_else(|| Failure::machine(format!("`{kernel}` has no SPIR-V"), None))
-    }
-
-    /// SPIR-V of every entry point.
-    pub fn all_words(&self) -> Result<BTreeMap<String, Vec<u32>>> {
-        Ok(self
-            .bundle()?
-            .modules
-            .iter()
-            .map(|(name, bytes)| (name.clone(), words(bytes)))
-            .collect())
-    }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use hankel_codegen::build::{Generated, Modules, Request, generate};
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::source_hash::hash;
+use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::Entry;
 
@@ -94,16 +95,13 @@ impl Crate {
     /// The modules as words.
     #[must_use]
     pub fn words(&self) -> BTreeMap<String, Vec<u32>> {
-        let words = |bytes: &[u8]| {
-            bytes
-                .chunks_exact(4)
-                .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-                .collect()
-        };
         self.bundle
             .modules
             .iter()
-            .map(|(name, bytes)| (name.clone(), words(bytes)))
+            .map(|(name, bytes)| {
+                let words = words(bytes, name).unwrap_or_else(|e| panic!("{e}"));
+                (name.clone(), words)
+            })
             .collect()
     }
 }

@@ -1,8 +1,6 @@
 //! Chores of this repository. `cargo xtask spirv` writes the committed SPIR-V anew, of the built-in
-//! kernels and of the crates that tests use; `cargo xtask spirv --check` fails unless it is what
-//! their sources give, byte for byte.
+//! kernels and of the crates that tests use. (That it follows from its sources is a test.)
 
-use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,14 +13,13 @@ use hankel_dsl::native::Entry;
 use hankel_dsl::native::describe::Kernel;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
-const USAGE: &str = "usage: cargo xtask spirv [--check]";
+const USAGE: &str = "usage: cargo xtask spirv";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match arguments[..] {
         ["spirv"] => write(),
-        ["spirv", "--check"] => check(),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);
@@ -109,39 +106,4 @@ fn write() -> Result<String, Box<dyn Error>> {
         lines.push(format!("{}: {} modules", one.folder, bundle.modules.len()));
     }
     Ok(lines.join("\n"))
-}
-
-fn check() -> Result<String, Box<dyn Error>> {
-    let mut lines = Vec::new();
-    for one in committed() {
-        let (fresh, committed) = (one.fresh()?, Bundle::read(&root().join(one.folder))?);
-        if fresh != committed {
-            return Err(complaint(one.folder, &fresh, &committed).into());
-        }
-        lines.push(format!(
-            "{}: {} modules rebuilt from source, the same bytes as committed",
-            one.folder,
-            fresh.modules.len()
-        ));
-    }
-    Ok(lines.join("\n"))
-}
-
-fn complaint(folder: &str, fresh: &Bundle, committed: &Bundle) -> String {
-    let differing = |a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>| -> Vec<String> {
-        a.iter()
-            .filter(|(name, bytes)| b.get(*name) != Some(bytes))
-            .map(|(n, _)| n.clone())
-            .collect()
-    };
-    let mut names = differing(&fresh.modules, &committed.modules);
-    names.extend(differing(&committed.modules, &fresh.modules));
-    names.sort();
-    names.dedup();
-    let what = if names.is_empty() {
-        "only its record differs".into()
-    } else {
-        names.join(", ")
-    };
-    format!("{folder} is not what the sources give ({what}): run `cargo xtask spirv`")
 }

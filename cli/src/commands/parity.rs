@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use hankel_codegen::Language;
 use hankel_codegen::build::generate;
+use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_host::device::VulkanDevice;
 use hankel_host::parity::{Subject, Wgsl};
@@ -10,7 +11,7 @@ use super::print_json;
 use crate::args::{Format, Parity};
 use crate::failure::{Outcome, Result};
 use crate::progress::Progress;
-use crate::session::{Session, words};
+use crate::session::Session;
 
 pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     // Whether there is a driver shows before the long work starts.
@@ -31,7 +32,8 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
                     why.unwrap_or_else(|| format!("there is no {language}"))
                 })
         };
-        let spirv = text(Language::Spirv).map(|(bytes, _)| words(bytes));
+        let spirv = text(Language::Spirv)
+            .and_then(|(bytes, _)| words(bytes, name).map_err(|failure| failure.to_string()));
         let wgsl = text(Language::Wgsl)
             .map(|(bytes, entry_point)| (String::from_utf8_lossy(bytes).into_owned(), entry_point));
         codes.insert(name.as_str(), (spirv, wgsl));
