@@ -59,6 +59,7 @@ mod memory;
 pub mod native;
 mod real;
 mod texture;
+mod unroll;
 
 pub use glam;
 pub use hankel_macros::{Element, kernel, kernels};

@@ -1,0 +1,37 @@
+//! Loops without a loop.
+
+/// Repeats a block for each index of a range that is known when the kernel is compiled, up to 0..16.
+/// Inside, the index is a constant. There is no `break` and no `continue`.
+///
+/// A shader that indexes a local array dynamically spills it to memory, and rust-gpu's loops are
+/// ones that shader compilers rarely unroll. With this, arrays of a few numbers become plain
+/// variables.
+///
+/// ```
+/// use hankel_dsl::{Real, unroll};
+/// fn sum<R: Real, const N: usize>(x: [R; N]) -> R {
+///     let mut total = x[0];
+///     unroll!(i in 1..N, {
+///         total += x[i];
+///     });
+///     total
+/// }
+/// assert_eq!(sum([1.0_f32, 2.0, 3.0]), 6.0);
+/// ```
+#[macro_export]
+macro_rules! unroll {
+    ($i:ident in $from:tt .. $to:expr, $body:block) => {
+        $crate::unroll!(@each $i, $from, $to, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)
+    };
+    (@each $i:ident, $from:expr, $to:expr, $body:block, $($index:tt)*) => {{
+        const { assert!($to <= 16, "unroll! goes up to 0..16") };
+        $(
+            #[allow(unused_comparisons, reason = "the range may start at 0")]
+            if const { $index >= $from && $index < $to } {
+                #[allow(non_upper_case_globals, reason = "it stands for a variable")]
+                const $i: usize = $index;
+                $body
+            }
+        )*
+    }};
+}
