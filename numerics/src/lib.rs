@@ -1,0 +1,2 @@
+//! What Hankel's mathematics is measured by. Nothing here runs in a renderer: these are the
+//! yardsticks that kernels are held against before they ship.
