@@ -106,6 +106,42 @@ pub trait Real:
     fn lerp(self, other: Self, t: Self) -> Self {
         t.mul_add(other - self, self)
     }
+    /// The sum as it is rounded, and what the rounding took off: together exactly `self + other`.
+    ///
+    /// For `f32`, `f64` and their lanes, on every backend and with the same bits, as long as the
+    /// sum and both terms lie within 2^126 (`f64`: 2^1022); where denormals are flushed, what is
+    /// taken off must not be one. An error of zero is +0. Natively TwoSum, six operations (Knuth,
+    /// The Art of Computer Programming 2, section 4.2.2, theorem B). A shader orders the two terms
+    /// by magnitude instead (Dekker, A floating-point technique for extending the available
+    /// precision, 1971, section 4) and hides intermediate results from its compiler, which may
+    /// neither contract nor cancel what it cannot see.
+    ///
+    /// Any other type gives its sum and zero: what it rounds off, if anything, is its own affair.
+    #[inline(always)]
+    fn two_sum(self, other: Self) -> (Self, Self) {
+        (self + other, crate::lit!(0.0))
+    }
+    /// The product as it is rounded, and what the rounding took off: together exactly
+    /// `self * other`.
+    ///
+    /// For `f32`, `f64` and their lanes, on every backend and with the same bits, where a factor is
+    /// zero, and where the product is from 2^-78 to 2^126 and neither factor is above 2^126 (`f64`:
+    /// from 2^-900 to 2^990, factors up to 2^990); factors that are denormal only where those are
+    /// not flushed. An error of zero is +0. Below that the error is rounded itself; beyond, it may
+    /// be no number.
+    ///
+    /// Natively by what is fastest and exact: through `f64`, by a fused operation where lanes have
+    /// one, or else from the factors' halves (Dekker 1971, section 5; Ogita, Rump, Oishi, Accurate
+    /// sum and dot product, 2005, algorithms 3.2 and 3.3). A shader takes the halves as well, and no
+    /// fused operation, since not every device that offers one rounds once. It hides intermediate
+    /// results from its compiler as [`Real::two_sum`] does, at five to six `max`.
+    ///
+    /// Any other type gives its product and zero: what it rounds off, if anything, is its own
+    /// affair.
+    #[inline(always)]
+    fn two_product(self, other: Self) -> (Self, Self) {
+        (self * other, crate::lit!(0.0))
+    }
 }
 
 /// `x` without its fraction. It must be within the range of `i32`: clamp first. Unlike `as`, this is
@@ -233,6 +269,141 @@ mod instruction {
     instructions!(f32, f64);
 }
 
+/// Sums and products with their errors, in a shader.
+///
+/// The `max` with a number that nothing is below keeps a value as it is. But no compiler knows
+/// that: it cannot contract the product behind it, nor cancel the sum behind it against another,
+/// whatever liberties its language gives it.
+#[cfg(any(target_arch = "spirv", test))]
+mod guarded {
+    macro_rules! sum {
+        ($float:ident) => {
+            #[inline(always)]
+            pub fn sum(a: $float, b: $float) -> ($float, $float) {
+                let ordered = Real::abs(b) <= Real::abs(a);
+                let large = instruction::$float::select(ordered, a, b);
+                let small = instruction::$float::select(ordered, b, a);
+                let sum = hide(large + small);
+                // In this order a zero is +0, as Knuth's is.
+                (sum, hide(large - sum) + small)
+            }
+        };
+    }
+    /// Given halves of the factors whose products are exact. What is hidden here, a compiler could
+    /// add in another order, or factor out.
+    macro_rules! product {
+        ($float:ident) => {
+            #[inline(always)]
+            pub fn product(a: $float, b: $float) -> ($float, $float) {
+                // A factor that is itself a product must not be contracted into the subtraction
+                // that splits it.
+                let (a, b) = (hide(a), hide(b));
+                let product = hide(a * b);
+                let ((a_high, a_low), (b_high, b_low)) = (split(a), split(b));
+                let error = hide(a_high * b_high - product);
+                let error = hide(error + a_high * b_low);
+                let error = hide(error + a_low * b_high);
+                (product, error + a_low * b_low)
+            }
+        };
+    }
+
+    pub mod f32 {
+        use super::super::instruction;
+        use crate::Real;
+
+        #[inline(always)]
+        fn hide(x: f32) -> f32 {
+            instruction::f32::max(x, -85_070_591_730_234_615_865_843_651_857_942_052_864.0)
+        }
+
+        /// Twelve bits each: the low half is cut off, which no rounding can undo.
+        #[inline(always)]
+        fn split(x: f32) -> (f32, f32) {
+            let high = f32::from_bits(x.to_bits() & 0xffff_f000);
+            (high, x - high)
+        }
+
+        sum!(f32);
+        product!(f32);
+    }
+
+    pub mod f64 {
+        use super::super::instruction;
+        use crate::Real;
+
+        /// -2^1022.
+        #[inline(always)]
+        fn hide(x: f64) -> f64 {
+            instruction::f64::max(x, const { f64::from_bits(0xffd0_0000_0000_0000) })
+        }
+
+        /// Twenty-six bits and a sign each (Veltkamp): no device needs 64-bit integers for it.
+        #[inline(always)]
+        fn split(x: f64) -> (f64, f64) {
+            let scaled = hide(x * 134_217_729.0);
+            let high = hide(scaled - hide(scaled - x));
+            (high, x - high)
+        }
+
+        sum!(f64);
+        product!(f64);
+    }
+}
+
+/// Sums and products with their errors, natively: nothing here contracts or reorders.
+#[cfg(not(target_arch = "spirv"))]
+mod plain {
+    macro_rules! sum {
+        ($float:ident) => {
+            #[inline(always)]
+            pub fn sum(a: $float, b: $float) -> ($float, $float) {
+                let sum = a + b;
+                let from_b = sum - a;
+                (sum, (a - (sum - from_b)) + (b - from_b))
+            }
+        };
+    }
+
+    pub mod f32 {
+        sum!(f32);
+
+        /// The product of two `f32` is exact in `f64`.
+        #[inline(always)]
+        #[allow(clippy::cast_possible_truncation, reason = "the error is an f32")]
+        pub fn product(a: f32, b: f32) -> (f32, f32) {
+            let product = a * b;
+            let error = f64::from(a) * f64::from(b) - f64::from(product);
+            (product, error as f32)
+        }
+    }
+
+    pub mod f64 {
+        sum!(f64);
+
+        /// Twenty-six bits and a sign each (Veltkamp).
+        #[inline(always)]
+        fn split(x: f64) -> (f64, f64) {
+            let scaled = x * 134_217_729.0;
+            let high = scaled - (scaled - x);
+            (high, x - high)
+        }
+
+        #[inline(always)]
+        pub fn product(a: f64, b: f64) -> (f64, f64) {
+            let product = a * b;
+            let ((a_high, a_low), (b_high, b_low)) = (split(a), split(b));
+            let error = (a_high * b_high - product) + a_high * b_low + a_low * b_high;
+            (product, error + a_low * b_low)
+        }
+    }
+}
+
+#[cfg(target_arch = "spirv")]
+use guarded as exact;
+#[cfg(not(target_arch = "spirv"))]
+use plain as exact;
+
 macro_rules! scalar {
     ($($float:ident),*) => {$(
         impl Real for $float {
@@ -292,8 +463,139 @@ macro_rules! scalar {
             fn select(mask: bool, a: Self, b: Self) -> Self {
                 instruction::$float::select(mask, a, b)
             }
+            #[inline(always)]
+            fn two_sum(self, other: Self) -> (Self, Self) {
+                exact::$float::sum(self, other)
+            }
+            #[inline(always)]
+            fn two_product(self, other: Self) -> (Self, Self) {
+                exact::$float::product(self, other)
+            }
         }
     )*};
 }
 
 scalar!(f32, f64);
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::native::lanes::tests::{magnitudes, pairs};
+
+    /// A finite number as an odd integer (or 0) times a power of two.
+    fn parts(x: f64) -> (i128, i32) {
+        let exponent = ((x.to_bits() >> 52) & 0x7ff) as i32;
+        let fraction = x.to_bits() & ((1 << 52) - 1);
+        let (whole, place) = match exponent {
+            0 => (fraction, -1074),
+            e => (fraction | 1 << 52, e - 1075),
+        };
+        if whole == 0 {
+            return (0, 0);
+        }
+        let zeros = whole.trailing_zeros();
+        let odd = i128::from(whole >> zeros);
+        (if x < 0.0 { -odd } else { odd }, place + zeros as i32)
+    }
+
+    /// A finite number as an integer of units of 2^`unit`.
+    fn integer(x: f64, unit: i32) -> i128 {
+        match parts(x) {
+            (0, _) => 0,
+            (odd, place) => {
+                let bits = odd.unsigned_abs().ilog2() as i32 + place - unit;
+                assert!(place >= unit && bits < 126, "{x:e} in units of 2^{unit}");
+                odd << (place - unit)
+            }
+        }
+    }
+
+    #[test]
+    fn a_product_and_its_error_are_the_exact_product() {
+        for (a, b) in pairs(-39, 62, 24) {
+            let (a, b) = (a as f32, b as f32);
+            let ((m, i), (n, j)) = (parts(a.into()), parts(b.into()));
+            let (p, e) = a.two_product(b);
+            assert_eq!(p.to_bits(), (a * b).to_bits());
+            assert_eq!(
+                integer(p.into(), i + j) + integer(e.into(), i + j),
+                m * n,
+                "{a:e} {b:e}"
+            );
+            let shader = guarded::f32::product(a, b);
+            assert_eq!(
+                (shader.0.to_bits(), shader.1.to_bits()),
+                (p.to_bits(), e.to_bits()),
+                "{a:e} {b:e}"
+            );
+        }
+        for (a, b) in pairs(-450, 494, 53) {
+            let ((m, i), (n, j)) = (parts(a), parts(b));
+            let (p, e) = a.two_product(b);
+            assert_eq!(p.to_bits(), (a * b).to_bits());
+            assert_eq!(integer(p, i + j) + integer(e, i + j), m * n, "{a:e} {b:e}");
+            let shader = guarded::f64::product(a, b);
+            assert_eq!(
+                (shader.0.to_bits(), shader.1.to_bits()),
+                (p.to_bits(), e.to_bits()),
+                "{a:e} {b:e}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_sum_and_its_error_are_the_exact_sum() {
+        let far = |a: f64, b: f64| a != 0.0 && b != 0.0 && (a / b).abs().log2().abs() > 60.0;
+        let lowest = |a: f64, b: f64| match (parts(a), parts(b)) {
+            ((0, _), (_, place)) | ((_, place), (0, _)) => place,
+            ((_, i), (_, j)) => i.min(j),
+        };
+        for (a, b) in pairs(-149, 124, 24) {
+            let (a, b) = (a as f32, b as f32);
+            let (s, e) = a.two_sum(b);
+            assert_eq!(s.to_bits(), (a + b).to_bits());
+            if far(a.into(), b.into()) {
+                assert_eq!((s, e), if a.abs() > b.abs() { (a, b) } else { (b, a) });
+            } else {
+                let unit = lowest(a.into(), b.into());
+                let [a, b, s, e] = [a, b, s, e].map(|x| integer(x.into(), unit));
+                assert_eq!(a + b, s + e);
+            }
+            let shader = guarded::f32::sum(a, b);
+            assert_eq!(
+                (shader.0.to_bits(), shader.1.to_bits()),
+                (s.to_bits(), e.to_bits()),
+                "{a:e} {b:e}"
+            );
+        }
+        for (a, b) in pairs(-1074, 1020, 53) {
+            let (s, e) = a.two_sum(b);
+            assert_eq!(s.to_bits(), (a + b).to_bits());
+            if far(a, b) {
+                assert_eq!((s, e), if a.abs() > b.abs() { (a, b) } else { (b, a) });
+            } else {
+                let unit = lowest(a, b);
+                let [x, y, s, e] = [a, b, s, e].map(|x| integer(x, unit));
+                assert_eq!(x + y, s + e);
+            }
+            let shader = guarded::f64::sum(a, b);
+            assert_eq!(
+                (shader.0.to_bits(), shader.1.to_bits()),
+                (s.to_bits(), e.to_bits()),
+                "{a:e} {b:e}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_lies_within_the_limit_is_hidden_but_kept() {
+        let all: Vec<f64> = magnitudes(-149, 125, 24).collect();
+        for &x in &all {
+            let x = x as f32;
+            let (product, error) = guarded::f32::product(x, 1.0);
+            assert_eq!((product.to_bits(), error.to_bits()), (x.to_bits(), 0));
+        }
+    }
+}

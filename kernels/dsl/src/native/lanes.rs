@@ -71,6 +71,42 @@ fn token<S: Simd>() -> S {
     unsafe { core::ptr::NonNull::<S>::dangling().read() }
 }
 
+/// Whether `mul_sub` of instruction set `S` rounds once.
+#[inline(always)]
+fn fuses<S: Simd>() -> bool {
+    match token::<S>().level() {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Level::Avx2(_) | Level::Avx512(_) => true,
+        #[cfg(target_arch = "aarch64")]
+        Level::Neon(_) => true,
+        _ => false,
+    }
+}
+
+/// A number as the sum of two halves, by clearing or rounding away the lower half of its bits.
+trait Split: Sized {
+    /// The upper half; the number less it is the lower half, exactly, and products of halves are
+    /// exact.
+    fn upper(self) -> Self;
+}
+
+impl<S: Simd> Split for F32s<S> {
+    #[inline(always)]
+    fn upper(self) -> Self {
+        let bits: S::u32s = self.0.bitcast();
+        Self((bits & 0xffff_f000).bitcast())
+    }
+}
+
+impl<S: Simd> Split for F64s<S> {
+    // 53 bits are cut into 26, a sign and 26: the upper half must be rounded (Veltkamp).
+    #[inline(always)]
+    fn upper(self) -> Self {
+        let scaled = self.0 * 134_217_729.0;
+        Self(scaled - (scaled - self.0))
+    }
+}
+
 macro_rules! lanes {
     ($name:ident, $vector:ident, $mask_name:ident, $mask:ident, $float:ident) => {
         /// As many numbers as a register of `S` holds.
@@ -183,6 +219,23 @@ macro_rules! lanes {
             fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
                 Self(mask.0.select(a.0, b.0))
             }
+            #[inline(always)]
+            fn two_sum(self, o: Self) -> (Self, Self) {
+                let sum = self + o;
+                let from_o = sum - self;
+                (sum, (self - (sum - from_o)) + (o - from_o))
+            }
+            #[inline(always)]
+            fn two_product(self, o: Self) -> (Self, Self) {
+                let product = self * o;
+                if fuses::<S>() {
+                    return (product, Self(self.0.mul_sub(o.0, product.0)));
+                }
+                let (high, o_high) = (self.upper(), o.upper());
+                let (low, o_low) = (self - high, o - o_high);
+                let error = (high * o_high - product) + high * o_low + low * o_high;
+                (product, error + low * o_low)
+            }
         }
 
         impl<S: Simd> Lane for $name<S> {
@@ -234,4 +287,78 @@ impl Scalar for f32 {
 
 impl Scalar for f64 {
     type Lanes<S: Simd> = F64s<S>;
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use fearless_simd::dispatch;
+
+    use super::*;
+
+    /// Numbers of `bits` bits whose exponents go from `low` to `high`: powers of two, their
+    /// neighbours, few bits, all bits, random bits, both signs; and both zeros.
+    pub fn magnitudes(low: i32, high: i32, bits: i32) -> impl Iterator<Item = f64> + Clone {
+        let mut state = 1_u64;
+        let mut random = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            state >> 11
+        };
+        let step = ((high - low) / 24).max(1);
+        let exponents = (low..=high).step_by(step as usize).chain([high]);
+        let power = |e: i32| 2_f64.powi(e / 2) * 2_f64.powi(e - e / 2);
+        exponents
+            .flat_map(move |e| {
+                let last = power(1 - bits);
+                let noise = ((random() >> (53 - bits)) | 1 << (bits - 1)) as f64 * power(1 - bits);
+                let half = (random() >> (53 - bits / 2)) as f64 * power(1 - bits / 2);
+                [1.0, 1.0 + last, 2.0 - last, 1.5, 1.0 + half / 4.0, noise].map(|x| x * power(e))
+            })
+            .flat_map(|x| [x, -x])
+            .chain([0.0, -0.0])
+    }
+
+    /// Every two of them.
+    pub fn pairs(low: i32, high: i32, bits: i32) -> impl Iterator<Item = (f64, f64)> {
+        let all = magnitudes(low, high, bits);
+        all.clone()
+            .flat_map(move |a| all.clone().map(move |b| (a, b)))
+    }
+
+    #[inline(always)]
+    fn agree<L: Lane>(a: &[L::Scalar], b: &[L::Scalar], bits: impl Fn(L::Scalar) -> u64) {
+        let name = level_name();
+        for (a, b) in a.chunks_exact(L::LANES).zip(b.chunks_exact(L::LANES)) {
+            let (x, y) = (L::from_fn(|i| a[i]), L::from_fn(|i| b[i]));
+            let (sum, product) = (x.two_sum(y), x.two_product(y));
+            for i in 0..L::LANES {
+                let (scalar_sum, scalar_product) = (a[i].two_sum(b[i]), a[i].two_product(b[i]));
+                for (lane, scalar) in [
+                    (sum.0, scalar_sum.0),
+                    (sum.1, scalar_sum.1),
+                    (product.0, scalar_product.0),
+                    (product.1, scalar_product.1),
+                ] {
+                    assert_eq!(bits(lane.get(i)), bits(scalar), "{name}, lane {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn exact_errors_are_the_same_on_every_level() {
+        let single: (Vec<f32>, Vec<f32>) = pairs(-39, 62, 24)
+            .map(|(a, b)| (a as f32, b as f32))
+            .unzip();
+        let double: (Vec<f64>, Vec<f64>) = pairs(-450, 494, 53).unzip();
+        for (_, level) in levels() {
+            #[inline(always)]
+            fn both<S: Simd>(_: S, single: &(Vec<f32>, Vec<f32>), double: &(Vec<f64>, Vec<f64>)) {
+                agree::<F32s<S>>(&single.0, &single.1, |x| x.to_bits().into());
+                agree::<F64s<S>>(&double.0, &double.1, f64::to_bits);
+            }
+            dispatch!(level, simd => both(simd, &single, &double));
+        }
+    }
 }
