@@ -28,8 +28,11 @@ pub use bias::{Bias, SYMMETRIC_16, SYMMETRIC_32, UNIT_16};
 pub use hamburger::hamburger_4;
 pub use hausdorff::hausdorff_4;
 pub use leak::cut_leak;
-pub use moments::Moments4;
+pub use moments::{Moments4, Moments6};
 pub use quantization::{
-    Quantized4, dequantize_symmetric, dequantize_unit, quantize_symmetric, quantize_unit,
+    Fixed4, Fixed6, FixedPoint, Packed6, Quantized4, Quantized6, Rectangle4, Rectangle6,
+    dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6,
+    from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, quantize_unit_6,
+    to_unorm,
 };
 pub use variance::variance_2;

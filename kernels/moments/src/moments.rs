@@ -1,6 +1,12 @@
-//! Four power moments.
+//! Power moments, four and six.
 
 use hankel_dsl::{Element, Real, lit};
+
+/// `x` between `low` and `high`; a NaN becomes `low`.
+#[inline(always)]
+pub(crate) fn within<R: Real>(x: R, low: R, high: R) -> R {
+    R::select(x.ge(low), x, low).min(high)
+}
 
 /// The first four power moments of a distribution of depths.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -29,10 +35,10 @@ impl<R: Real> Moments4<R> {
         }
     }
 
-    /// Each moment in [-1, 1], where those of depths in [-1, 1] lie anyway.
+    /// Each moment in [-1, 1], where those of depths in [-1, 1] lie anyway; a NaN becomes -1.
     #[inline(always)]
     pub fn clamped(self) -> Self {
-        let clamp = |b: R| b.clamp(lit!(-1.0), lit!(1.0));
+        let clamp = |b: R| within(b, lit!(-1.0), lit!(1.0));
         Self {
             b1: clamp(self.b1),
             b2: clamp(self.b2),
@@ -63,6 +69,68 @@ impl<R: Real> Moments4<R> {
             b2: (b2 + b1 * lit!(2.0) + one) * lit!(0.25),
             b3: (b3 + (b2 + b1) * lit!(3.0) + one) * lit!(0.125),
             b4: (b4 + (b3 + b1) * lit!(4.0) + b2 * lit!(6.0) + one) * lit!(0.0625),
+        }
+    }
+}
+
+/// The first six power moments of a distribution of depths.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Moments6<R> {
+    /// Mean depth.
+    pub b1: R,
+    /// Mean square of the depth.
+    pub b2: R,
+    /// Mean cube of the depth.
+    pub b3: R,
+    /// Mean fourth power of the depth.
+    pub b4: R,
+    /// Mean fifth power of the depth.
+    pub b5: R,
+    /// Mean sixth power of the depth.
+    pub b6: R,
+}
+
+impl<R: Real> Moments6<R> {
+    /// The moments of a single depth.
+    #[inline(always)]
+    pub fn of_depth(z: R) -> Self {
+        let z2 = z * z;
+        let z3 = z2 * z;
+        Self {
+            b1: z,
+            b2: z2,
+            b3: z3,
+            b4: z2 * z2,
+            b5: z2 * z3,
+            b6: z3 * z3,
+        }
+    }
+
+    /// Each moment in [-1, 1], where those of depths in [-1, 1] lie anyway; a NaN becomes -1.
+    #[inline(always)]
+    pub fn clamped(self) -> Self {
+        let clamp = |b: R| within(b, lit!(-1.0), lit!(1.0));
+        Self {
+            b1: clamp(self.b1),
+            b2: clamp(self.b2),
+            b3: clamp(self.b3),
+            b4: clamp(self.b4),
+            b5: clamp(self.b5),
+            b6: clamp(self.b6),
+        }
+    }
+
+    /// `self + t (other - self)`: the moments of the mixed distributions.
+    #[inline(always)]
+    pub fn lerp(self, other: Self, t: R) -> Self {
+        Self {
+            b1: self.b1.lerp(other.b1, t),
+            b2: self.b2.lerp(other.b2, t),
+            b3: self.b3.lerp(other.b3, t),
+            b4: self.b4.lerp(other.b4, t),
+            b5: self.b5.lerp(other.b5, t),
+            b6: self.b6.lerp(other.b6, t),
         }
     }
 }

@@ -5,7 +5,7 @@ mod common;
 
 use common::distribution;
 use hankel_moments::{
-    Moments4, Quantized4, dequantize_symmetric, dequantize_unit, quantize_symmetric, quantize_unit,
+    Moments4, Quantized4, dequantize_symmetric_4, dequantize_unit_4, quantize_symmetric_4, quantize_unit_4,
 };
 use proptest::prelude::*;
 
@@ -14,8 +14,8 @@ type Basis = (
     fn(Quantized4<f64>) -> Moments4<f64>,
 );
 
-const UNIT: Basis = (quantize_unit, dequantize_unit);
-const SYMMETRIC: Basis = (quantize_symmetric, dequantize_symmetric);
+const UNIT: Basis = (quantize_unit_4, dequantize_unit_4);
+const SYMMETRIC: Basis = (quantize_symmetric_4, dequantize_symmetric_4);
 
 fn channels(q: Quantized4<f64>) -> [f64; 4] {
     [q.r, q.g, q.b, q.a]
@@ -87,12 +87,12 @@ fn the_curve_of_depths_fills_the_cube_and_stays_in_it() {
 #[test]
 fn the_gain_is_the_published_one() {
     assert!(
-        (bits(quantize_unit) - 12.28).abs() < 0.005,
+        (bits(quantize_unit_4) - 12.28).abs() < 0.005,
         "{}",
-        bits(quantize_unit)
+        bits(quantize_unit_4)
     );
     // Moving the range to [-1, 1] stretches the four powers by 2, 4, 8 and 16: 10 bits.
-    let symmetric = bits(quantize_symmetric) + 10.0;
+    let symmetric = bits(quantize_symmetric_4) + 10.0;
     assert!((symmetric - 12.28).abs() < 0.3, "{symmetric}");
 }
 

@@ -3,8 +3,8 @@
 
 use hankel_dsl::{Element, Real, kernel};
 use hankel_moments::{
-    Moments4, Quantized4, cut_leak, dequantize_symmetric, dequantize_unit, hamburger_4,
-    hausdorff_4, quantize_symmetric, quantize_unit, variance_2,
+    Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
+    hausdorff_4, quantize_symmetric_4, quantize_unit_4, variance_2,
 };
 
 /// How a bound is turned into a shadow.
@@ -106,23 +106,23 @@ pub fn vsm<R: Real>(
 /// Four moments of depths in [0, 1] to the basis optimised for 16 bits.
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn quantize_4_unit<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
-    quantize_unit(moments.clamped())
+    quantize_unit_4(moments.clamped())
 }
 
 /// The basis optimised for 16 bits to four moments of depths in [0, 1].
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn dequantize_4_unit<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
-    dequantize_unit(quantized.saturated())
+    dequantize_unit_4(quantized.saturated())
 }
 
 /// Four moments of depths in [-1, 1] to the basis optimised for 16 bits.
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn quantize_4_symmetric<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
-    quantize_symmetric(moments.clamped())
+    quantize_symmetric_4(moments.clamped())
 }
 
 /// The basis optimised for 16 bits to four moments of depths in [-1, 1].
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn dequantize_4_symmetric<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
-    dequantize_symmetric(quantized.saturated())
+    dequantize_symmetric_4(quantized.saturated())
 }

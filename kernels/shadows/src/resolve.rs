@@ -3,7 +3,7 @@
 
 use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::{Real, Texture2dMultisampled, kernel};
-use hankel_moments::{Moments4, Quantized4, quantize_symmetric, quantize_unit};
+use hankel_moments::{Moments4, Quantized4, quantize_symmetric_4, quantize_unit_4};
 
 /// The mean of what the samples of a texel give; depths beyond [0, 1] are moved to its ends.
 #[inline(always)]
@@ -51,7 +51,7 @@ pub fn resolve_unit(
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     mean(depth, at, samples, |z| {
-        quantized(quantize_unit(Moments4::of_depth(z)))
+        quantized(quantize_unit_4(Moments4::of_depth(z)))
     })
 }
 
@@ -72,7 +72,7 @@ pub fn resolve_symmetric(
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     mean(depth, at, samples, |z| {
-        quantized(quantize_symmetric(symmetric(z)))
+        quantized(quantize_symmetric_4(symmetric(z)))
     })
 }
 

@@ -4,7 +4,7 @@
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel, to_i32};
 use hankel_moments::{
-    Moments4, Quantized4, cut_leak, dequantize_symmetric, dequantize_unit, hamburger_4,
+    Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
     hausdorff_4, variance_2,
 };
 
@@ -106,9 +106,9 @@ fn decode(texel: Vec4, how: u32) -> Moments4<f32> {
         a: texel.w,
     };
     if how == encoding::UNIT {
-        dequantize_unit(q)
+        dequantize_unit_4(q)
     } else if how == encoding::SYMMETRIC {
-        dequantize_symmetric(q)
+        dequantize_symmetric_4(q)
     } else {
         Moments4 {
             b1: q.r,

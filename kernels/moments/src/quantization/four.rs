@@ -1,13 +1,10 @@
-//! Optimised quantisation: an affine change of basis that makes the set of valid moment vectors
-//! fill the unit cube, so that 16 bits for each channel suffice (\[MSM\], section 4.1 and section 8
-//! of the supplement: for depths in [0, 1] it gains 12.3 bits).
-//!
-//! All maps are affine, so filtering commutes with them. Constant summands come first in a sum:
-//! drivers may move them there, which changes the rounding.
+//! Four moments: the published transforms for depths in [0, 1] and in [-1, 1].
 
 use hankel_dsl::{Element, Real, lit};
 
+use super::unorm::{from_unorm, to_unorm};
 use crate::Moments4;
+use crate::moments::within;
 
 /// Four moments in the optimised basis: each channel is in [0, 1] for valid moments.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -24,14 +21,25 @@ pub struct Quantized4<R> {
 }
 
 impl<R: Real> Quantized4<R> {
-    /// Each channel in [0, 1], where those of valid moments lie anyway.
+    /// Each channel in [0, 1], where those of valid moments lie anyway; a NaN becomes 0.
     #[inline(always)]
     pub fn saturated(self) -> Self {
+        self.map(|x| within(x, lit!(0.0), lit!(1.0)))
+    }
+
+    /// What is left of it when each channel is stored in `BITS` bits, see [`to_unorm`].
+    #[inline(always)]
+    pub fn stored<const BITS: usize>(self) -> Self {
+        self.map(|x| from_unorm::<R, BITS>(to_unorm::<R, BITS>(x)))
+    }
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(R) -> R) -> Self {
         Self {
-            r: self.r.saturate(),
-            g: self.g.saturate(),
-            b: self.b.saturate(),
-            a: self.a.saturate(),
+            r: f(self.r),
+            g: f(self.g),
+            b: f(self.b),
+            a: f(self.a),
         }
     }
 }
@@ -43,10 +51,10 @@ macro_rules! unit_offset {
     };
 }
 
-/// Moments of depths in [0, 1] to the optimised basis: the inverse of [`dequantize_unit`]
+/// Moments of depths in [0, 1] to the optimised basis: the inverse of [`dequantize_unit_4`]
 /// (\[MSM\], Listing 1).
 #[inline(always)]
-pub fn quantize_unit<R: Real>(m: Moments4<R>) -> Quantized4<R> {
+pub fn quantize_unit_4<R: Real>(m: Moments4<R>) -> Quantized4<R> {
     let Moments4 { b1, b2, b3, b4 } = m;
     Quantized4 {
         r: b1 * lit!(-2.072_246_399_676) + unit_offset!() + b2 * lit!(32.237_037_479_455)
@@ -66,7 +74,7 @@ pub fn quantize_unit<R: Real>(m: Moments4<R>) -> Quantized4<R> {
 
 /// The optimised basis to moments of depths in [0, 1] (\[MSM\], Listing 2).
 #[inline(always)]
-pub fn dequantize_unit<R: Real>(q: Quantized4<R>) -> Moments4<R> {
+pub fn dequantize_unit_4<R: Real>(q: Quantized4<R>) -> Moments4<R> {
     let Quantized4 { r, g, b, a } = q;
     let r = r - unit_offset!();
     Moments4 {
@@ -86,7 +94,7 @@ pub fn dequantize_unit<R: Real>(q: Quantized4<R>) -> Moments4<R> {
 /// Moments of depths in [-1, 1] to the optimised basis (the lecture; its square roots, lost in
 /// print, follow from the requirement that the curve stays in the unit cube).
 #[inline(always)]
-pub fn quantize_symmetric<R: Real>(m: Moments4<R>) -> Quantized4<R> {
+pub fn quantize_symmetric_4<R: Real>(m: Moments4<R>) -> Quantized4<R> {
     let Moments4 { b1, b2, b3, b4 } = m;
     Quantized4 {
         r: b1 * lit!(1.5) + lit!(0.5) - b3 * lit!(2.0),
@@ -97,9 +105,9 @@ pub fn quantize_symmetric<R: Real>(m: Moments4<R>) -> Quantized4<R> {
     }
 }
 
-/// The optimised basis to moments of depths in [-1, 1]: the inverse of [`quantize_symmetric`].
+/// The optimised basis to moments of depths in [-1, 1]: the inverse of [`quantize_symmetric_4`].
 #[inline(always)]
-pub fn dequantize_symmetric<R: Real>(q: Quantized4<R>) -> Moments4<R> {
+pub fn dequantize_symmetric_4<R: Real>(q: Quantized4<R>) -> Moments4<R> {
     let r = q.r - lit!(0.5);
     // sqrt(3) (B - 1/2)
     let b = (q.b - lit!(0.5)) * lit!(1.732_050_807_568_877_2);
