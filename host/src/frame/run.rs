@@ -350,7 +350,7 @@ impl<'a> Frame<'a> {
     fn light(&self) -> Light {
         let shadow = &self.scene.shadow;
         let clip = self.light.clip_from_world;
-        let target = Shadow::published(shadow.depth_range, shadow.format).target;
+        let target = Shadow::published(shadow.depth_range, shadow.format).four();
         Light {
             row_u: clip.row(0) * 0.5 + Vec4::W * 0.5,
             // Rows of the map count from the top.

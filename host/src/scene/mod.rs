@@ -46,7 +46,7 @@ use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_moments::{Bias, SYMMETRIC_16, SYMMETRIC_32, UNIT_16};
+use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use serde::Deserialize;
 
 pub use error::{Place, Result, SceneError};
@@ -186,7 +186,7 @@ impl Shadow {
     /// The published moment bias for a map: see [`hankel_moments::Bias`].
     #[must_use]
     pub const fn recommended_bias(depth_range: DepthRange, format: MapFormat) -> f32 {
-        Self::published(depth_range, format).strength
+        Self::published(depth_range, format).strength as f32
     }
 
     /// The depth bias unless given.
@@ -210,9 +210,9 @@ impl Shadow {
     /// The published bias for a map.
     pub(crate) const fn published(depth_range: DepthRange, format: MapFormat) -> Bias {
         match (format, depth_range) {
-            (MapFormat::Rgba16unorm, DepthRange::Unit) => UNIT_16,
-            (MapFormat::Rgba16unorm, DepthRange::Symmetric) => SYMMETRIC_16,
-            (MapFormat::Rgba32float, _) => SYMMETRIC_32,
+            (MapFormat::Rgba16unorm, DepthRange::Unit) => UNIT_4_16,
+            (MapFormat::Rgba16unorm, DepthRange::Symmetric) => SYMMETRIC_4_16_LECTURE,
+            (MapFormat::Rgba32float, _) => SYMMETRIC_4_32,
         }
     }
 }

@@ -1,48 +1,217 @@
 //! Biases: rounding can push moments out of the set that distributions can have; mixing in a
 //! little of a fixed, valid vector pulls them back (\[MSM\], section 4.2; \[BHS\], section 4 of the
 //! supplement).
+//!
+//! Here are the published ones, named by basis, number of moments and bits of each stored channel.
+//! All but the two for clamped depths were found by experiments with distributions of few depths;
+//! other solvers than their authors' may get by with less, or need more.
+//!
+//! ```
+//! use hankel_moments::bias::SYMMETRIC_4_32;
+//!
+//! // Moments 0 to 4 of a surface at depth 0.5, with the bias mixed in.
+//! let z = 0.5_f64;
+//! let biased: [f64; 5] = core::array::from_fn(|i| {
+//!     let m = z.powi(i as i32);
+//!     m + SYMMETRIC_4_32.strength * (SYMMETRIC_4_32.target[i] - m)
+//! });
+//! assert_eq!(biased[0], 1.0);
+//! assert!(biased[2] - biased[1] * biased[1] > 0.0);
+//! ```
 
-use crate::Moments4;
+use crate::{Moments4, Moments6};
+
+/// What moments are means of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Basis {
+    /// Powers of depths in [0, 1].
+    Unit,
+    /// Powers of depths in [-1, 1].
+    Symmetric,
+    /// Cosines and sines of multiples of an angle.
+    Trigonometric,
+}
 
 /// A published bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
-    /// The vector to be mixed in.
-    pub target: Moments4<f32>,
+    /// What the moments are means of.
+    pub basis: Basis,
+    /// How many moments there are after the zeroth. A trigonometric moment is complex, and counts
+    /// as two: its cosine and its sine.
+    pub count: usize,
+    /// Bits of each stored channel: a float's for 32, else a normalised integer's in the basis
+    /// optimised for it.
+    pub bits: u32,
+    /// The vector to be mixed in, from its zeroth moment, 1, on; what follows `count` is 0.
+    pub target: [f64; 11],
     /// How much of it, from 0 to 1.
-    pub strength: f32,
+    pub strength: f64,
 }
 
-const fn even(b: f32) -> Moments4<f32> {
-    Moments4 {
-        b1: 0.0,
-        b2: b,
-        b3: 0.0,
-        b4: b,
+impl Bias {
+    /// The target's first four moments.
+    #[must_use]
+    pub const fn four(&self) -> Moments4<f32> {
+        Moments4 {
+            b1: self.target[1] as f32,
+            b2: self.target[2] as f32,
+            b3: self.target[3] as f32,
+            b4: self.target[4] as f32,
+        }
+    }
+
+    /// The target's first six moments.
+    #[must_use]
+    pub const fn six(&self) -> Moments6<f32> {
+        Moments6 {
+            b1: self.target[1] as f32,
+            b2: self.target[2] as f32,
+            b3: self.target[3] as f32,
+            b4: self.target[4] as f32,
+            b5: self.target[5] as f32,
+            b6: self.target[6] as f32,
+        }
     }
 }
 
-/// Depths in [0, 1], moments stored in 16 bits with optimised quantisation: half a surface at
-/// each end of the range (\[MSM\], section 4.2 and Listing 3).
-pub const UNIT_16: Bias = Bias {
-    target: Moments4 {
-        b1: 0.5,
-        b2: 0.5,
-        b3: 0.5,
-        b4: 0.5,
-    },
-    strength: 3e-5,
-};
+const fn bias<const N: usize>(basis: Basis, bits: u32, moments: [f64; N], strength: f64) -> Bias {
+    let mut target = [0.0; 11];
+    target[0] = 1.0;
+    let mut i = 0;
+    while i < N {
+        target[i + 1] = moments[i];
+        i += 1;
+    }
+    Bias {
+        basis,
+        count: N,
+        bits,
+        target,
+        strength,
+    }
+}
 
-/// Depths in [-1, 1], moments stored in 16 bits with optimised quantisation (the lecture).
-pub const SYMMETRIC_16: Bias = Bias {
-    target: even(0.63),
-    strength: 6e-5,
-};
+/// Half a surface at each end of [0, 1] and, for the share `uniform`, all depths between.
+const fn ends_and_uniform<const N: usize>(uniform: f64) -> [f64; N] {
+    let mut moments = [0.0; N];
+    let mut i = 0;
+    while i < N {
+        moments[i] = (1.0 - uniform) * 0.5 + uniform / (i + 2) as f64;
+        i += 1;
+    }
+    moments
+}
 
-/// Depths in [-1, 1], moments stored as 32-bit floats (published with moment-based transparency
-/// for four power moments).
-pub const SYMMETRIC_32: Bias = Bias {
-    target: even(0.375),
-    strength: 5e-7,
-};
+/// Half a surface at each end of [0, 1]: the best for the average of moments (\[MSM\], section 4.2
+/// and Listing 3). It does not help depths at the ends themselves: what is there stays on the
+/// boundary of the valid moments.
+pub const UNIT_4_16: Bias = bias(Basis::Unit, 16, [0.5; 4], 3e-5);
+
+/// Where depths are clamped to [0, 1], many are at the ends. A fifth of the target is uniform, which
+/// puts it inside the valid moments (\[BHS\], section 4 of the supplement).
+pub const CLAMPED_4_16: Bias = bias(Basis::Unit, 16, ends_and_uniform::<4>(0.2), 3e-5);
+
+/// Where depths are clamped to [0, 1]; half of the target is uniform, for three depths suffice to
+/// lie on the boundary of six moments (\[BHS\], section 4 of the supplement; 10 bits: the lecture).
+pub const CLAMPED_6_10: Bias = bias(Basis::Unit, 10, ends_and_uniform::<6>(0.5), 4e-3);
+
+/// As [`SYMMETRIC_4_16`], rounded: what moment shadow mapping uses (the lecture).
+pub const SYMMETRIC_4_16_LECTURE: Bias = bias(Basis::Symmetric, 16, [0.0, 0.63, 0.0, 0.63], 6e-5);
+
+/// Four power moments, 16 bits (\[MBOIT\], Table 1 of the supplement).
+pub const SYMMETRIC_4_16: Bias = bias(Basis::Symmetric, 16, [0.0, 0.628, 0.0, 0.628], 6e-5);
+
+/// Four power moments, 32-bit floats (\[MBOIT\], Table 1 of the supplement).
+pub const SYMMETRIC_4_32: Bias = bias(Basis::Symmetric, 32, [0.0, 0.375, 0.0, 0.375], 5e-7);
+
+/// Six power moments, 16 bits (\[MBOIT\], Table 1 of the supplement).
+pub const SYMMETRIC_6_16: Bias = bias(
+    Basis::Symmetric,
+    16,
+    [0.0, 0.5566, 0.0, 0.489, 0.0, 0.478_693_82],
+    6e-4,
+);
+
+/// Six power moments, 32-bit floats (\[MBOIT\], Table 1 of the supplement). Distributions on the
+/// real line have these moments, but none within [-1, 1] has.
+pub const SYMMETRIC_6_32: Bias = bias(
+    Basis::Symmetric,
+    32,
+    [0.0, 0.48, 0.0, 0.451, 0.0, 0.45],
+    5e-6,
+);
+
+/// Eight power moments, 16 bits (\[MBOIT\], Table 1 of the supplement).
+pub const SYMMETRIC_8_16: Bias = bias(
+    Basis::Symmetric,
+    16,
+    [
+        0.0,
+        0.424_749_163_879_598_66,
+        0.0,
+        0.224_078_026_755_852_84,
+        0.0,
+        0.153_692_307_692_307_68,
+        0.0,
+        0.129_004_405_290_891_2,
+    ],
+    2.5e-3,
+);
+
+/// Eight power moments, 32-bit floats (\[MBOIT\], Table 1 of the supplement).
+pub const SYMMETRIC_8_32: Bias = bias(
+    Basis::Symmetric,
+    32,
+    [
+        0.0,
+        0.75,
+        0.0,
+        0.676_666_666_666_666_6,
+        0.0,
+        0.63,
+        0.0,
+        0.600_303_030_303_030_3,
+    ],
+    5e-5,
+);
+
+/// Two trigonometric moments, 16 bits (\[MBOIT\], Table 1 of the supplement). The target of
+/// trigonometric moments is the uniform distribution, whose moments are 0: the bias scales them by
+/// 1 - strength.
+pub const TRIGONOMETRIC_2_16: Bias = bias(Basis::Trigonometric, 16, [0.0; 4], 4e-4);
+
+/// Two trigonometric moments, 32-bit floats; see [`TRIGONOMETRIC_2_16`].
+pub const TRIGONOMETRIC_2_32: Bias = bias(Basis::Trigonometric, 32, [0.0; 4], 4e-7);
+
+/// Three trigonometric moments, 16 bits; see [`TRIGONOMETRIC_2_16`].
+pub const TRIGONOMETRIC_3_16: Bias = bias(Basis::Trigonometric, 16, [0.0; 6], 6.5e-4);
+
+/// Three trigonometric moments, 32-bit floats; see [`TRIGONOMETRIC_2_16`].
+pub const TRIGONOMETRIC_3_32: Bias = bias(Basis::Trigonometric, 32, [0.0; 6], 8e-7);
+
+/// Four trigonometric moments, 16 bits; see [`TRIGONOMETRIC_2_16`].
+pub const TRIGONOMETRIC_4_16: Bias = bias(Basis::Trigonometric, 16, [0.0; 8], 8.5e-4);
+
+/// Four trigonometric moments, 32-bit floats; see [`TRIGONOMETRIC_2_16`].
+pub const TRIGONOMETRIC_4_32: Bias = bias(Basis::Trigonometric, 32, [0.0; 8], 1.5e-6);
+
+/// All of them, each with its constant's name.
+pub const PUBLISHED: [(&str, Bias); 16] = [
+    ("UNIT_4_16", UNIT_4_16),
+    ("CLAMPED_4_16", CLAMPED_4_16),
+    ("CLAMPED_6_10", CLAMPED_6_10),
+    ("SYMMETRIC_4_16_LECTURE", SYMMETRIC_4_16_LECTURE),
+    ("SYMMETRIC_4_16", SYMMETRIC_4_16),
+    ("SYMMETRIC_4_32", SYMMETRIC_4_32),
+    ("SYMMETRIC_6_16", SYMMETRIC_6_16),
+    ("SYMMETRIC_6_32", SYMMETRIC_6_32),
+    ("SYMMETRIC_8_16", SYMMETRIC_8_16),
+    ("SYMMETRIC_8_32", SYMMETRIC_8_32),
+    ("TRIGONOMETRIC_2_16", TRIGONOMETRIC_2_16),
+    ("TRIGONOMETRIC_2_32", TRIGONOMETRIC_2_32),
+    ("TRIGONOMETRIC_3_16", TRIGONOMETRIC_3_16),
+    ("TRIGONOMETRIC_3_32", TRIGONOMETRIC_3_32),
+    ("TRIGONOMETRIC_4_16", TRIGONOMETRIC_4_16),
+    ("TRIGONOMETRIC_4_32", TRIGONOMETRIC_4_32),
+];

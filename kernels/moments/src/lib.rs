@@ -13,10 +13,12 @@
 //! - \[BHS\] C. Peters, C. Münstermann, N. Wetzstein, R. Klein: *Beyond Hard Shadows: Moment Shadow
 //!   Maps for Single Scattering, Soft Shadows and Translucent Occluders* (2016), its supplement, and
 //!   the lecture on both.
+//! - \[MBOIT\] C. Münstermann, S. Krumpen, R. Klein, C. Peters: *Moment-Based Order-Independent
+//!   Transparency* (2018), its supplement.
 //! - \[VSM\] W. Donnelly, A. Lauritzen: *Variance Shadow Maps* (2006).
 #![no_std]
 
-mod bias;
+pub mod bias;
 mod hamburger;
 mod hausdorff;
 mod leak;
@@ -24,7 +26,7 @@ mod moments;
 mod quantization;
 mod variance;
 
-pub use bias::{Bias, SYMMETRIC_16, SYMMETRIC_32, UNIT_16};
+pub use bias::Bias;
 pub use hamburger::hamburger_4;
 pub use hausdorff::hausdorff_4;
 pub use leak::cut_leak;

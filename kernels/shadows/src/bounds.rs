@@ -2,10 +2,7 @@
 //! `hankel eval`, and for parity in both precisions.
 
 use hankel_dsl::{Element, Real, kernel};
-use hankel_moments::{
-    Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
-    hausdorff_4, quantize_symmetric_4, quantize_unit_4, variance_2,
-};
+use hankel_moments::{Moments4, cut_leak, hamburger_4, hausdorff_4, variance_2};
 
 /// How a bound is turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -101,28 +98,4 @@ pub fn vsm<R: Real>(
         variance_2(receiver.b1, receiver.b2, z, settings.least_variance),
         settings,
     )
-}
-
-/// Four moments of depths in [0, 1] to the basis optimised for 16 bits.
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn quantize_4_unit<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
-    quantize_unit_4(moments.clamped())
-}
-
-/// The basis optimised for 16 bits to four moments of depths in [0, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn dequantize_4_unit<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
-    dequantize_unit_4(quantized.saturated())
-}
-
-/// Four moments of depths in [-1, 1] to the basis optimised for 16 bits.
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn quantize_4_symmetric<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
-    quantize_symmetric_4(moments.clamped())
-}
-
-/// The basis optimised for 16 bits to four moments of depths in [-1, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn dequantize_4_symmetric<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
-    dequantize_symmetric_4(quantized.saturated())
 }

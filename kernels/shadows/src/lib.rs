@@ -14,6 +14,7 @@ pub mod blur;
 pub mod bounds;
 pub mod depth;
 mod grid;
+pub mod quantize;
 pub mod resolve;
 pub mod shade;
 
@@ -31,8 +32,18 @@ hankel_dsl::kernels![
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,
-    bounds::quantize_4_unit,
-    bounds::dequantize_4_unit,
-    bounds::quantize_4_symmetric,
-    bounds::dequantize_4_symmetric,
+    quantize::quantize_4_unit,
+    quantize::dequantize_4_unit,
+    quantize::quantize_4_symmetric,
+    quantize::dequantize_4_symmetric,
+    quantize::quantize_6_unit,
+    quantize::dequantize_6_unit,
+    quantize::quantize_6_symmetric,
+    quantize::dequantize_6_symmetric,
+    quantize::pack_6,
+    quantize::unpack_6,
+    quantize::to_summed_area_4,
+    quantize::from_summed_area_4,
+    quantize::to_summed_area_6,
+    quantize::from_summed_area_6,
 ];
