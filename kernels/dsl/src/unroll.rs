@@ -26,7 +26,14 @@ macro_rules! unroll {
     (@each $i:ident, $from:expr, $to:expr, $body:block, $($index:tt)*) => {{
         const { assert!($to <= 16, "unroll! goes up to 0..16") };
         $(
-            #[allow(unused_comparisons, reason = "the range may start at 0")]
+            #[allow(
+                unused_comparisons,
+                unconditional_panic,
+                arithmetic_overflow,
+                unused_assignments,
+                reason = "what is beyond the range is never reached, and after the last index \
+                          nothing is read"
+            )]
             if const { $index >= $from && $index < $to } {
                 #[allow(non_upper_case_globals, reason = "it stands for a variable")]
                 const $i: usize = $index;

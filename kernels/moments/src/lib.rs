@@ -15,10 +15,13 @@
 //!   the lecture on both.
 //! - \[MBOIT\] C. Münstermann, S. Krumpen, R. Klein, C. Peters: *Moment-Based Order-Independent
 //!   Transparency* (2018), its supplement.
+//! - \[MBD\] M. Worchel, M. Alexa: *Moment Bounds are Differentiable: Efficiently Approximating
+//!   Measures in Inverse Rendering* (2025).
 //! - \[VSM\] W. Donnelly, A. Lauritzen: *Variance Shadow Maps* (2006).
 #![no_std]
 
 pub mod bias;
+mod bound;
 mod hamburger;
 mod hausdorff;
 mod leak;
@@ -27,6 +30,7 @@ mod quantization;
 mod variance;
 
 pub use bias::Bias;
+pub use bound::{Bounds, MAX_MOMENTS, bound, bound_compensated, mix_bias};
 pub use hamburger::hamburger_4;
 pub use hausdorff::hausdorff_4;
 pub use leak::cut_leak;

@@ -1,0 +1,293 @@
+//! From the recurrence to the points of the distribution that attains the bound.
+
+use hankel_dsl::{Real, lit, unroll};
+
+use super::MAX;
+use super::recurrence::Recurrence;
+use super::roots::{Monic, least_of_cubic, least_two, whole};
+
+/// What a query point makes of a recurrence.
+///
+/// Depths are `u`, relative to the query point; points of the extremal distribution other than it
+/// are the roots of the kernel polynomial `K(u) = Σ p_k(u) p_k(0) / h_k` (\[MBD\], Eq. 16). They are
+/// given by their reciprocals `v = 1/u`: `K(0)`, a sum of squares, is the leading coefficient of the
+/// polynomial in `v`, so that it never loses a degree, and a root at infinity is `v = 0`.
+///
+/// The side of the query point with fewer roots is always the negative one: if need be the axis is
+/// turned around.
+#[derive(Clone, Copy)]
+pub(crate) struct Kernel<R: Real> {
+    /// The recurrence, turned around where `turned`.
+    pub a: [R; MAX],
+    /// Its other coefficients.
+    pub b: [R; MAX + 1],
+    /// `p_k(0)`
+    pub y: [R; MAX + 1],
+    /// `h_N / h_k`: the weights of the inner product that makes vectors `p_k(u)` of different
+    /// roots orthogonal.
+    pub c: [R; MAX + 1],
+    /// Mean square distance to the query point.
+    pub mean_square: R,
+    /// Coefficients of `K`, lowest power first.
+    pub k: [R; MAX + 1],
+    /// `Σ c_k y_k²`
+    pub square: R,
+    /// Weight of the query point.
+    pub own: R,
+    /// Weight of all other points: 1 - `own`, without cancellation.
+    pub others: R,
+    /// The monic polynomial whose roots are `v / reach`.
+    pub e: Monic<R>,
+    /// The root of the sum of all `v²`: no root is nearer than its reciprocal.
+    pub reach: R,
+    /// Whether the axis was turned around.
+    pub turned: R::Mask,
+    /// How many roots are on the negative side, 0 to N/2.
+    pub few: R,
+}
+
+impl<R: Real> Kernel<R> {
+    /// For N steps of a recurrence.
+    #[inline(always)]
+    pub fn new<const N: usize>(recurrence: &Recurrence<R>) -> Self {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let least: R = lit!(1e-30);
+        let mut a = recurrence.a;
+        let b = recurrence.b;
+        let mut y = [one; MAX + 1];
+        y[1] = -a[0];
+        unroll!(k in 1..N, {
+            y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
+        });
+
+        // The roots and the query point interlace with the roots of p_N, and how many of those
+        // are below the query point is the number of permanences of sign (Sturm).
+        let mut below = zero;
+        unroll!(k in 0..N, {
+            let (is, was) = (y[k + 1].ge(zero), y[k].ge(zero));
+            below += R::select((is & was) | !(is | was), one, zero);
+        });
+        let count: R = whole(N);
+        let turned = below.gt(count * lit!(0.5));
+        let sign = R::select(turned, -one, one);
+        unroll!(k in 0..N, {
+            a[k] = a[k] * sign;
+        });
+        unroll!(k in 0..(N + 1), {
+            if const { k % 2 == 1 } {
+                y[k] = y[k] * sign;
+            }
+        });
+        let few = R::select(turned, count - below, below);
+
+        let mut c = [one; MAX + 1];
+        unroll!(k in 0..N, {
+            c[N - 1 - k] = c[N - k] * b[N - k];
+        });
+        let mut outer = zero;
+        unroll!(k in 2..(N + 1), {
+            outer += c[k] * (y[k] * y[k]);
+        });
+        // The first two terms are the mean square times c_1.
+        let square = (outer + c[1] * recurrence.square).max(least);
+        let (own, others) = if const { N == 1 } {
+            (recurrence.spread, recurrence.rest)
+        } else {
+            let own = (c[0] / square).min(recurrence.spread);
+            let others = (outer + c[1] * (y[1] * y[1])) / square;
+            let others = R::select(own.lt(lit!(0.5)), one - own, others);
+            (own, others.max(recurrence.rest))
+        };
+
+        // K_k = y_k p_k + β_k K_{k-1}, all in powers of u.
+        let mut p = [zero; MAX + 2];
+        let mut before = p;
+        let mut kernel = [zero; MAX + 1];
+        p[0] = one;
+        kernel[0] = one;
+        unroll!(k in 0..N, {
+            let mut next = [zero; MAX + 2];
+            unroll!(i in 0..7, {
+                if const { i <= k + 1 } {
+                    let mut t = zero;
+                    if const { i <= k } {
+                        t = t - a[k] * p[i];
+                    }
+                    if const { k > 0 && i + 1 <= k } {
+                        t = t - b[k] * before[i];
+                    }
+                    if const { i > 0 } {
+                        t = t + p[i - 1];
+                    }
+                    next[i] = t;
+                }
+            });
+            before = p;
+            p = next;
+            unroll!(i in 0..6, {
+                if const { i <= k } {
+                    kernel[i] = b[k + 1] * kernel[i] + y[k + 1] * p[i];
+                } else if const { i == k + 1 } {
+                    kernel[i] = y[k + 1];
+                }
+            });
+        });
+        kernel[0] = square;
+
+        let (e, reach) = reversed::<R, N>(&kernel);
+        Self {
+            a,
+            b,
+            y,
+            c,
+            mean_square: recurrence.square,
+            k: kernel,
+            square,
+            own,
+            others,
+            e,
+            reach,
+            turned,
+            few,
+        }
+    }
+
+    /// `p_k(u)` for the root `u = 1 / (reach v)`, all times a common factor that keeps them within
+    /// range.
+    #[inline(always)]
+    fn vector<const N: usize>(&self, v: R) -> [R; MAX + 1] {
+        let one: R = lit!(1.0);
+        // u = s / t, and the larger of both is 1.
+        let v = v * self.reach;
+        let is_near = v.abs().gt(one);
+        let t = R::select(is_near, one, v);
+        let s = R::select(is_near, one / R::select(is_near, v, one), one);
+        let mut z = [one; MAX + 1];
+        z[1] = s - self.a[0] * t;
+        unroll!(k in 1..N, {
+            z[k + 1] = (s - self.a[k] * t) * z[k] - self.b[k] * (t * t) * z[k - 1];
+        });
+        let mut power = t;
+        unroll!(k in 0..N, {
+            z[N - 1 - k] = z[N - 1 - k] * power;
+            power = power * t;
+        });
+        z
+    }
+
+    #[inline(always)]
+    fn dot<const N: usize>(&self, x: &[R; MAX + 1], y: &[R; MAX + 1]) -> R {
+        let mut sum = x[N] * y[N];
+        unroll!(k in 0..N, {
+            sum += self.c[k] * (x[k] * y[k]);
+        });
+        sum
+    }
+
+    /// The root's vector and its square, both freed of the query point's vector, to which it would
+    /// be orthogonal if the root were exact: what a root's rounding error does to its weight is
+    /// thereby undone to first order.
+    #[inline(always)]
+    fn freed<const N: usize>(&self, v: R) -> ([R; MAX + 1], R) {
+        let z = self.vector::<N>(v);
+        let shared = self.dot::<N>(&z, &self.y) / self.square;
+        let mut x = z;
+        unroll!(k in 0..(N + 1), {
+            x[k] = z[k] - shared * self.y[k];
+        });
+        let least: R = lit!(1e-37);
+        (x, self.dot::<N>(&x, &x).max(least))
+    }
+
+    /// The weight of the negative side's roots together.
+    #[inline(always)]
+    pub fn weight<const N: usize>(&self) -> R {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let weight = if const { N == 1 } {
+            zero
+        } else if const { N == 2 } {
+            self.lesser_of_two(self.a[0], self.mean_square)
+        } else if const { N == 3 } {
+            let (x, square) = self.freed::<N>(least_of_cubic(&self.e));
+            self.c[0] * x[0] * (x[0] / square)
+        } else {
+            let (first, second) = if const { N == 4 } {
+                least_two::<R, 4, 3>(&self.e)
+            } else {
+                least_two::<R, 5, 4>(&self.e)
+            };
+            let (x, x_square) = self.freed::<N>(first);
+            let (z, z_square) = self.freed::<N>(second);
+            let (x_share, z_share) = (x[0] / x_square, z[0] / z_square);
+            let single = self.c[0] * x[0] * x_share;
+            // The length of the first axis' projection into the space of both vectors, which need
+            // not be exactly orthogonal.
+            let overlap = self.dot::<N>(&x, &z);
+            let cosine = ((overlap / x_square) * (overlap / z_square)).min(lit!(0.5));
+            let both = single + self.c[0] * z_share * (z[0] - x_share * overlap * lit!(2.0));
+            R::select(self.few.gt(one), both / (one - cosine), single)
+        };
+        R::select(self.few.gt(zero), weight.clamp(zero, self.others), zero)
+    }
+
+    /// N = 2, one root on each side: the negative one's weight from total, mean and mean square
+    /// alone, which are exact. The nearer root enters as a distance and the farther one as a
+    /// reciprocal; of the two weights the one without cancellation is computed.
+    #[inline(always)]
+    fn lesser_of_two(&self, mean: R, mean_square: R) -> R {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let [k0, k1, k2, ..] = self.k;
+        let k2 = k2.abs();
+        let root = (k1 * k1 + k2 * k0 * lit!(4.0)).sqrt();
+        let s = ((k1.abs() + root) * lit!(0.5)).max(R::epsilon() * k0);
+        let near = k0 / s;
+        let far = k2 / s;
+        let near_is_below = k1.gt(zero);
+        // How far the mean lies to the nearer root's side.
+        let toward = R::select(near_is_below, -mean, mean);
+        let shared = one + near * far;
+        // Where terms cancel, the rounding error is about that of a weight of this size.
+        let near_noise = mean_square * far / (near * shared);
+        let far_noise = mean_square * (far * far) / shared;
+        let half: R = lit!(0.5);
+        let of_near = (mean_square * far + toward) / (near * shared);
+        let of_far = far * far * (mean_square - toward * near) / shared;
+        let near_is_exact = near_noise.lt(half) | toward.ge(zero);
+        let far_is_exact = far_noise.lt(half) | toward.le(zero);
+        let is_exact = (near_is_below & near_is_exact) | (!near_is_below & far_is_exact);
+        let is_other_exact = (near_is_below & far_is_exact) | (!near_is_below & near_is_exact);
+        let wanted = R::select(near_is_below, of_near, of_far);
+        let other = R::select(near_is_below, of_far, of_near);
+        let is_small = wanted.lt(half) | !is_other_exact;
+        R::select(is_exact & is_small, wanted, one - (self.own + other))
+    }
+}
+
+/// The polynomial in the reciprocal, made monic, with its roots divided by the reach that is
+/// returned with it.
+#[inline(always)]
+fn reversed<R: Real, const N: usize>(kernel: &[R; MAX + 1]) -> (Monic<R>, R) {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let half: R = lit!(0.5);
+    let tiny: R = lit!(1e-30);
+    let nearest = half / R::epsilon();
+    let ratio = |k: R| k / kernel[0].max(k.abs() * tiny);
+    let first = ratio(kernel[1]).clamp(-nearest, nearest);
+    let limit = nearest * nearest;
+    let second = ratio(kernel[2]).clamp(-limit, limit);
+    let squares = (first * first - second * lit!(2.0)).max(zero);
+    let reach = squares.sqrt().clamp(lit!(1e-6), nearest);
+    let per_reach = one / reach;
+    let largest: R = lit!(32.0);
+    let mut e = [one; MAX + 1];
+    let mut power = per_reach;
+    unroll!(i in 1..(N + 1), {
+        e[i] = (ratio(kernel[i]) * power).clamp(-largest, largest);
+        power = power * per_reach;
+    });
+    (e, reach)
+}

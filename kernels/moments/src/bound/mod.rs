@@ -1,0 +1,103 @@
+//! Bounds for any even number of power moments up to ten, with the total free (\[MBD\], Algorithm 1;
+//! \[MSM\], Algorithm 2).
+//!
+//! Among all distributions with moments `m_0` to `m_2N`, the share below a query point is least and
+//! greatest for one that consists of the query point and N others. It is found in two steps:
+//!
+//! 1. [`recurrence`]: the moments' three-term recurrence. The only ill-conditioned step.
+//! 2. [`kernel`]: the N points are roots of a polynomial. Only those on the side of the query point
+//!    that has fewer are needed, at most two ([`roots`]), and weights follow from the recurrence as
+//!    quotients of sums of squares: no Vandermonde system, no order to choose.
+//!
+//! Where the published algorithm has a root at infinity there is a reciprocal of 0 here.
+
+mod kernel;
+mod recurrence;
+mod roots;
+mod twofold;
+
+use hankel_dsl::{Real, lit};
+
+use kernel::Kernel;
+use recurrence::Recurrence;
+use twofold::{Plain, Twofold};
+
+/// The largest N.
+pub const MAX: usize = 5;
+/// The length of a moment vector: the first 2N + 1 elements count.
+pub const MAX_MOMENTS: usize = 2 * MAX + 1;
+
+/// The least and the greatest amount that a distribution with given moments can have below a query
+/// point, both from 0 to the total `m_0`; the greatest includes the query point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds<R> {
+    /// Greatest lower bound.
+    pub lower: R,
+    /// Least upper bound.
+    pub upper: R,
+}
+
+impl<R: Real> Bounds<R> {
+    /// Between both: the lower one for `overestimation` 0, the upper one for 1.
+    #[inline(always)]
+    pub fn blend(self, overestimation: R) -> R {
+        self.lower + overestimation.saturate() * (self.upper - self.lower)
+    }
+}
+
+/// The bounds at `eta` for moments `m_0` to `m_2N`, N from 1 to 5; the rest of `m` is not used.
+///
+/// Depths may be anywhere. Anything is accepted: moments that no distribution has give the bounds
+/// of others, what is not a number or beyond range (1e37, and 1e25 times the total) counts as 0,
+/// and a total that is not positive gives 0.
+#[inline(always)]
+pub fn bound<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> {
+    let floor = R::epsilon() * lit!(0.25);
+    bounds::<R, N>(&Recurrence::new::<Plain<R>, N>(m, eta, floor))
+}
+
+/// [`bound`], with the recurrence computed in about twice the digits of the number type. Moments
+/// of tight surfaces lose most of their digits there and next to none elsewhere.
+#[inline(always)]
+pub fn bound_compensated<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> {
+    let floor = R::epsilon() * R::epsilon();
+    bounds::<R, N>(&Recurrence::new::<Twofold<R>, N>(m, eta, floor))
+}
+
+#[inline(always)]
+fn bounds<R: Real, const N: usize>(recurrence: &Recurrence<R>) -> Bounds<R> {
+    const { assert!(N >= 1 && N <= MAX) }
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let kernel = Kernel::new::<N>(recurrence);
+    let weight = kernel.weight::<N>();
+    let share = R::select(kernel.turned, kernel.others - weight, weight);
+    // Mean and variance alone bound it (Cantelli); more moments never leave that, rounding does.
+    let spread = recurrence.spread;
+    let is_above = recurrence.a[0].lt(zero);
+    let least = R::select(is_above, recurrence.rest, zero);
+    let most = R::select(is_above, one, spread);
+    let lower = share.clamp(least, most).saturate();
+    let upper = (lower + kernel.own).min(one);
+    Bounds {
+        lower: lower * recurrence.total,
+        upper: upper * recurrence.total,
+    }
+}
+
+/// Moments `m` with a share `strength` of them, from 0 to 1, replaced by the moments of
+/// `target`, a distribution with total 1: `(1 - strength) m + strength m_0 target` (\[MBD\],
+/// Algorithm 1; \[MSM\], section 4.2). The total stays.
+#[inline(always)]
+pub fn mix_bias<R: Real, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    target: [R; MAX_MOMENTS],
+    strength: R,
+) -> [R; MAX_MOMENTS] {
+    let strength = strength.saturate();
+    let mut mixed = m;
+    hankel_dsl::unroll!(k in 1..(2 * N + 1), {
+        mixed[k] = m[k].lerp(m[0] * target[k], strength);
+    });
+    mixed
+}

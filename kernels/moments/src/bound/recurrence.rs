@@ -1,0 +1,170 @@
+//! From moments to the three-term recurrence of their orthogonal polynomials.
+//!
+//! Monic polynomials that are orthogonal with respect to a distribution satisfy
+//! `p_{k+1}(x) = (x - α_k) p_k(x) - β_k p_{k-1}(x)`. Chebyshev's algorithm finds the coefficients
+//! from the moments (W. Gautschi, *Orthogonal Polynomials*, 2004, section 2.1.7). It is the Cholesky
+//! factorisation of the Hankel matrix, which it never forms: `β_k` is the quotient of two pivots,
+//! `α_k` the difference of two entries below the diagonal.
+//!
+//! What low precision loses of tight surfaces it loses here, where pivots are small differences of
+//! moments. All that follows from the coefficients is well conditioned. So this is the one place
+//! where the compensated variant computes with twice the digits.
+
+use hankel_dsl::{Real, lit, unroll};
+
+use super::twofold::Arithmetic;
+use super::{MAX, MAX_MOMENTS};
+
+/// The recurrence about the query point, in a unit of length that keeps powers of depths within
+/// range.
+#[derive(Clone, Copy)]
+pub(crate) struct Recurrence<R> {
+    /// `α_k` minus the query point; `a[0]` is the mean.
+    pub a: [R; MAX],
+    /// `β_k` from index 1 on; `b[1]` is the variance.
+    pub b: [R; MAX + 1],
+    /// Mean square distance to the query point: `a[0]² + b[1]`.
+    pub square: R,
+    /// The variance's share of it.
+    pub spread: R,
+    /// The squared mean's share of it.
+    pub rest: R,
+    /// The unit of length: 1 for N up to 2, where no high powers occur and a rounding less counts;
+    /// else the root of the mean square distance.
+    pub unit: R,
+    /// `m_0`, or 0 if it is not a positive number.
+    pub total: R,
+}
+
+/// `x`, or 0 if it is not a number or so large that its products would be infinite.
+#[inline(always)]
+pub(crate) fn finite<R: Real>(x: R, largest: R) -> R {
+    R::select(x.abs().le(largest), x, lit!(0.0))
+}
+
+/// The largest |a| that is used: 2N factors of that size and a few more stay within the type's
+/// range for the largest N.
+#[inline(always)]
+pub(crate) fn farthest<R: Real>() -> R {
+    let half: R = lit!(0.5);
+    half / R::epsilon().sqrt()
+}
+
+/// A power of two that brings a total into the middle of `f32`'s range.
+#[inline(always)]
+fn scale<R: Real>(total: R) -> R {
+    let small = R::select(
+        total.lt(lit!(1e-27)),
+        lit!((1_u128 << 110) as f64),
+        lit!((1_u64 << 60) as f64),
+    );
+    let large = R::select(
+        total.gt(lit!(1e27)),
+        lit!(1.0 / (1_u128 << 110) as f64),
+        lit!(1.0 / (1_u64 << 60) as f64),
+    );
+    let one: R = lit!(1.0);
+    R::select(
+        total.lt(lit!(1e-9)),
+        small,
+        R::select(total.gt(lit!(1e9)), large, one),
+    )
+}
+
+impl<R: Real> Recurrence<R> {
+    /// The first N steps for moments `m_0` to `m_2N`, of any value, and query point `eta`.
+    ///
+    /// What is not a number, or too large (the query point above 1e12, a moment above 1e25 times
+    /// the total or so), counts as 0.
+    ///
+    /// Pivots are lifted to the size of their own rounding errors, `floor` times the moment on the
+    /// diagonal: `ε/4` for plain arithmetic.
+    #[inline(always)]
+    pub fn new<A: Arithmetic<R>, const N: usize>(m: [R; MAX_MOMENTS], eta: R, floor: R) -> Self {
+        let zero: R = lit!(0.0);
+        let least: R = lit!(1e-30);
+        let largest: R = lit!(1e25);
+        let far: R = if const { N > 2 } {
+            lit!(1e12)
+        } else {
+            lit!(1e9)
+        };
+        let total = finite(m[0], lit!(1e37)).max(zero);
+        let scale = scale(total);
+        let eta = finite(eta, far);
+        let query = A::of(eta);
+
+        let mut current = [A::of(zero); MAX_MOMENTS];
+        let scaled_total = (total * scale).max(least);
+        current[0] = A::of(scaled_total);
+        unroll!(k in 1..(2 * N + 1), {
+            current[k] = A::of(finite(finite(m[k], lit!(1e37)) * scale, largest));
+        });
+        let raw = current;
+        let mut previous = current;
+
+        let mut slope = current[1].over(current[0]);
+        let mut alpha = slope.within(-far, far);
+        let mut beta = A::of(zero);
+        let mut square = scaled_total;
+        let mut unit = scaled_total;
+        let mut limit = far;
+        let mut a = [zero; MAX];
+        let mut b = [zero; MAX + 1];
+        a[0] = alpha.minus(query).rounded();
+        unroll!(k in 1..(N + 1), {
+            let mut next = current;
+            unroll!(l in 1..10, {
+                if const { l >= k && l + k <= 2 * N } {
+                    let mut t = current[l + 1].minus(alpha.times(current[l]));
+                    if const { k > 1 } {
+                        t = t.minus(beta.times(previous[l]));
+                    }
+                    next[l] = t.within(-largest, largest);
+                }
+            });
+            let noise = raw[2 * k].rounded().abs() * floor;
+            let least = if const { k == 1 } { scaled_total * least } else { least };
+            next[k] = next[k].at_least(noise.max(least));
+            beta = next[k].over(current[k - 1]).within(zero, far);
+            b[k] = beta.rounded();
+            if const { k == 1 } {
+                square = b[1] + a[0] * a[0];
+                unit = square.sqrt();
+                limit = (unit * farthest::<R>()).min(far);
+            }
+            if const { k < N } {
+                let below = next[k + 1].over(next[k]);
+                alpha = below.minus(slope).within(eta - limit, eta + limit);
+                slope = below;
+                a[k] = alpha.minus(query).rounded();
+            }
+            previous = current;
+            current = next;
+        });
+
+        let spread = b[1] / square;
+        let one: R = lit!(1.0);
+        // The complement where that rounds less.
+        let rest = R::select(spread.lt(lit!(0.5)), one - spread, a[0] * a[0] / square);
+        if const { N > 2 } {
+            let most = farthest::<R>() * farthest::<R>();
+            unroll!(k in 0..N, {
+                a[k] = a[k] / unit;
+                b[k + 1] = (b[k + 1] / square).min(most);
+            });
+            square = one;
+        } else {
+            unit = one;
+        }
+        Self {
+            a,
+            b,
+            square,
+            spread,
+            rest,
+            unit,
+            total,
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Roots of real-rooted polynomials, by as many steps for every input.
+//!
+//! Polynomials are monic and given by their other coefficients: `e[i]` belongs to
+//! `v^(degree - i)`, `e[0]` is 1. Roots are expected in [-1, 1].
+
+use hankel_dsl::{Real, lit, unroll};
+
+use super::MAX;
+
+/// Coefficients of a monic polynomial, highest power first.
+pub(crate) type Monic<R> = [R; MAX + 1];
+
+/// Steps of Laguerre's method towards the least root of a polynomial. Each is cubic once it is
+/// nearer to that root than to the next; where roots lie close together on the way, it starts
+/// with a few that are not.
+const FROM_OUTSIDE: u32 = 8;
+/// Steps from a stationary point to a neighbouring root.
+const FROM_STATIONARY: u32 = 6;
+
+/// Small whole numbers, which compilers fold into constants.
+#[inline(always)]
+pub(crate) fn whole<R: Real>(k: usize) -> R {
+    match k {
+        0 => lit!(0.0),
+        1 => lit!(1.0),
+        2 => lit!(2.0),
+        3 => lit!(3.0),
+        4 => lit!(4.0),
+        5 => lit!(5.0),
+        6 => lit!(6.0),
+        7 => lit!(7.0),
+        8 => lit!(8.0),
+        9 => lit!(9.0),
+        _ => lit!(10.0),
+    }
+}
+
+/// Value, first derivative and half the second derivative.
+#[inline(always)]
+fn value<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R, R) {
+    let zero: R = lit!(0.0);
+    let mut p = e[0];
+    let mut d = zero;
+    let mut h = zero;
+    unroll!(i in 1..(DEGREE + 1), {
+        h = h * v + d;
+        d = d * v + p;
+        p = p * v + e[i];
+    });
+    (p, d, h)
+}
+
+/// Length of Laguerre's step. For a polynomial with real roots only, it never passes the next root
+/// on the side that it is taken to (A. Householder, *The Numerical Treatment of a Single Nonlinear
+/// Equation*, 1970, section 4.4).
+#[inline(always)]
+fn laguerre<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> R {
+    let (p, d, h) = value::<R, DEGREE>(e, v);
+    let zero: R = lit!(0.0);
+    let less = whole::<R>(DEGREE - 1);
+    let least: R = lit!(1e-30);
+    let square = less * (less * (d * d) - whole::<R>(2 * DEGREE) * (p * h));
+    whole::<R>(DEGREE) * p.abs() / (d.abs() + square.max(zero).sqrt()).max(least)
+}
+
+/// One step of Newton's method, kept within the bracket.
+#[inline(always)]
+fn newton<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R, low: R, high: R) -> R {
+    let (p, d, _) = value::<R, DEGREE>(e, v);
+    let least: R = lit!(1e-30);
+    let slope = R::select(d.abs().lt(least), least, d);
+    (v - p / slope).clamp(low, high)
+}
+
+/// The least root, from the left: Laguerre's step from minus infinity, and then steps that never
+/// pass it.
+#[inline(always)]
+fn from_outside<R: Real, const DEGREE: usize>(e: &Monic<R>) -> R {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let less = whole::<R>(DEGREE - 1);
+    let square = less * (less * (e[1] * e[1]) - whole::<R>(2 * DEGREE) * e[2]);
+    let mut v = -(e[1] + square.max(zero).sqrt()) / whole::<R>(DEGREE);
+    let mut i = 0;
+    while i < FROM_OUTSIDE {
+        v = (v + laguerre::<R, DEGREE>(e, v)).min(one);
+        i += 1;
+    }
+    v
+}
+
+/// The least root of a cubic, if it is negative; else 0.
+#[inline(always)]
+pub(crate) fn least_of_cubic<R: Real>(e: &Monic<R>) -> R {
+    let one: R = lit!(1.0);
+    let zero: R = lit!(0.0);
+    let v = from_outside::<R, 3>(e).clamp(-one, zero);
+    newton::<R, 3>(e, v, -one, zero)
+}
+
+/// The two least roots, where they are negative; else 0. DEGREE is 4 or 5, REDUCED one less.
+///
+/// Two roots that nearly coincide are told apart from between them: by the derivative's least
+/// root, which such a pair encloses and which has no near neighbour itself.
+#[inline(always)]
+pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
+    e: &Monic<R>,
+) -> (R, R) {
+    let one: R = lit!(1.0);
+    let zero: R = lit!(0.0);
+    let mut derivative = *e;
+    unroll!(i in 1..(REDUCED + 1), {
+        derivative[i] = e[i] * (whole::<R>(DEGREE - i) / whole::<R>(DEGREE));
+    });
+    let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
+    let mut first = between;
+    let mut second = between;
+    let mut i = 0;
+    while i < FROM_STATIONARY {
+        first = (first - laguerre::<R, DEGREE>(e, first)).max(-one);
+        second = (second + laguerre::<R, DEGREE>(e, second)).min(zero);
+        i += 1;
+    }
+    (
+        newton::<R, DEGREE>(e, first, -one, between),
+        newton::<R, DEGREE>(e, second, between, zero),
+    )
+}

@@ -1,0 +1,137 @@
+//! Numbers of which the rounding error is kept, or is not: what Chebyshev's algorithm runs on.
+
+use hankel_dsl::{Real, lit};
+
+/// The arithmetic that the recurrence needs.
+pub(crate) trait Arithmetic<R: Real>: Copy {
+    /// Exactly `x`.
+    fn of(x: R) -> Self;
+    /// The nearest number of the base type.
+    fn rounded(self) -> R;
+    /// Difference.
+    fn minus(self, other: Self) -> Self;
+    /// Product.
+    fn times(self, other: Self) -> Self;
+    /// Quotient. Its magnitude is limited to 2⁸⁰, so that a vanishing divisor (which must not be
+    /// negative) does no harm.
+    fn over(self, positive: Self) -> Self;
+    /// `floor` if the number is less.
+    fn at_least(self, floor: R) -> Self;
+    /// Moved between the limits.
+    fn within(self, low: R, high: R) -> Self;
+}
+
+/// A divisor that keeps a quotient's magnitude below 2⁸⁰.
+#[inline(always)]
+fn divisor<R: Real>(numerator: R, positive: R) -> R {
+    let smallest: R = lit!(1e-37);
+    let least = numerator.abs() * lit!(1.0 / (1_u128 << 80) as f64);
+    positive.max(least.max(smallest))
+}
+
+/// A number as it is.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain<R>(R);
+
+impl<R: Real> Arithmetic<R> for Plain<R> {
+    #[inline(always)]
+    fn of(x: R) -> Self {
+        Self(x)
+    }
+    #[inline(always)]
+    fn rounded(self) -> R {
+        self.0
+    }
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        Self(self.0 - other.0)
+    }
+    #[inline(always)]
+    fn times(self, other: Self) -> Self {
+        Self(self.0 * other.0)
+    }
+    #[inline(always)]
+    fn over(self, positive: Self) -> Self {
+        Self(self.0 / divisor(self.0, positive.0))
+    }
+    #[inline(always)]
+    fn at_least(self, floor: R) -> Self {
+        Self(self.0.max(floor))
+    }
+    #[inline(always)]
+    fn within(self, low: R, high: R) -> Self {
+        Self(self.0.clamp(low, high))
+    }
+}
+
+/// An unevaluated sum of two numbers, the second within the first's rounding error: about twice
+/// the digits (T. Dekker, *A floating-point technique for extending the available precision*, 1971).
+///
+/// If a compiler contracts or reassociates what it should not, error terms come out wrong by as
+/// much as they are large: the result is then about as good as [`Plain`]'s, not worse.
+#[derive(Clone, Copy)]
+pub(crate) struct Twofold<R> {
+    high: R,
+    low: R,
+}
+
+impl<R: Real> Twofold<R> {
+    /// `high + low` where `low` is small: both parts renewed.
+    #[inline(always)]
+    fn of_parts(high: R, low: R) -> Self {
+        let sum = high + low;
+        Self {
+            high: sum,
+            low: low - (sum - high),
+        }
+    }
+}
+
+impl<R: Real> Arithmetic<R> for Twofold<R> {
+    #[inline(always)]
+    fn of(x: R) -> Self {
+        Self {
+            high: x,
+            low: lit!(0.0),
+        }
+    }
+    #[inline(always)]
+    fn rounded(self) -> R {
+        self.high
+    }
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        let (sum, error) = self.high.two_sum(-other.high);
+        Self::of_parts(sum, error + (self.low - other.low))
+    }
+    #[inline(always)]
+    fn times(self, other: Self) -> Self {
+        let (product, error) = self.high.two_product(other.high);
+        let cross = self.high * other.low + self.low * other.high;
+        Self::of_parts(product, error + cross)
+    }
+    #[inline(always)]
+    fn over(self, positive: Self) -> Self {
+        let by = divisor(self.high, positive.high);
+        let first = self.high / by;
+        let (product, error) = first.two_product(positive.high);
+        let rest = ((self.high - product) - error + self.low - first * positive.low) / by;
+        Self::of_parts(first, rest)
+    }
+    #[inline(always)]
+    fn at_least(self, floor: R) -> Self {
+        let is_less = self.high.lt(floor);
+        Self {
+            high: R::select(is_less, floor, self.high),
+            low: R::select(is_less, lit!(0.0), self.low),
+        }
+    }
+    #[inline(always)]
+    fn within(self, low: R, high: R) -> Self {
+        let inside = low.le(self.high) & self.high.le(high);
+        Self {
+            high: self.high.clamp(low, high),
+            low: R::select(inside, self.low, lit!(0.0)),
+        }
+    }
+}
