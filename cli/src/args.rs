@@ -119,8 +119,12 @@ Examples:
 A budget is a TOML file:
   [budget]
   branches = 4
+  findings = 0
   [budget.kernels.hamburger_4msm]
   operations = 120
+
+It limits arithmetic, operations, branches, texture, total (see `hankel list`), and findings: loops
+that cannot be unrolled and dynamic indices into a function's own arrays.
 
 Give the options that the folder was built with.")]
 pub struct Check {

@@ -341,6 +341,9 @@ fn one(
             &baked
         };
         let Some(ir) = ir else { continue };
+        if entry.findings.is_empty() {
+            entry.findings = ir.findings();
+        }
         match ir.write(language, kernel, options)? {
             Written::Text(text) => {
                 for binding in &mut entry.bindings {

@@ -7,12 +7,13 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::build::{Generated, MANIFEST_FILE};
-use crate::cost::Cost;
 use crate::error::{During, Error, Failure, Result};
 use crate::finish;
+use crate::lint::Finding;
+use crate::manifest::KernelEntry;
 use crate::spirv;
 
-/// Limits on a kernel's cost; see [`Cost`] for what is counted.
+/// Limits on a kernel's cost; see [`Cost`](crate::cost::Cost) for what is counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -26,6 +27,8 @@ pub struct Limits {
     pub texture: Option<u32>,
     /// Most instructions in all.
     pub total: Option<u32>,
+    /// Most findings of [`crate::lint`].
+    pub findings: Option<u32>,
 }
 
 /// `hankel.toml`:
@@ -59,6 +62,8 @@ pub struct Budget {
     pub texture: Option<u32>,
     /// Most instructions in all.
     pub total: Option<u32>,
+    /// Most findings of [`crate::lint`].
+    pub findings: Option<u32>,
     /// Limits of single kernels, which come before those for all.
     #[serde(default)]
     pub kernels: BTreeMap<String, Limits>,
@@ -89,6 +94,7 @@ impl Budget {
             branches: own.branches.or(self.branches),
             texture: own.texture.or(self.texture),
             total: own.total.or(self.total),
+            findings: own.findings.or(self.findings),
         }
     }
 }
@@ -104,6 +110,9 @@ pub struct OverBudget {
     pub got: u32,
     /// How much there may be.
     pub limit: u32,
+    /// What the lint found, if that is limited.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
 }
 
 /// A file that differs.
@@ -198,7 +207,7 @@ pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result
     for (kernel, entry) in &generated.manifest.kernels {
         report
             .over_budget
-            .extend(over_budget(kernel, entry.cost, budget.of(kernel)));
+            .extend(over_budget(kernel, entry, budget.of(kernel)));
     }
     let known = &generated.manifest.kernels;
     report.unknown_in_budget = budget
@@ -210,7 +219,9 @@ pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result
     Ok(report)
 }
 
-fn over_budget(kernel: &str, cost: Cost, limits: Limits) -> Vec<OverBudget> {
+fn over_budget(kernel: &str, entry: &KernelEntry, limits: Limits) -> Vec<OverBudget> {
+    const FINDINGS: &str = "findings of the lint";
+    let cost = entry.cost;
     [
         (
             "arithmetic instructions",
@@ -221,6 +232,7 @@ fn over_budget(kernel: &str, cost: Cost, limits: Limits) -> Vec<OverBudget> {
         ("branches", cost.branches, limits.branches),
         ("texture instructions", cost.texture, limits.texture),
         ("instructions", cost.total, limits.total),
+        (FINDINGS, entry.findings.len() as u32, limits.findings),
     ]
     .into_iter()
     .filter_map(|(what, got, limit)| {
@@ -230,6 +242,10 @@ fn over_budget(kernel: &str, cost: Cost, limits: Limits) -> Vec<OverBudget> {
             what,
             got,
             limit,
+            findings: match what {
+                FINDINGS => entry.findings.clone(),
+                _ => Vec::new(),
+            },
         })
     })
     .collect()
@@ -310,11 +326,15 @@ impl fmt::Display for Report {
                 what,
                 got,
                 limit,
+                findings,
             } = over;
             writeln!(
                 f,
                 "over budget: kernel `{kernel}` has {got} {what}, {limit} are allowed"
             )?;
+            for finding in findings {
+                writeln!(f, "  {finding}")?;
+            }
         }
         for kernel in &self.unknown_in_budget {
             writeln!(f, "in the budget, but no kernel: {kernel}")?;

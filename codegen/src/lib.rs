@@ -24,6 +24,7 @@ pub mod files;
 pub mod finish;
 pub mod headers;
 mod language;
+pub mod lint;
 pub mod manifest;
 pub mod scaffold;
 pub mod source_hash;

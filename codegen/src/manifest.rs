@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::cost::Cost;
 use crate::finish::PIPELINE;
 use crate::headers::Layouts;
+use crate::lint::Finding;
 use crate::spirv::names::output_name;
 use crate::translate::{self, Options, Place};
 use crate::{Language, VERSION};
@@ -138,6 +139,9 @@ pub struct KernelEntry {
     pub outputs: Vec<Interface>,
     /// What it costs, counted in the SPIR-V.
     pub cost: Cost,
+    /// What makes it slow in the languages that it is written in.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub findings: Vec<Finding>,
     /// How closely backends agree with the native scalar run.
     pub tolerance: Tolerance,
     /// The text in each language.
@@ -399,6 +403,7 @@ pub(crate) fn entry(
         inputs,
         outputs,
         cost,
+        findings: Vec::new(),
         tolerance: Tolerance {
             ulp: kernel.tolerance.ulp,
             absolute: kernel.tolerance.absolute,

@@ -254,6 +254,7 @@ fn a_check_shows_what_differs() {
     fs::write(folder.path().join("spirv/bound.spv"), [0; 40]).unwrap();
     let mut budget = Budget {
         branches: Some(1),
+        findings: Some(0),
         ..Budget::default()
     };
     budget.kernels.insert(
@@ -291,6 +292,13 @@ fn a_check_shows_what_differs() {
         "{text}"
     );
     assert!(text.contains("kernel `total` has "), "{text}");
+    // What the lint found is shown.
+    assert!(
+        text.contains(
+            "kernel `total` has 1 findings of the lint, 0 are allowed\n  `total`: a loop that"
+        ),
+        "{text}"
+    );
     let json = serde_json::to_value(&report).unwrap();
     assert_eq!(json["missing"][0], "msl/tint.metal");
     // A folder that is not there lacks everything.

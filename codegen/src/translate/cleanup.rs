@@ -261,28 +261,34 @@ fn returns(block: &Block) -> bool {
     found
 }
 
-fn each_statement(block: &Block, visit: &mut impl FnMut(&Statement)) {
+/// Visits every statement of a block, and of the blocks within it.
+pub(crate) fn each_statement(block: &Block, visit: &mut impl FnMut(&Statement)) {
     for statement in block {
-        visit(statement);
-        match statement {
-            Statement::Block(inner) => each_statement(inner, visit),
-            Statement::If { accept, reject, .. } => {
-                each_statement(accept, visit);
-                each_statement(reject, visit);
-            }
-            Statement::Switch { cases, .. } => {
-                cases
-                    .iter()
-                    .for_each(|case| each_statement(&case.body, visit));
-            }
-            Statement::Loop {
-                body, continuing, ..
-            } => {
-                each_statement(body, visit);
-                each_statement(continuing, visit);
-            }
-            _ => {}
+        each_within(statement, visit);
+    }
+}
+
+/// Visits a statement, and those within it.
+pub(crate) fn each_within(statement: &Statement, visit: &mut impl FnMut(&Statement)) {
+    visit(statement);
+    match statement {
+        Statement::Block(inner) => each_statement(inner, visit),
+        Statement::If { accept, reject, .. } => {
+            each_statement(accept, visit);
+            each_statement(reject, visit);
         }
+        Statement::Switch { cases, .. } => {
+            cases
+                .iter()
+                .for_each(|case| each_statement(&case.body, visit));
+        }
+        Statement::Loop {
+            body, continuing, ..
+        } => {
+            each_statement(body, visit);
+            each_statement(continuing, visit);
+        }
+        _ => {}
     }
 }
 

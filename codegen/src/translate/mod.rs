@@ -20,6 +20,8 @@ mod msl;
 pub(crate) mod text;
 mod wgsl;
 
+pub(crate) use cleanup::{each_statement, each_within};
+
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -35,6 +37,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Step, guarded};
+use crate::lint::Finding;
 use crate::{Error, Language, VERSION};
 
 /// What to do about an index that is out of range, beyond the kernel's own guard.
@@ -279,6 +282,11 @@ impl Ir {
     /// around buffers. Shapes that Hankel's DSL does not make may stay as naga reads them.
     pub fn is_clean(&self) -> bool {
         self.clean
+    }
+
+    /// What makes it slow in every language ([`crate::lint`]).
+    pub fn findings(&self) -> Vec<Finding> {
+        crate::lint::of_module(&self.module, None)
     }
 
     fn cleaned(&self, kernel: &Kernel) -> Option<Self> {

@@ -1,0 +1,62 @@
+//! Kernels that map rows to rows have neither loops that a compiler cannot unroll nor dynamic
+//! indices into arrays of their own, in the form from which every text is written.
+
+use std::collections::BTreeMap;
+
+use hankel_codegen::lint::{Construct, Finding};
+use hankel_codegen::translate::Ir;
+use hankel_dsl::native::describe::{Kernel, Output, Role};
+use hankel_tests::Crate;
+
+/// Whether it reads or writes no texture.
+fn maps_rows(kernel: &Kernel) -> bool {
+    let reads = |role: &Role| matches!(role, Role::Texture { .. });
+    let writes = |output: &Output| matches!(output, Output::Texture { .. });
+    !kernel.params.iter().any(|param| reads(&param.role)) && !kernel.outputs.iter().any(writes)
+}
+
+fn findings(one: &Crate) -> BTreeMap<String, (bool, Vec<Finding>)> {
+    one.entries
+        .iter()
+        .map(|entry| {
+            let kernel = &entry.kernel;
+            let ir = Ir::read(&one.bundle.modules[&kernel.name], kernel)
+                .unwrap_or_else(|e| panic!("{e}"));
+            assert!(ir.is_clean(), "{}", kernel.name);
+            (kernel.name.clone(), (maps_rows(kernel), ir.findings()))
+        })
+        .collect()
+}
+
+#[test]
+fn maps_over_rows_are_clean() {
+    let all = findings(&Crate::shadows());
+    let maps: Vec<_> = all.iter().filter(|(_, (maps, _))| *maps).collect();
+    for (name, (_, found)) in &maps {
+        assert!(found.is_empty(), "{name}: {found:?}");
+    }
+    let names: Vec<&str> = maps.iter().map(|(name, _)| name.as_str()).collect();
+    for bound in ["hamburger_4msm", "hausdorff_4msm", "vsm", "quantize_4_unit"] {
+        assert!(names.contains(&bound), "{bound} is no map: {names:?}");
+    }
+}
+
+/// Filters have loops as long as their inputs say; and the lint sees those.
+#[test]
+fn filters_loop_over_their_samples() {
+    let all = findings(&Crate::shadows());
+    for (kernel, loops) in [
+        ("blur_rgba16unorm", 1),
+        // How many samples is a specialisation constant.
+        ("resolve_unit", 0),
+        // Rows and columns.
+        ("shade_pcf", 2),
+    ] {
+        let found = &all[kernel].1;
+        assert_eq!(found.len(), loops, "{kernel}: {found:?}");
+        assert!(
+            found.iter().all(|it| it.construct == Construct::Loop),
+            "{kernel}: {found:?}"
+        );
+    }
+}
