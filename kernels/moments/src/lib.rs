@@ -22,15 +22,25 @@
 
 pub mod bias;
 mod bound;
+mod degenerate;
 mod hamburger;
 mod hausdorff;
 mod leak;
 mod moments;
+mod orthogonal;
 mod quantization;
+mod six;
+mod sparse;
+mod trigonometric;
 mod variance;
 
 pub use bias::Bias;
-pub use bound::{Bounds, MAX_MOMENTS, bound, bound_compensated, mix_bias};
+pub use bound::{
+    Bounds, Canonical, Gradient, MAX_MOMENTS, bias_target, bound, bound_adjoint,
+    bound_adjoint_compensated, bound_compensated, canonical, canonical_compensated, mix_bias,
+    mix_bias_adjoint,
+};
+pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
 pub use hamburger::hamburger_4;
 pub use hausdorff::hausdorff_4;
 pub use leak::cut_leak;
@@ -41,4 +51,7 @@ pub use quantization::{
     from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, quantize_unit_6,
     to_unorm,
 };
+pub use six::hamburger_6;
+pub use sparse::{TwoPoints, sparse_2};
+pub use trigonometric::{HalfAngle, TrigonometricMoments, trigonometric_4};
 pub use variance::variance_2;
