@@ -3,8 +3,9 @@
 //! supplement).
 //!
 //! Here are the published ones, named by basis, number of moments and bits of each stored channel.
-//! All but the two for clamped depths were found by experiments with distributions of few depths;
-//! other solvers than their authors' may get by with less, or need more.
+//! Stored moments of few random depths are invalid more often than not: their Hankel matrix is not
+//! positive definite. The symmetric biases make all of 50 000 valid again; those for [0, 1] leave the
+//! shares stated with them.
 //!
 //! ```
 //! use hankel_moments::bias::SYMMETRIC_4_32;
@@ -105,15 +106,18 @@ const fn ends_and_uniform<const N: usize>(uniform: f64) -> [f64; N] {
 
 /// Half a surface at each end of [0, 1]: the best for the average of moments (\[MSM\], section 4.2
 /// and Listing 3). It does not help depths at the ends themselves: what is there stays on the
-/// boundary of the valid moments.
+/// boundary of the valid moments. Of up to two random depths' moments, 4.8 % stay invalid; where some
+/// of the depths are at the ends, 22 %.
 pub const UNIT_4_16: Bias = bias(Basis::Unit, 16, [0.5; 4], 3e-5);
 
 /// Where depths are clamped to [0, 1], many are at the ends. A fifth of the target is uniform, which
-/// puts it inside the valid moments (\[BHS\], section 4 of the supplement).
+/// puts it inside the valid moments (\[BHS\], section 4 of the supplement). Of up to two depths'
+/// moments, 2.4 % stay invalid, at the ends or between.
 pub const CLAMPED_4_16: Bias = bias(Basis::Unit, 16, ends_and_uniform::<4>(0.2), 3e-5);
 
 /// Where depths are clamped to [0, 1]; half of the target is uniform, for three depths suffice to
 /// lie on the boundary of six moments (\[BHS\], section 4 of the supplement; 10 bits: the lecture).
+/// Of up to three depths' moments, 0.014 % stay invalid.
 pub const CLAMPED_6_10: Bias = bias(Basis::Unit, 10, ends_and_uniform::<6>(0.5), 4e-3);
 
 /// As [`SYMMETRIC_4_16`], rounded: what moment shadow mapping uses (the lecture).
@@ -142,7 +146,8 @@ pub const SYMMETRIC_6_32: Bias = bias(
     5e-6,
 );
 
-/// Eight power moments, 16 bits (\[MBOIT\], Table 1 of the supplement).
+/// Eight power moments, 16 bits (\[MBOIT\], Table 1 of the supplement); of these, what is left invalid
+/// is not measured: the basis that they are stored in is not here.
 pub const SYMMETRIC_8_16: Bias = bias(
     Basis::Symmetric,
     16,

@@ -53,6 +53,10 @@ macro_rules! unit_offset {
 
 /// Moments of depths in [0, 1] to the optimised basis: the inverse of [`dequantize_unit_4`]
 /// (\[MSM\], Listing 1).
+///
+/// Its coefficients reach 82 and magnify the rounding of the moments. In `f32` a depth's channels
+/// are off by up to 1.5e-5, a step of 16 bits; those of [`quantize_symmetric_4`], which gains nearly
+/// as many bits, by 2.3e-7.
 #[inline(always)]
 pub fn quantize_unit_4<R: Real>(m: Moments4<R>) -> Quantized4<R> {
     let Moments4 { b1, b2, b3, b4 } = m;

@@ -1,8 +1,9 @@
 //! Optimised quantisation: an affine change of basis that makes the set of valid moment vectors
 //! fill the unit cube, so that few bits for each channel suffice (\[MSM\], section 4.1 and section 8
 //! of the supplement; \[BHS\], section 3 of the supplement). It gains 12.3 bits for four moments of
-//! depths in [0, 1] and 30.5 bits for six; the transforms for depths in [-1, 1] gain as much, once
-//! the change of the depths' range is counted, from coefficients that are a hundredth as large.
+//! depths in [0, 1] and 30.5 bits for six. The transforms for depths in [-1, 1] gain 12.2 and 30.5,
+//! counting the change of the depths' range, and their coefficients are much smaller: in `f32`, they
+//! are the ones to use.
 //!
 //! | moments | stored as | by |
 //! | --- | --- | --- |

@@ -29,8 +29,12 @@ pub fn to_unorm<R: Real, const BITS: usize>(x: R) -> R {
     nearest(crate::moments::within(x, lit!(0.0), lit!(1.0)) * largest::<R, BITS>())
 }
 
-/// The number in [0, 1] that the integer `n` of [`to_unorm`] stands for.
+/// The number in [0, 1] that the integer `n` of [`to_unorm`] stands for, n / (2^BITS - 1): exact at
+/// the ends, within two roundings between.
 #[inline(always)]
 pub fn from_unorm<R: Real, const BITS: usize>(n: R) -> R {
-    n / largest::<R, BITS>()
+    let one: R = lit!(1.0);
+    let most = largest::<R, BITS>();
+    // A shader's optimiser takes a quotient by a constant for this product.
+    R::select(n.lt(most), n * (one / most), one)
 }
