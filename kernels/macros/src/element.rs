@@ -140,25 +140,22 @@ fn one(
                         type Over<L: ::hankel_dsl::Real> = #name<L>;
                         #[inline(always)]
                         fn gather<L: layout::Lane<Scalar = #scalar>>(
-                            at: impl Fn(usize) -> Self + Copy,
+                            rows: layout::Rows<'_, #scalar>,
+                            at: usize,
                         ) -> #name<L> {
                             #name {
                                 #(#names: <#types as layout::Lanewise<#scalar>>::gather(
-                                    |i| at(i).#names,
+                                    rows,
+                                    at + core::mem::offset_of!(#this, #names) / size_of::<#scalar>(),
                                 ),)*
                             }
                         }
                         #[inline(always)]
-                        fn extract<L: layout::Lane<Scalar = #scalar>>(
+                        fn scatter<L: layout::Lane<Scalar = #scalar>>(
                             over: &#name<L>,
-                            i: usize,
-                        ) -> Self {
-                            Self {
-                                #(#names: <#types as layout::Lanewise<#scalar>>::extract::<L>(
-                                    &over.#names,
-                                    i,
-                                ),)*
-                            }
+                            columns: &mut layout::Columns<'_, L>,
+                        ) {
+                            #(<#types as layout::Lanewise<#scalar>>::scatter(&over.#names, columns);)*
                         }
                     }
                 }

@@ -388,16 +388,20 @@ impl Kernel {
             let name = &p.name;
             quote!(let #name = &#name[start..start + L::LANES];)
         });
+        let (uniforms, uniform_types): (Vec<_>, Vec<_>) = self
+            .params
+            .iter()
+            .filter_map(|p| match &p.role {
+                Role::Uniform(ty) => Some((&p.name, self.concrete(ty, variant))),
+                _ => None,
+            })
+            .unzip();
         let args = self.params.iter().map(|p| {
             let name = &p.name;
             match &p.role {
-                Role::Uniform(ty) => {
-                    let ty = self.concrete(ty, variant);
-                    quote!(&<#ty as layout::Splat<#scalar>>::splat::<L>(*#name))
-                }
                 Role::Element(ty) => {
                     let ty = self.concrete(ty, variant);
-                    quote!(<#ty as layout::Lanewise<#scalar>>::gather::<L>(|i| #name[i]))
+                    quote!(<#ty as layout::Lanewise<#scalar>>::load::<L>(#name))
                 }
                 _ => quote!(#name),
             }
@@ -410,19 +414,29 @@ impl Kernel {
             impl exec::LaneBody for Body<'_> {
                 type Scalar = #scalar;
                 type Out = #out;
+                type Uniforms<L: ::hankel_dsl::Real> =
+                    (#(<#uniform_types as layout::Splat<#scalar>>::Over<L>,)*);
+                #[inline(always)]
+                fn uniforms<L: layout::Lane<Scalar = #scalar>>(&self) -> Self::Uniforms<L> {
+                    (#(<#uniform_types as layout::Splat<#scalar>>::splat::<L>(*self.#uniforms),)*)
+                }
                 #[inline(always)]
                 fn one(&self, i: usize) -> #out {
                     let Self { #(#names,)* .. } = *self;
                     #call
                 }
                 #[inline(always)]
-                fn many<L: layout::Lane<Scalar = #scalar>>(&self, start: usize, out: &mut [#out]) {
+                fn many<L: layout::Lane<Scalar = #scalar>>(
+                    &self,
+                    uniforms: &Self::Uniforms<L>,
+                    start: usize,
+                    out: &mut [#out],
+                ) {
                     let Self { #(#names,)* .. } = *self;
+                    let (#(#uniforms,)*) = uniforms;
                     #(#windows)*
                     let value = super::#name::<L>(#(#args),*);
-                    for (i, slot) in out.iter_mut().enumerate().take(L::LANES) {
-                        *slot = <#out as layout::Lanewise<#scalar>>::extract::<L>(&value, i);
-                    }
+                    <#out as layout::Lanewise<#scalar>>::store::<L>(&value, out);
                 }
             }
             exec::map1_lanes(mode, output, &Body { #(#names,)* marker: core::marker::PhantomData })

@@ -15,7 +15,7 @@ use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef};
 use super::describe::TexelFormat;
 use super::lanes::{self, Scalar};
 use super::layout::Lane;
-use crate::{Group, Texel};
+use crate::{Group, Real, Texel};
 
 /// Invocations that a thread takes at once.
 const CHUNK: usize = 4096;
@@ -258,10 +258,19 @@ pub trait LaneBody: Sync {
     type Scalar: Scalar;
     /// An output element.
     type Out: Send;
+    /// What is the same for all invocations, over lanes.
+    type Uniforms<L: Real>;
+    /// It.
+    fn uniforms<L: Lane<Scalar = Self::Scalar>>(&self) -> Self::Uniforms<L>;
     /// Invocation `i`.
     fn one(&self, i: usize) -> Self::Out;
     /// Invocations from `start` on, as many as `L` has lanes, into `out`, which is that long.
-    fn many<L: Lane<Scalar = Self::Scalar>>(&self, start: usize, out: &mut [Self::Out]);
+    fn many<L: Lane<Scalar = Self::Scalar>>(
+        &self,
+        uniforms: &Self::Uniforms<L>,
+        start: usize,
+        out: &mut [Self::Out],
+    );
 }
 
 /// A map over one dimension, on SIMD lanes if `mode` says so.
@@ -280,10 +289,12 @@ pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Resu
 #[inline(always)]
 fn lane_chunk<S: Simd, B: LaneBody>(_simd: S, start: usize, chunk: &mut [B::Out], body: &B) {
     let lanes = <B::Scalar as Scalar>::Lanes::<S>::LANES;
+    // Once, not for each group: the compiler cannot know that storing a result leaves them alone.
+    let uniforms = body.uniforms::<<B::Scalar as Scalar>::Lanes<S>>();
     let mut start = start;
     let mut groups = chunk.chunks_exact_mut(lanes);
     for group in &mut groups {
-        body.many::<<B::Scalar as Scalar>::Lanes<S>>(start, group);
+        body.many::<<B::Scalar as Scalar>::Lanes<S>>(&uniforms, start, group);
         start += lanes;
     }
     for (i, slot) in groups.into_remainder().iter_mut().enumerate() {

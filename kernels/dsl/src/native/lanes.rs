@@ -11,6 +11,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd};
 
 use super::layout::Lane;
+use super::transpose;
 use crate::{Mask, Real};
 
 /// The instruction sets that this processor has and lanes can use, widest first, each by its name.
@@ -64,7 +65,7 @@ pub fn level_name() -> &'static str {
 /// Lane types cannot be named outside of this crate, and the executor creates them only inside
 /// [`fearless_simd::dispatch`], where the token exists.
 #[inline(always)]
-fn token<S: Simd>() -> S {
+pub(super) fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0) }
     // SAFETY: `S` has no bytes, so any pointer that is not null and aligned reads a valid value;
     // and code that gets here runs under `dispatch` with a token of this very type.
@@ -79,6 +80,17 @@ fn fuses<S: Simd>() -> bool {
         Level::Avx2(_) | Level::Avx512(_) => true,
         #[cfg(target_arch = "aarch64")]
         Level::Neon(_) => true,
+        _ => false,
+    }
+}
+
+/// Whether `min` and `max` of instruction set `S` are a comparison and a choice, and so give the
+/// scalar's bits even of a NaN or of zeros of both signs.
+#[inline(always)]
+fn picks<S: Simd>() -> bool {
+    match token::<S>().level() {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Level::Sse2(_) | Level::Sse4_2(_) | Level::Avx2(_) | Level::Avx512(_) => true,
         _ => false,
     }
 }
@@ -108,7 +120,7 @@ impl<S: Simd> Split for F64s<S> {
 }
 
 macro_rules! lanes {
-    ($name:ident, $vector:ident, $mask_name:ident, $mask:ident, $float:ident) => {
+    ($name:ident, $vector:ident, $mask_name:ident, $mask:ident, $float:ident, $column:ident, $put_column:ident) => {
         /// As many numbers as a register of `S` holds.
         #[derive(Clone, Copy)]
         pub struct $name<S: Simd>(S::$vector);
@@ -197,10 +209,16 @@ macro_rules! lanes {
             }
             #[inline(always)]
             fn min(self, o: Self) -> Self {
+                if picks::<S>() {
+                    return Self(self.0.min(o.0));
+                }
                 Self::select(self.lt(o), self, o)
             }
             #[inline(always)]
             fn max(self, o: Self) -> Self {
+                if picks::<S>() {
+                    return Self(self.0.max(o.0));
+                }
                 Self::select(self.gt(o), self, o)
             }
             #[inline(always)]
@@ -242,16 +260,17 @@ macro_rules! lanes {
             type Scalar = $float;
             const LANES: usize = S::$vector::LEN;
             #[inline(always)]
-            fn from_fn(f: impl FnMut(usize) -> $float) -> Self {
-                Self(S::$vector::from_fn(token::<S>(), f))
-            }
-            #[inline(always)]
             fn splat(value: $float) -> Self {
                 Self(S::$vector::simd_from(token::<S>(), value))
             }
             #[inline(always)]
-            fn get(&self, i: usize) -> $float {
-                self.0.as_slice()[i]
+            fn column(table: &[$float], width: usize, at: usize) -> Self {
+                Self(transpose::$column::<S>(table, width, at))
+            }
+            #[inline(always)]
+            fn put_column(table: &mut [$float], width: usize, at: usize, last: &[Self; 4]) {
+                let [a, b, c, d] = *last;
+                transpose::$put_column::<S>(table, width, at, [a.0, b.0, c.0, d.0]);
             }
         }
     };
@@ -272,8 +291,24 @@ macro_rules! lanes {
     };
 }
 
-lanes!(F32s, f32s, F32Mask, mask32s, f32);
-lanes!(F64s, f64s, F64Mask, mask64s, f64);
+lanes!(
+    F32s,
+    f32s,
+    F32Mask,
+    mask32s,
+    f32,
+    column_f32,
+    put_column_f32
+);
+lanes!(
+    F64s,
+    f64s,
+    F64Mask,
+    mask64s,
+    f64,
+    column_f64,
+    put_column_f64
+);
 
 /// A scalar that has lanes.
 pub trait Scalar: Real {
@@ -291,6 +326,8 @@ impl Scalar for f64 {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use std::vec;
+
     use fearless_simd::dispatch;
 
     use super::*;
@@ -330,17 +367,24 @@ pub(crate) mod tests {
     fn agree<L: Lane>(a: &[L::Scalar], b: &[L::Scalar], bits: impl Fn(L::Scalar) -> u64) {
         let name = level_name();
         for (a, b) in a.chunks_exact(L::LANES).zip(b.chunks_exact(L::LANES)) {
-            let (x, y) = (L::from_fn(|i| a[i]), L::from_fn(|i| b[i]));
+            let (x, y) = (L::column(a, 1, 0), L::column(b, 1, 0));
             let (sum, product) = (x.two_sum(y), x.two_product(y));
+            let numbers = |lanes: L| {
+                let mut out = a.to_vec();
+                L::put_column(&mut out, 1, 0, &[lanes; 4]);
+                out
+            };
+            let sum = (numbers(sum.0), numbers(sum.1));
+            let product = (numbers(product.0), numbers(product.1));
             for i in 0..L::LANES {
                 let (scalar_sum, scalar_product) = (a[i].two_sum(b[i]), a[i].two_product(b[i]));
                 for (lane, scalar) in [
-                    (sum.0, scalar_sum.0),
-                    (sum.1, scalar_sum.1),
-                    (product.0, scalar_product.0),
-                    (product.1, scalar_product.1),
+                    (sum.0[i], scalar_sum.0),
+                    (sum.1[i], scalar_sum.1),
+                    (product.0[i], scalar_product.0),
+                    (product.1[i], scalar_product.1),
                 ] {
-                    assert_eq!(bits(lane.get(i)), bits(scalar), "{name}, lane {i}");
+                    assert_eq!(bits(lane), bits(scalar), "{name}, lane {i}");
                 }
             }
         }
@@ -357,6 +401,46 @@ pub(crate) mod tests {
             fn both<S: Simd>(_: S, single: &(Vec<f32>, Vec<f32>), double: &(Vec<f64>, Vec<f64>)) {
                 agree::<F32s<S>>(&single.0, &single.1, |x| x.to_bits().into());
                 agree::<F64s<S>>(&double.0, &double.1, f64::to_bits);
+            }
+            dispatch!(level, simd => both(simd, &single, &double));
+        }
+    }
+
+    #[inline(always)]
+    fn smaller_and_larger<L: Lane>(values: &[L::Scalar], bits: impl Fn(L::Scalar) -> u64) {
+        for a in values {
+            for b in values {
+                let (x, y) = (L::splat(*a), L::splat(*b));
+                for (lanes, scalar) in [(x.min(y), a.min(*b)), (x.max(y), a.max(*b))] {
+                    let mut out = vec![*a; L::LANES];
+                    L::put_column(&mut out, 1, 0, &[lanes; 4]);
+                    for lane in out {
+                        assert_eq!(bits(lane), bits(scalar));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn min_and_max_choose_what_the_scalar_chooses() {
+        let double = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            1e-310,
+            f64::NAN,
+            -f64::NAN,
+            f64::INFINITY,
+            f64::MIN,
+        ];
+        let single = double.map(|x| x as f32);
+        for (_, level) in levels() {
+            #[inline(always)]
+            fn both<S: Simd>(_: S, single: &[f32], double: &[f64]) {
+                smaller_and_larger::<F32s<S>>(single, |x| x.to_bits().into());
+                smaller_and_larger::<F64s<S>>(double, f64::to_bits);
             }
             dispatch!(level, simd => both(simd, &single, &double));
         }

@@ -134,15 +134,18 @@ impl HasPrecision for f64 {
 /// Several values of a scalar type at once; see [`super::lanes`].
 pub trait Lane: Real {
     /// What one lane holds.
-    type Scalar: Real;
+    type Scalar: Real + Pod;
     /// Number of lanes.
     const LANES: usize;
-    /// Lane `i` holds `f(i)`.
-    fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
     /// Every lane holds `value`.
     fn splat(value: Self::Scalar) -> Self;
-    /// What lane `i` < [`Lane::LANES`] holds.
-    fn get(&self, i: usize) -> Self::Scalar;
+    /// Column `at` of `table`, which lies in memory row by row, one row of `width` for each lane.
+    /// Which lane has which row is the same for all columns of all tables.
+    fn column(table: &[Self::Scalar], width: usize, at: usize) -> Self;
+    /// Called for `at` = 0, 1, ... `width` - 1 in turn: fills `table` with the columns, of which
+    /// `last` has those up to `at`, as many as fit, the newest at its end. What earlier calls
+    /// have not stored yet, the last one does.
+    fn put_column(table: &mut [Self::Scalar], width: usize, at: usize, last: &[Self; 4]);
 }
 
 /// A value over scalars of type `S` that has a counterpart over lanes of `S`.
@@ -150,13 +153,60 @@ pub trait Lane: Real {
     message = "`{Self}` cannot be spread over SIMD lanes",
     note = "every field of an element or an output of a kernel that is generic over `Real` must be the generic type, or a structure of it"
 )]
-pub trait Lanewise<S: Real>: Copy {
+pub trait Lanewise<S: Real + Pod>: Pod {
     /// The counterpart.
     type Over<L: Real>;
-    /// Lane `i` is `at(i)`.
-    fn gather<L: Lane<Scalar = S>>(at: impl Fn(usize) -> Self + Copy) -> Self::Over<L>;
-    /// The value in lane `i`.
-    fn extract<L: Lane<Scalar = S>>(over: &Self::Over<L>, i: usize) -> Self;
+    /// Each lane holds the value that starts in its row of `rows` at column `at`.
+    fn gather<L: Lane<Scalar = S>>(rows: Rows<'_, S>, at: usize) -> Self::Over<L>;
+    /// Puts the scalars, over lanes, into `columns`.
+    fn scatter<L: Lane<Scalar = S>>(over: &Self::Over<L>, columns: &mut Columns<'_, L>);
+
+    /// Each lane holds one of `rows`, as many as there are lanes. Which one, is up to `L`.
+    #[inline(always)]
+    fn load<L: Lane<Scalar = S>>(rows: &[Self]) -> Self::Over<L> {
+        let width = const { size_of::<Self>() / size_of::<S>() };
+        let words = &bytemuck::cast_slice(rows)[..L::LANES * width];
+        Self::gather(Rows { words, width }, 0)
+    }
+    /// Each of `rows` becomes what its lane holds: the one of that row in [`Lanewise::load`].
+    #[inline(always)]
+    fn store<L: Lane<Scalar = S>>(over: &Self::Over<L>, rows: &mut [Self]) {
+        let width = const { size_of::<Self>() / size_of::<S>() };
+        Self::scatter(
+            over,
+            &mut Columns {
+                words: &mut bytemuck::cast_slice_mut(rows)[..L::LANES * width],
+                width,
+                at: 0,
+                last: [crate::lit!(0.0); 4],
+            },
+        );
+    }
+}
+
+/// Values of a structure of scalars, each value's scalars a row.
+#[derive(Clone, Copy)]
+pub struct Rows<'a, S> {
+    words: &'a [S],
+    width: usize,
+}
+
+/// Columns that become rows of memory.
+pub struct Columns<'a, L: Lane> {
+    words: &'a mut [L::Scalar],
+    width: usize,
+    at: usize,
+    last: [L; 4],
+}
+
+impl<L: Lane> Columns<'_, L> {
+    #[inline(always)]
+    fn push(&mut self, column: L) {
+        let [_, b, c, d] = self.last;
+        self.last = [b, c, d, column];
+        L::put_column(self.words, self.width, self.at, &self.last);
+        self.at += 1;
+    }
 }
 
 /// A value that is the same for all lanes.
@@ -172,12 +222,12 @@ macro_rules! scalar {
         impl Lanewise<$float> for $float {
             type Over<L: Real> = L;
             #[inline(always)]
-            fn gather<L: Lane<Scalar = $float>>(at: impl Fn(usize) -> Self + Copy) -> L {
-                L::from_fn(at)
+            fn gather<L: Lane<Scalar = $float>>(rows: Rows<'_, $float>, at: usize) -> L {
+                L::column(rows.words, rows.width, at)
             }
             #[inline(always)]
-            fn extract<L: Lane<Scalar = $float>>(over: &L, i: usize) -> Self {
-                over.get(i)
+            fn scatter<L: Lane<Scalar = $float>>(over: &L, columns: &mut Columns<'_, L>) {
+                columns.push(*over);
             }
         }
         impl Splat<$float> for $float {

@@ -10,6 +10,7 @@ pub mod lanes;
 pub mod layout;
 pub mod plugin;
 pub mod texel;
+mod transpose;
 
 pub use call::{Address, Arg, Call, CallError, Filter, Mode, Run, Sampler, TextureMut, TextureRef};
 
