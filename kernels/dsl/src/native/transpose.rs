@@ -99,6 +99,9 @@ macro_rules! blocks {
             #[inline(always)]
             pub fn load<S: Simd>(table: &[$float], start: usize, step: usize) -> S::$vector {
                 let (t, at) = (token::<S>(), start);
+                if step == $per_block {
+                    return S::$vector::from_slice(t, &table[at..at + S::$vector::LEN]);
+                }
                 match blocks::<S>() {
                     1 => S::$vector::from_slice(t, &block(table, at)),
                     2 => {
@@ -276,6 +279,16 @@ pub fn column_f64<S: Simd>(table: &[f64], width: usize, at: usize) -> S::f64s {
     if width == 1 {
         return couples::spread::<S>(couples::load::<S>(table, 0, 2));
     }
+    if width == 4 && couples::blocks::<S>() == 4 {
+        // Whole rows side by side: so few shuffles across blocks cost less than loading by blocks.
+        let low = couples::load::<S>(table, 0, 2);
+        let low = low.deinterleave(couples::load::<S>(table, 8, 2));
+        let high = couples::load::<S>(table, 16, 2);
+        let high = high.deinterleave(couples::load::<S>(table, 24, 2));
+        let (a, c) = low.0.deinterleave(high.0);
+        let (b, d) = low.1.deinterleave(high.1);
+        return couples::spread::<S>([a, b, c, d][at]);
+    }
     // The last two columns overlap others where the width is odd.
     let first = (at / 2 * 2).min(width - 2);
     let row = couples::blocks::<S>() * width;
@@ -292,13 +305,25 @@ pub fn put_column_f64<S: Simd>(
     table: &mut [f64],
     width: usize,
     at: usize,
-    [_, _, a, b]: [S::f64s; 4],
+    [a, b, c, d]: [S::f64s; 4],
 ) {
+    let blocks = couples::blocks::<S>();
     if width == 1 {
-        couples::store::<S>(couples::align::<S>(b), table, 0, 2);
+        couples::store::<S>(couples::align::<S>(d), table, 0, 2);
+    } else if width == 4 && blocks == 4 {
+        if at == 3 {
+            let (a, b) = (couples::align::<S>(a), couples::align::<S>(b));
+            let (c, d) = (couples::align::<S>(c), couples::align::<S>(d));
+            let (ac, bd) = (a.interleave(c), b.interleave(d));
+            let (low, high) = (ac.0.interleave(bd.0), ac.1.interleave(bd.1));
+            couples::store::<S>(low.0, table, 0, 2);
+            couples::store::<S>(low.1, table, 8, 2);
+            couples::store::<S>(high.0, table, 16, 2);
+            couples::store::<S>(high.1, table, 24, 2);
+        }
     } else if at + 1 == width || at % 2 == 1 {
-        let (low, high) = couples::unpack::<S>(a, b);
-        let row = couples::blocks::<S>() * width;
+        let (low, high) = couples::unpack::<S>(c, d);
+        let row = blocks * width;
         couples::store::<S>(low, table, at - 1, width);
         couples::store::<S>(high, table, row + at - 1, width);
     }
