@@ -40,7 +40,8 @@ impl<R: Real> TwoPoints<R> {
 ///
 /// Of all distributions with these three moments it has the least fourth one. The arguments are
 /// clamped to [-1, 1]; moments that no distribution on [-1, 1] has give the points of a nearby
-/// vector. Without variance both points are at the mean, to within epsilon.
+/// vector. Without variance, one point is at the mean and the other either close to it, at most the
+/// root of epsilon away, or without weight.
 ///
 /// Theorem 1 takes roots of the quadratic σ² z² + (b1 b2 - b3) z + c0; c0 follows from the other
 /// two by the Hankel matrix' Cholesky factors, that is, from the quadratic about the mean being
