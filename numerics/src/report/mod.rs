@@ -91,7 +91,7 @@ pub enum Scale {
 /// Points that belong together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Series {
-    /// Its name in the legend.
+    /// Its name in the legend; empty leaves it out.
     pub name: String,
     /// How it is drawn.
     pub style: Style,
@@ -187,7 +187,7 @@ impl fmt::Display for Report {
         for (name, value) in &self.facts {
             writeln!(f, "  {name}: {value}")?;
         }
-        for table in &self.tables {
+        for table in self.tables.iter().filter(|t| !t.is_detail) {
             writeln!(f, "\n{table}")?;
         }
         if !self.notes.is_empty() {

@@ -18,7 +18,9 @@ pub struct PlotError {
     problem: String,
 }
 
-const SIZE: (u32, u32) = (960, 600);
+const SIZE: (u32, u32) = (1120, 600);
+/// The legend's share of the width, to the right.
+const LEGEND: u32 = 250;
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito).
 const COLOURS: [RGBColor; 8] = [
@@ -85,9 +87,12 @@ impl Plot {
         Y::CoordDescType: ValueFormatter<f64>,
     {
         root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(root)
+        let has_legend = self.series.iter().any(|s| !s.name.is_empty());
+        let width = if has_legend { SIZE.0 - LEGEND } else { SIZE.0 };
+        let (area, legend) = root.split_horizontally(width);
+        let mut chart = ChartBuilder::on(&area)
             .margin(12)
-            .margin_right(28)
+            .margin_right(20)
             .x_label_area_size(44)
             .y_label_area_size(76)
             .build_cartesian_2d(x, y)?;
@@ -103,10 +108,7 @@ impl Plot {
             .axis_desc_style(("sans-serif", 15))
             .draw()?;
         for (i, series) in self.series.iter().enumerate() {
-            let colour = match series.style {
-                Style::Front => BLACK,
-                _ => COLOURS[i % COLOURS.len()],
-            };
+            let colour = colour_of(i, series.style);
             let points: Vec<(f64, f64, &str)> = series
                 .points
                 .iter()
@@ -128,40 +130,43 @@ impl Plot {
                     .map(move |(x, y, _)| Circle::new((*x, *y), size, style))
                     .collect::<Vec<_>>()
             };
-            let entry = match series.style {
-                Style::Dots => chart.draw_series(discs(4, colour.mix(0.8).filled()))?,
-                Style::Line => chart.draw_series(line())?,
-                Style::Front => {
-                    chart.draw_series(line())?;
-                    chart.draw_series(discs(8, colour.stroke_width(2)))?
-                }
-            };
-            let style = series.style;
-            entry
-                .label(series.name.as_str())
-                .legend(move |(x, y)| match style {
-                    Style::Dots => Circle::new((x + 10, y), 4, colour.filled()).into_dyn(),
-                    Style::Line => {
-                        PathElement::new(vec![(x, y), (x + 20, y)], colour.stroke_width(2))
-                            .into_dyn()
-                    }
-                    Style::Front => Circle::new((x + 10, y), 7, colour.stroke_width(2)).into_dyn(),
-                });
+            if series.style != Style::Dots {
+                chart.draw_series(line())?;
+            }
+            match series.style {
+                Style::Dots => drop(chart.draw_series(discs(4, colour.mix(0.8).filled()))?),
+                Style::Line => {}
+                Style::Front => drop(chart.draw_series(discs(8, colour.stroke_width(2)))?),
+            }
             let font = ("sans-serif", 12).into_font();
             chart.draw_series(points.iter().filter(|p| !p.2.is_empty()).map(|(x, y, l)| {
                 EmptyElement::at((*x, *y)) + Text::new((*l).to_owned(), (9, -14), font.clone())
             }))?;
         }
-        if self.series.iter().any(|s| !s.name.is_empty()) {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.3))
-                .label_font(("sans-serif", 14))
-                .draw()?;
+        let named = self.series.iter().enumerate();
+        for (row, (i, series)) in named.filter(|(_, s)| !s.name.is_empty()).enumerate() {
+            let colour = colour_of(i, series.style);
+            let y = 24 + 22 * row as i32;
+            match series.style {
+                Style::Dots => legend.draw(&Circle::new((14, y), 4, colour.filled()))?,
+                Style::Line => legend.draw(&PathElement::new(
+                    vec![(4, y), (24, y)],
+                    colour.stroke_width(2),
+                ))?,
+                Style::Front => legend.draw(&Circle::new((14, y), 7, colour.stroke_width(2)))?,
+            }
+            let font = ("sans-serif", 14).into_font();
+            legend.draw(&Text::new(series.name.clone(), (32, y - 8), font))?;
         }
         root.present()
+    }
+}
+
+/// The colour of series number `i`.
+fn colour_of(i: usize, style: Style) -> RGBColor {
+    match style {
+        Style::Front => BLACK,
+        _ => COLOURS[i % COLOURS.len()],
     }
 }
 

@@ -16,6 +16,9 @@ pub struct Table {
     pub columns: Vec<Column>,
     /// The rows, each with a cell for every column.
     pub rows: Vec<Vec<Cell>>,
+    /// Whether it is too long for a terminal: files have it nevertheless.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_detail: bool,
 }
 
 /// A column of a table.
@@ -237,7 +240,15 @@ impl Table {
             caption: caption.into(),
             columns: columns.into_iter().collect(),
             rows: Vec::new(),
+            is_detail: false,
         }
+    }
+
+    /// The same, left out where a report is printed as text.
+    #[must_use]
+    pub fn detail(mut self) -> Self {
+        self.is_detail = true;
+        self
     }
 
     /// Adds a row.
