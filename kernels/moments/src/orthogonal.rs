@@ -82,12 +82,13 @@ pub(crate) fn positive_root<R: Real>(a: R, b: R, c: R) -> R {
     let mut s = R::select(has_bound, without_cube.min(from_afar), from_afar).max(zero);
     unroll!(_i in 0..4, {
         let p = ((s + a) * s + b) * s - c;
+        let thrice = p * lit!(3.0);
         let slope = (s * lit!(3.0) + a * lit!(2.0)) * s + b;
         let half_bend = s * lit!(3.0) + a;
-        let root = (slope * slope - p * half_bend * lit!(3.0)).max(zero).sqrt();
+        let root = (slope * slope - thrice * half_bend).max(zero).sqrt();
         let denominator = slope.max(zero) + root * lit!(2.0);
         let is_steep = denominator.gt(p.abs() * R::epsilon());
-        let step = p * lit!(3.0) / R::select(is_steep, denominator, one);
+        let step = thrice / R::select(is_steep, denominator, one);
         s = (s - R::select(is_steep, step, zero)).max(zero);
     });
     s

@@ -73,9 +73,9 @@ pub fn hamburger_6<R: Real>(m: Moments6<R>, z: R) -> Bounds<R> {
     let u2 = p1 * p1 + c1;
     let u3 = toward((a1 - a0 - p1 * lit!(3.0)) * c1 - p1 * p1 * p1);
     let others = (s + a).max(zero);
-    let cube = s * s * s;
-    let scale = (s * s * others + c + cube).max(epsilon * epsilon * epsilon);
-    let alone = cube / scale * (s * (others * u2 - u1) - c * u3);
+    let square = s * s;
+    let scale = (square * (others + s) + c).max(epsilon * epsilon * epsilon);
+    let alone = square * s / scale * (s * (others * u2 - u1) - c * u3);
     let rest = one - own;
     let below = R::select(are_all_below, rest, alone.clamp(zero, rest));
     let share = R::select(is_turned, rest - below, below);

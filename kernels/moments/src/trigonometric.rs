@@ -306,6 +306,12 @@ impl<R: Real> Kernel<R> {
         a.u * b.u * self.p + lit!(1.0) + a.v * b.v * self.q
     }
 
+    /// 1 minus the product.
+    #[inline(always)]
+    fn rest(&self, a: Sheared<R>, b: Sheared<R>) -> R {
+        -(a.u * b.u * self.p) + lit!(1.0) - a.v * b.v * self.q
+    }
+
     /// The first direction, counterclockwise from `a` (`side` 1) or clockwise (-1), where K with
     /// `a` is 0.
     #[inline(always)]
@@ -316,9 +322,9 @@ impl<R: Real> Kernel<R> {
         let x = R::select(self.is_swapped, v, u);
         let y = R::select(self.is_swapped, u, v);
         let length = (x * x + y * y).max(R::epsilon() * R::epsilon()).sqrt();
-        let (x, y) = (x / length, y / length);
         // The line's distance from the center is the cosine of half the angle it cuts off.
-        let cos = (x * self.x + y * self.y - one / length).clamp(-one, one);
+        let cos = ((x * self.x - one + y * self.y) / length).clamp(-one, one);
+        let (x, y) = (x / length, y / length);
         let sin = ((one - cos) * (one + cos)).sqrt() * side;
         HalfAngle::of_direction(cos * x - sin * y, cos * y + sin * x)
     }
@@ -384,24 +390,29 @@ fn weight_on_arc<R: Real>(
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let two: R = lit!(2.0);
-    // 1/w at a direction, and the first two derivatives of its logarithm.
+    // 1/w at a direction, and the first two derivatives of its logarithm. The second derivative of
+    // a direction points to the center, which is at minus the mean.
+    let mean = kernel.shear(kernel.x, kernel.y);
+    let center_start = kernel.rest(mean, start) / d;
+    let center_end = kernel.rest(mean, end);
     let at = |direction: HalfAngle<R>| {
         let (x, y) = direction.direction();
         let here = kernel.at(x, y);
         let tangent = kernel.shear(-y, x);
-        let inward = kernel.shear(-x, -y);
-        let s = kernel.value(here, start).max(zero) / d;
-        let q = kernel.value(here, end).max(zero);
+        let own = kernel.value(here, here);
+        let to_start = kernel.value(here, start) / d;
+        let to_end = kernel.value(here, end);
+        let s = to_start.max(zero);
+        let e = to_end.max(zero);
         let ds = kernel.product(tangent, start) / d;
-        let dq = kernel.product(tangent, end);
-        let dds = kernel.product(inward, start) / d;
-        let ddq = kernel.product(inward, end);
-        let value = kernel.value(here, here) + s * q;
-        let slope = kernel.product(tangent, here) * two + (s * dq + q * ds);
-        let bend = (kernel.product(tangent, tangent) + kernel.product(inward, here) + ds * dq)
-            * two
-            + (s * ddq + q * dds);
-        let slope = slope / value;
+        let de = kernel.product(tangent, end);
+        let value = own + s * e;
+        let slope = (kernel.product(tangent, here) * two + (s * de + e * ds)) / value;
+        let outward = kernel.shear(x, y);
+        let own_bend = (tangent.u * tangent.u - outward.u * here.u) * kernel.p
+            + (tangent.v * tangent.v - outward.v * here.v) * kernel.q;
+        let bend = (own_bend + ds * de) * two
+            + (s * (center_end - to_end) + e * (center_start - to_start));
         (value, slope, bend / value - slope * slope)
     };
     // Rounding must not push the ends out of the arc, to the other end of the circle.
