@@ -3,6 +3,9 @@
 /// Repeats a block for each index of a range that is known when the kernel is compiled, up to 0..16.
 /// Inside, the index is a constant. There is no `break` and no `continue`.
 ///
+/// The compiler reads the block once for every index that there might be. Where such blocks stand
+/// within each other, say how far the range can go, 6 or 11: `unroll!(i in 0..N, max 6, { … })`.
+///
 /// A shader that indexes a local array dynamically spills it to memory, and rust-gpu's loops are
 /// ones that shader compilers rarely unroll. With this, arrays of a few numbers become plain
 /// variables.
@@ -20,17 +23,24 @@
 /// ```
 #[macro_export]
 macro_rules! unroll {
-    ($i:ident in $from:tt .. $to:expr, $body:block) => {
-        $crate::unroll!(@each $i, $from, $to, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)
+    ($i:ident in $from:tt .. $to:expr, max 6, $body:block) => {
+        $crate::unroll!(@each $i, $from, $to, $body, 6, 0 1 2 3 4 5)
     };
-    (@each $i:ident, $from:expr, $to:expr, $body:block, $($index:tt)*) => {{
-        const { assert!($to <= 16, "unroll! goes up to 0..16") };
+    ($i:ident in $from:tt .. $to:expr, max 11, $body:block) => {
+        $crate::unroll!(@each $i, $from, $to, $body, 11, 0 1 2 3 4 5 6 7 8 9 10)
+    };
+    ($i:ident in $from:tt .. $to:expr, $body:block) => {
+        $crate::unroll!(@each $i, $from, $to, $body, 16, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)
+    };
+    (@each $i:ident, $from:expr, $to:expr, $body:block, $max:literal, $($index:tt)*) => {{
+        const { assert!($to <= $max, "unroll! goes up to 16, or to what max says") };
         $(
             #[allow(
                 unused_comparisons,
                 unconditional_panic,
                 arithmetic_overflow,
                 unused_assignments,
+                clippy::out_of_bounds_indexing,
                 reason = "what is beyond the range is never reached, and after the last index \
                           nothing is read"
             )]

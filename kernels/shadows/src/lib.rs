@@ -14,9 +14,13 @@ pub mod blur;
 pub mod bounds;
 pub mod depth;
 mod grid;
+pub mod moment_bounds;
+pub mod points;
 pub mod quantize;
 pub mod resolve;
 pub mod shade;
+pub mod six;
+pub mod trigonometric;
 
 hankel_dsl::kernels![
     depth::light_depth,
@@ -32,6 +36,24 @@ hankel_dsl::kernels![
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,
+    moment_bounds::moment_bound_n1,
+    moment_bounds::moment_bound_n2,
+    moment_bounds::moment_bound_n3,
+    moment_bounds::moment_bound_n4,
+    moment_bounds::moment_bound_n5,
+    moment_bounds::moment_bound_adjoint_n1,
+    moment_bounds::moment_bound_adjoint_n2,
+    moment_bounds::moment_bound_adjoint_n3,
+    moment_bounds::moment_bound_adjoint_n4,
+    moment_bounds::moment_bound_adjoint_n5,
+    moment_bounds::moment_bound_compensated_n2,
+    moment_bounds::moment_bound_compensated_n3,
+    six::hamburger_6msm,
+    trigonometric::trigonometric_4msm,
+    trigonometric::trigonometric_moments,
+    points::sparse_2point,
+    points::degenerate_2point,
+    points::degenerate_3point,
     quantize::quantize_4_unit,
     quantize::dequantize_4_unit,
     quantize::quantize_4_symmetric,

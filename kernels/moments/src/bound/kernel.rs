@@ -57,24 +57,24 @@ impl<R: Real> Kernel<R> {
         let b = recurrence.b;
         let mut y = [one; MAX + 1];
         y[1] = -a[0];
-        unroll!(k in 1..N, {
+        unroll!(k in 1..N, max 6, {
             y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
         });
 
         // The roots and the query point interlace with the roots of p_N, and how many of those
         // are below the query point is the number of permanences of sign (Sturm).
         let mut below = zero;
-        unroll!(k in 0..N, {
+        unroll!(k in 0..N, max 6, {
             let (is, was) = (y[k + 1].ge(zero), y[k].ge(zero));
             below += R::select((is & was) | !(is | was), one, zero);
         });
         let count: R = whole(N);
         let turned = below.gt(count * lit!(0.5));
         let sign = R::select(turned, -one, one);
-        unroll!(k in 0..N, {
+        unroll!(k in 0..N, max 6, {
             a[k] = a[k] * sign;
         });
-        unroll!(k in 0..(N + 1), {
+        unroll!(k in 0..(N + 1), max 6, {
             if const { k % 2 == 1 } {
                 y[k] = y[k] * sign;
             }
@@ -82,11 +82,11 @@ impl<R: Real> Kernel<R> {
         let few = R::select(turned, count - below, below);
 
         let mut c = [one; MAX + 1];
-        unroll!(k in 0..N, {
+        unroll!(k in 0..N, max 6, {
             c[N - 1 - k] = c[N - k] * b[N - k];
         });
         let mut outer = zero;
-        unroll!(k in 2..(N + 1), {
+        unroll!(k in 2..(N + 1), max 6, {
             outer += c[k] * (y[k] * y[k]);
         });
         // The first two terms are the mean square times c_1.
@@ -106,9 +106,9 @@ impl<R: Real> Kernel<R> {
         let mut kernel = [zero; MAX + 1];
         p[0] = one;
         kernel[0] = one;
-        unroll!(k in 0..N, {
+        unroll!(k in 0..N, max 6, {
             let mut next = [zero; MAX + 2];
-            unroll!(i in 0..7, {
+            unroll!(i in 0..6, max 6, {
                 if const { i <= k + 1 } {
                     let mut t = zero;
                     if const { i <= k } {
@@ -125,7 +125,7 @@ impl<R: Real> Kernel<R> {
             });
             before = p;
             p = next;
-            unroll!(i in 0..6, {
+            unroll!(i in 0..6, max 6, {
                 if const { i <= k } {
                     kernel[i] = b[k + 1] * kernel[i] + y[k + 1] * p[i];
                 } else if const { i == k + 1 } {
@@ -165,11 +165,11 @@ impl<R: Real> Kernel<R> {
         let s = R::select(is_near, one / R::select(is_near, v, one), one);
         let mut z = [one; MAX + 1];
         z[1] = s - self.a[0] * t;
-        unroll!(k in 1..N, {
+        unroll!(k in 1..N, max 6, {
             z[k + 1] = (s - self.a[k] * t) * z[k] - self.b[k] * (t * t) * z[k - 1];
         });
         let mut power = t;
-        unroll!(k in 0..N, {
+        unroll!(k in 0..N, max 6, {
             z[N - 1 - k] = z[N - 1 - k] * power;
             power = power * t;
         });
@@ -179,7 +179,7 @@ impl<R: Real> Kernel<R> {
     #[inline(always)]
     fn dot<const N: usize>(&self, x: &[R; MAX + 1], y: &[R; MAX + 1]) -> R {
         let mut sum = x[N] * y[N];
-        unroll!(k in 0..N, {
+        unroll!(k in 0..N, max 6, {
             sum += self.c[k] * (x[k] * y[k]);
         });
         sum
@@ -193,11 +193,18 @@ impl<R: Real> Kernel<R> {
         let z = self.vector::<N>(v);
         let shared = self.dot::<N>(&z, &self.y) / self.square;
         let mut x = z;
-        unroll!(k in 0..(N + 1), {
+        unroll!(k in 0..(N + 1), max 6, {
             x[k] = z[k] - shared * self.y[k];
         });
         let least: R = lit!(1e-37);
         (x, self.dot::<N>(&x, &x).max(least))
+    }
+
+    /// The weight of a single root.
+    #[inline(always)]
+    pub fn weight_of<const N: usize>(&self, v: R) -> R {
+        let (x, square) = self.freed::<N>(v);
+        self.c[0] * x[0] * (x[0] / square)
     }
 
     /// The weight of the negative side's roots together.
@@ -210,8 +217,7 @@ impl<R: Real> Kernel<R> {
         } else if const { N == 2 } {
             self.lesser_of_two(self.a[0], self.mean_square)
         } else if const { N == 3 } {
-            let (x, square) = self.freed::<N>(least_of_cubic(&self.e));
-            self.c[0] * x[0] * (x[0] / square)
+            self.weight_of::<N>(least_of_cubic(&self.e))
         } else {
             let (first, second) = if const { N == 4 } {
                 least_two::<R, 4, 3>(&self.e)
@@ -285,7 +291,7 @@ fn reversed<R: Real, const N: usize>(kernel: &[R; MAX + 1]) -> (Monic<R>, R) {
     let largest: R = lit!(32.0);
     let mut e = [one; MAX + 1];
     let mut power = per_reach;
-    unroll!(i in 1..(N + 1), {
+    unroll!(i in 1..(N + 1), max 6, {
         e[i] = (ratio(kernel[i]) * power).clamp(-largest, largest);
         power = power * per_reach;
     });

@@ -11,6 +11,8 @@
 //!
 //! Where the published algorithm has a root at infinity there is a reciprocal of 0 here.
 
+mod adjoint;
+mod canonical;
 mod kernel;
 mod recurrence;
 mod roots;
@@ -18,6 +20,8 @@ mod twofold;
 
 use hankel_dsl::{Real, lit};
 
+pub use adjoint::{Gradient, bound_adjoint, bound_adjoint_compensated, mix_bias_adjoint};
+pub use canonical::{Canonical, canonical, canonical_compensated};
 use kernel::Kernel;
 use recurrence::Recurrence;
 use twofold::{Plain, Twofold};
@@ -96,8 +100,42 @@ pub fn mix_bias<R: Real, const N: usize>(
 ) -> [R; MAX_MOMENTS] {
     let strength = strength.saturate();
     let mut mixed = m;
-    hankel_dsl::unroll!(k in 1..(2 * N + 1), {
+    hankel_dsl::unroll!(k in 1..(2 * N + 1), max 11, {
         mixed[k] = m[k].lerp(m[0] * target[k], strength);
     });
     mixed
+}
+
+/// A distribution on [-1, 1] to mix in with [`mix_bias`]: its moments `m_0` to `m_2N`, `m_0` being 1.
+///
+/// For N = 2, 3, 4 the vectors published with \[MBOIT\] for 32-bit floats
+/// ([`SYMMETRIC_4_32`](crate::bias::SYMMETRIC_4_32) and on); for N = 1 and 5, where none is, N + 1
+/// equal weights at equal distances from -1 to 1, as \[MBD\] has it.
+#[inline(always)]
+pub fn bias_target<R: Real, const N: usize>() -> [R; MAX_MOMENTS] {
+    let mut target = [lit!(0.0); MAX_MOMENTS];
+    target[0] = lit!(1.0);
+    if const { N == 1 } {
+        target[2] = lit!(1.0);
+    } else if const { N == 2 } {
+        target[2] = lit!(0.375);
+        target[4] = lit!(0.375);
+    } else if const { N == 3 } {
+        target[2] = lit!(0.48);
+        target[4] = lit!(0.451);
+        target[6] = lit!(0.45);
+    } else if const { N == 4 } {
+        target[2] = lit!(0.75);
+        target[4] = lit!(203.0 / 300.0);
+        target[6] = lit!(0.63);
+        target[8] = lit!(0.600_303_030_303_030_3);
+    } else {
+        // The means of 1, 0.6 and 0.2, to the power of 2, 4, 6, 8 and 10.
+        target[2] = lit!(7.0 / 15.0);
+        target[4] = lit!(1.1312 / 3.0);
+        target[6] = lit!(1.04672 / 3.0);
+        target[8] = lit!(1.016_798_72 / 3.0);
+        target[10] = lit!(1.006_046_72 / 3.0);
+    }
+    target
 }

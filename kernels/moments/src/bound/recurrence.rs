@@ -97,7 +97,7 @@ impl<R: Real> Recurrence<R> {
         let mut current = [A::of(zero); MAX_MOMENTS];
         let scaled_total = (total * scale).max(least);
         current[0] = A::of(scaled_total);
-        unroll!(k in 1..(2 * N + 1), {
+        unroll!(k in 1..(2 * N + 1), max 11, {
             current[k] = A::of(finite(finite(m[k], lit!(1e37)) * scale, largest));
         });
         let raw = current;
@@ -112,9 +112,9 @@ impl<R: Real> Recurrence<R> {
         let mut a = [zero; MAX];
         let mut b = [zero; MAX + 1];
         a[0] = alpha.minus(query).rounded();
-        unroll!(k in 1..(N + 1), {
+        unroll!(k in 1..(N + 1), max 6, {
             let mut next = current;
-            unroll!(l in 1..10, {
+            unroll!(l in 1..10, max 11, {
                 if const { l >= k && l + k <= 2 * N } {
                     let mut t = current[l + 1].minus(alpha.times(current[l]));
                     if const { k > 1 } {
@@ -149,7 +149,7 @@ impl<R: Real> Recurrence<R> {
         let rest = R::select(spread.lt(lit!(0.5)), one - spread, a[0] * a[0] / square);
         if const { N > 2 } {
             let most = farthest::<R>() * farthest::<R>();
-            unroll!(k in 0..N, {
+            unroll!(k in 0..N, max 6, {
                 a[k] = a[k] / unit;
                 b[k + 1] = (b[k + 1] / square).min(most);
             });

@@ -7,6 +7,9 @@ use hankel_dsl::{Real, lit, unroll};
 
 use super::MAX;
 
+/// The same where every root is wanted, to the last digit.
+const FOR_ALL: u32 = 16;
+
 /// Coefficients of a monic polynomial, highest power first.
 pub(crate) type Monic<R> = [R; MAX + 1];
 
@@ -42,7 +45,7 @@ fn value<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R, R) {
     let mut p = e[0];
     let mut d = zero;
     let mut h = zero;
-    unroll!(i in 1..(DEGREE + 1), {
+    unroll!(i in 1..(DEGREE + 1), max 6, {
         h = h * v + d;
         d = d * v + p;
         p = p * v + e[i];
@@ -80,13 +83,23 @@ fn from_outside<R: Real, const DEGREE: usize>(e: &Monic<R>) -> R {
     let one: R = lit!(1.0);
     let less = whole::<R>(DEGREE - 1);
     let square = less * (less * (e[1] * e[1]) - whole::<R>(2 * DEGREE) * e[2]);
-    let mut v = -(e[1] + square.max(zero).sqrt()) / whole::<R>(DEGREE);
+    let mut v = -(e[1] + square.max(zero).sqrt()) * (one / whole::<R>(DEGREE));
     let mut i = 0;
     while i < FROM_OUTSIDE {
         v = (v + laguerre::<R, DEGREE>(e, v)).min(one);
         i += 1;
     }
     v
+}
+
+/// The least root of a quadratic, if it is negative; else 0.
+#[inline(always)]
+pub(crate) fn least_of_quadratic<R: Real>(e: &Monic<R>) -> R {
+    let zero: R = lit!(0.0);
+    let root = (e[1] * e[1] - e[2] * lit!(4.0)).max(zero).sqrt();
+    let sum = (e[1].abs() + root) * lit!(0.5);
+    let least: R = lit!(1e-30);
+    R::select(e[1].gt(zero), -sum, e[2] / sum.max(least)).min(zero)
 }
 
 /// The least root of a cubic, if it is negative; else 0.
@@ -109,7 +122,7 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
     let mut derivative = *e;
-    unroll!(i in 1..(REDUCED + 1), {
+    unroll!(i in 1..(REDUCED + 1), max 6, {
         derivative[i] = e[i] * (whole::<R>(DEGREE - i) / whole::<R>(DEGREE));
     });
     let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
@@ -125,4 +138,55 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
         newton::<R, DEGREE>(e, first, -one, between),
         newton::<R, DEGREE>(e, second, between, zero),
     )
+}
+
+/// All roots in ascending order: those of each derivative bracket those of the one before
+/// (C. Yuksel, *High-Performance Polynomial Root Finding for Graphics*, 2022), here with Laguerre's
+/// steps, which need no bisection.
+#[inline(always)]
+pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
+    let one: R = lit!(1.0);
+    let zero: R = lit!(0.0);
+    let mut stationary = [zero; MAX];
+    unroll!(d in 1..6, max 6, {
+        if const { d <= DEGREE } {
+            // The derivative of degree d: monic again.
+            let mut derivative = *e;
+            unroll!(i in 1..6, max 6, {
+                if const { i <= d } {
+                    let mut ratio = one;
+                    unroll!(j in 0..5, max 6, {
+                        if const { j < i } {
+                            ratio = ratio * (whole::<R>(d - j) / whole::<R>(DEGREE - j));
+                        }
+                    });
+                    derivative[i] = e[i] * ratio;
+                }
+            });
+            let mut roots = stationary;
+            unroll!(i in 0..5, max 6, {
+                if const { d == 1 } {
+                    roots[0] = -derivative[1];
+                } else if const { i < d } {
+                    // From the stationary point above, or for the last one from that below.
+                    let low = if const { i == 0 } { -one } else { stationary[i - 1] };
+                    let high = if const { i + 1 == d } { one } else { stationary[i] };
+                    let mut v = if const { i + 1 == d } { low } else { high };
+                    let mut step = 0;
+                    while step < FOR_ALL {
+                        let length = laguerre::<R, d>(&derivative, v);
+                        v = if const { i + 1 == d } {
+                            (v + length).min(one)
+                        } else {
+                            (v - length).max(-one)
+                        };
+                        step += 1;
+                    }
+                    roots[i] = newton::<R, d>(&derivative, v, low, high);
+                }
+            });
+            stationary = roots;
+        }
+    });
+    stationary
 }

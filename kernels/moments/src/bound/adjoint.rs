@@ -1,0 +1,320 @@
+//! Derivatives of the bounds.
+//!
+//! The bound is the optimum of a linear programme, and what multiplies the moments in the dual is
+//! its gradient: the coefficients of the polynomial `q` of degree 2N that touches the step from 1
+//! to 0 at the query point from below (S. Karlin, W. Studden, *Tchebycheff Systems*, 1966, chapter
+//! III). It is 1 at the roots below, 0 at those above and at the query point, and stationary at all
+//! roots. The step moves with the query point, so the derivative to that is minus its weight times
+//! `q'`. The query point's own weight has the gradient `(K(u) / K(0))²`.
+//!
+//! This is the adjoint of the algorithm, \[MBD\] Eq. 22 to 30, without going through it: no
+//! derivative of a root, none of a weight, and nothing that is singular where a root is at infinity
+//! (Theorem 14 there).
+
+use hankel_dsl::{Real, lit, unroll};
+
+use super::kernel::Kernel;
+use super::recurrence::{Recurrence, finite};
+use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_two, whole};
+use super::twofold::{Arithmetic, Plain, Twofold};
+use super::{MAX, MAX_MOMENTS};
+
+/// The derivative of something that depends on a bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gradient<R> {
+    /// To the moments `m_0` to `m_2N`; the rest is 0.
+    pub m: [R; MAX_MOMENTS],
+    /// To the query point.
+    pub eta: R,
+}
+
+/// What [`blend`](super::Bounds::blend) makes of [`bound`](super::bound) as seen from behind: the
+/// derivatives to moments and query point, times `d_bound`.
+///
+/// Takes anything that [`bound`](super::bound) takes. Each factor of a derivative is limited to
+/// 1e25, `d_bound` to 1e12.
+#[inline(always)]
+pub fn bound_adjoint<R: Real, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    eta: R,
+    overestimation: R,
+    d_bound: R,
+) -> Gradient<R> {
+    let floor = R::epsilon() * lit!(0.25);
+    adjoint::<R, Plain<R>, N>(m, eta, overestimation, d_bound, floor)
+}
+
+/// [`bound_adjoint`] of [`bound_compensated`](super::bound_compensated).
+#[inline(always)]
+pub fn bound_adjoint_compensated<R: Real, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    eta: R,
+    overestimation: R,
+    d_bound: R,
+) -> Gradient<R> {
+    let floor = R::epsilon() * R::epsilon();
+    adjoint::<R, Twofold<R>, N>(m, eta, overestimation, d_bound, floor)
+}
+
+/// [`mix_bias`](super::mix_bias) as seen from behind: from the gradient to the mixed moments that
+/// to the given ones.
+#[inline(always)]
+pub fn mix_bias_adjoint<R: Real, const N: usize>(
+    mut d: [R; MAX_MOMENTS],
+    target: [R; MAX_MOMENTS],
+    strength: R,
+) -> [R; MAX_MOMENTS] {
+    let strength = strength.saturate();
+    let one: R = lit!(1.0);
+    unroll!(k in 1..(2 * N + 1), max 11, {
+        d[0] = d[0] + strength * (target[k] * d[k]);
+        d[k] = (one - strength) * d[k];
+    });
+    d
+}
+
+#[inline(always)]
+fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    eta: R,
+    overestimation: R,
+    d_bound: R,
+    floor: R,
+) -> Gradient<R> {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let recurrence = Recurrence::new::<A, N>(m, eta, floor);
+    let kernel = Kernel::new::<N>(&recurrence);
+
+    // All in powers of u times the reach. (K(u) / K(0))², K(u) being Σ e_i u^i.
+    let own = squared::<R, N>(&kernel.e);
+    let minor = minor::<R, N>(&kernel);
+    let blend = overestimation.saturate();
+    let own_share = R::select(kernel.turned, blend - one, blend);
+    let minor_share = R::select(kernel.turned, -one, one);
+    let minor_share = R::select(kernel.few.gt(zero), minor_share, zero);
+    let mut q = [zero; MAX_MOMENTS];
+    unroll!(i in 0..(2 * N + 1), max 11, {
+        q[i] = own_share * own[i] + minor_share * minor[i];
+    });
+    q[0] = R::select(kernel.turned, one + q[0], q[0]);
+
+    // In powers of x - eta.
+    let limit: R = lit!(1e25);
+    let sign = R::select(kernel.turned, -one, one);
+    let per_length = sign * (kernel.reach / recurrence.unit);
+    let mut power = per_length;
+    unroll!(i in 1..(2 * N + 1), max 11, {
+        q[i] = (q[i] * power).clamp(-limit, limit);
+        power = (power * per_length).clamp(-limit, limit);
+    });
+    let present = recurrence.total.gt(zero);
+    let factor = R::select(present, finite(d_bound, lit!(1e12)), zero);
+    let d_eta = -(kernel.own * recurrence.total).min(limit) * q[1];
+
+    // In powers of x: Horner's scheme, repeated.
+    let eta = finite(eta, lit!(1e12));
+    unroll!(j in 0..10, max 11, {
+        unroll!(i in 0..10, max 11, {
+            // Each time one coefficient less: from the highest but one down to j.
+            if const { i + j < 2 * N } {
+                let carried = eta * q[2 * N - i];
+                q[2 * N - 1 - i] = (q[2 * N - 1 - i] - carried).clamp(-limit, limit);
+            }
+        });
+    });
+    let mut gradient = Gradient {
+        m: [zero; MAX_MOMENTS],
+        eta: d_eta.clamp(-limit, limit) * factor,
+    };
+    unroll!(i in 0..(2 * N + 1), max 11, {
+        gradient.m[i] = q[i] * factor;
+    });
+    gradient
+}
+
+/// The square of a polynomial of degree N.
+#[inline(always)]
+fn squared<R: Real, const N: usize>(p: &[R; MAX + 1]) -> [R; MAX_MOMENTS] {
+    let zero: R = lit!(0.0);
+    let mut square = [zero; MAX_MOMENTS];
+    unroll!(i in 0..(N + 1), max 6, {
+        unroll!(j in 0..(N + 1), max 6, {
+            square[i + j] = square[i + j] + p[i] * p[j];
+        });
+    });
+    square
+}
+
+/// The polynomial that is 1 at the negative roots, 0 at the others and at 0, and stationary at all
+/// roots.
+#[inline(always)]
+fn minor<R: Real, const N: usize>(kernel: &Kernel<R>) -> [R; MAX_MOMENTS] {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    if const { N == 1 } {
+        return [zero; MAX_MOMENTS];
+    }
+    let (first, second) = if const { N == 2 } {
+        (least_of_quadratic(&kernel.e), zero)
+    } else if const { N == 3 } {
+        (least_of_cubic(&kernel.e), zero)
+    } else if const { N == 4 } {
+        least_two::<R, 4, 3>(&kernel.e)
+    } else {
+        least_two::<R, 5, 4>(&kernel.e)
+    };
+    let rest = deflated::<R, N>(&kernel.e, first);
+    let single = single::<R, N>(&rest, first);
+    if const { N < 4 } {
+        return single;
+    }
+    let rest = deflated::<R, N>(&rest, second);
+    let double = double::<R, N>(&rest, first, second);
+    let is_double = kernel.few.gt(one);
+    let mut minor = single;
+    unroll!(i in 0..(2 * N + 1), max 11, {
+        minor[i] = R::select(is_double, double[i], single[i]);
+    });
+    minor
+}
+
+/// The polynomial without the root: coefficients that are left over are 0.
+#[inline(always)]
+fn deflated<R: Real, const N: usize>(e: &Monic<R>, v: R) -> Monic<R> {
+    let mut rest = *e;
+    unroll!(i in 1..N, max 6, {
+        rest[i] = e[i] + v * rest[i - 1];
+    });
+    rest[N] = lit!(0.0);
+    rest
+}
+
+/// The quotient of a polynomial by `v - at`, and the remainder at index `degree`; what is beyond
+/// has no meaning.
+#[inline(always)]
+fn divided<R: Real>(e: &Monic<R>, at: R) -> Monic<R> {
+    let mut quotient = *e;
+    unroll!(i in 1..6, max 6, {
+        quotient[i] = e[i] + at * quotient[i - 1];
+    });
+    quotient
+}
+
+/// `n - by`, also where an instance that is never run asks for less than 0.
+const fn less(n: usize, by: usize) -> usize {
+    n.saturating_sub(by)
+}
+
+/// 1 / x, limited to 1e18.
+#[inline(always)]
+fn inverse<R: Real>(x: R) -> R {
+    let least: R = lit!(1e-18);
+    let one: R = lit!(1.0);
+    one / R::select(x.lt(lit!(0.0)), x.min(-least), x.max(least))
+}
+
+/// `u rest(u)²` times the straight line that makes it 1 and stationary at the root; `rest` has
+/// degree N - 1.
+#[inline(always)]
+fn single<R: Real, const N: usize>(rest: &Monic<R>, v: R) -> [R; MAX_MOMENTS] {
+    let one: R = lit!(1.0);
+    let zero: R = lit!(0.0);
+    let quotient = divided(rest, v);
+    let value = quotient[const { less(N, 1) }];
+    let slope = divided(&quotient, v)[const { less(N, 2) }];
+    let per_value = inverse(value);
+    let mut power = one;
+    unroll!(k in 1..N, max 6, {
+        power = power * v;
+    });
+    // 1 / rest at the root: all its roots are on the other side, so it is between 0 and 1.
+    let share = (power * per_value).clamp(zero, one);
+    let at_root = v * (share * share);
+    let tilt = v * (slope * per_value) * lit!(2.0) - whole::<R>(2 * N - 1);
+    let constant = at_root * (one - tilt);
+    let linear = at_root * (v * tilt);
+    let square = squared::<R, N>(rest);
+    let mut q = [zero; MAX_MOMENTS];
+    unroll!(i in 1..(2 * N + 1), max 11, {
+        q[i] = constant * square[i - 1];
+        if const { i > 1 } {
+            q[i] = q[i] + linear * square[i - 2];
+        }
+    });
+    q
+}
+
+/// `u rest(u)²` times the cubic that makes it 1 and stationary at both roots; `rest` has degree
+/// N - 2.
+///
+/// In the reciprocal, the cubic meets `s(v)² = (v^N / rest(v))²` doubly at both roots. With the
+/// straight line `l` that meets `s`, it is `l² + (v - v_1)(v - v_2) t`, where the straight line `t`
+/// meets `2 l` times the second divided difference of `s`. Divided differences of a quotient of
+/// polynomials follow from theirs by Leibniz' rule, without cancellation where both roots meet.
+#[inline(always)]
+fn double<R: Real, const N: usize>(rest: &Monic<R>, v1: R, v2: R) -> [R; MAX_MOMENTS] {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    // Divided differences of rest, named by their arguments.
+    let by_1 = divided(rest, v1);
+    let by_2 = divided(rest, v2);
+    let by_11 = divided(&by_1, v1);
+    let by_12 = divided(&by_1, v2);
+    let r1 = by_1[const { less(N, 2) }];
+    let r2 = by_2[const { less(N, 2) }];
+    let r11 = by_11[const { less(N, 3) }];
+    let r12 = by_12[const { less(N, 3) }];
+    let r22 = divided(&by_2, v2)[const { less(N, 3) }];
+    let r112 = divided(&by_11, v2)[const { less(N, 4) }];
+    let r122 = divided(&by_12, v2)[const { less(N, 4) }];
+    let r1122 = if const { N == 5 } { one } else { zero };
+    // Divided differences of v^N: complete homogeneous polynomials.
+    let (mut p2, mut p12, mut p22, mut p112, mut p122, mut p1122) =
+        (one, zero, zero, zero, zero, zero);
+    let mut p1 = one;
+    unroll!(k in 0..N, max 6, {
+        p1122 = v2 * p1122 + p112;
+        p122 = v2 * p122 + p12;
+        p112 = v1 * p112 + p12;
+        p22 = v2 * p22 + p2;
+        p12 = v2 * p12 + p1;
+        p1 = v1 * p1;
+        p2 = v2 * p2;
+    });
+    let (per_r1, per_r2) = (inverse(r1), inverse(r2));
+    // And of the quotient.
+    let limit: R = lit!(1e9);
+    let within = |s: R| s.clamp(-limit, limit);
+    let s1 = within(p1 * per_r1);
+    let s2 = within(p2 * per_r2);
+    let s12 = within((p12 - r12 * s2) * per_r1);
+    let s22 = within((p22 - r22 * s2) * per_r2);
+    let s112 = within((p112 - r11 * s12 - r112 * s2) * per_r1);
+    let s122 = within((p122 - r12 * s22 - r122 * s2) * per_r1);
+    let s1122 = within((p1122 - r11 * s122 - r112 * s22 - r1122 * s2) * per_r1);
+    // l = s1 + s12 (v - v1), t = t0 + t1 (v - v1).
+    let t0 = s1 * s112;
+    let t1 = s1 * s1122 + s12 * s122;
+    let (t0, t1) = (t0 + t0, t1 + t1);
+    let l0 = s1 - s12 * v1;
+    let t0 = t0 - t1 * v1;
+    let (sum, product) = (v1 + v2, v1 * v2);
+    let cubic = [
+        // Coefficients of u^0 to u^3, of v^3 to v^0.
+        t1,
+        s12 * s12 + t0 - t1 * sum,
+        l0 * s12 + l0 * s12 - t0 * sum + t1 * product,
+        l0 * l0 + t0 * product,
+    ];
+    let square = squared::<R, N>(rest);
+    let mut q = [zero; MAX_MOMENTS];
+    unroll!(i in 0..4, max 6, {
+        unroll!(j in 0..10, max 11, {
+            if const { i + j < 2 * N } {
+                q[i + j + 1] = q[i + j + 1] + cubic[i] * square[j];
+            }
+        });
+    });
+    q
+}

@@ -1,0 +1,197 @@
+//! Bounds for two, four, six, eight and ten power moments and a free total, and their derivatives,
+//! as maps over rows of moments: `moment_bound_n2` is for N = 2, moments `m0` to `m4`.
+
+use hankel_dsl::{Element, Real, kernel};
+use hankel_moments::{
+    MAX_MOMENTS, bias_target, bound, bound_adjoint, bound_compensated, mix_bias, mix_bias_adjoint,
+};
+
+/// How bounds are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct BoundSettings<R> {
+    /// Where between the lower bound, 0, and the upper bound, 1; default 0.
+    pub overestimation: R,
+    /// Share of the moments, from 0 to 1, that is replaced by a fixed distribution's on [-1, 1];
+    /// default 0.
+    pub bias: R,
+}
+
+/// A bound.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Bound<R> {
+    /// How much of the total `m0` lies below the query point, from 0 to `m0`.
+    pub bound: R,
+}
+
+#[inline(always)]
+fn biased<R: Real, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    settings: &BoundSettings<R>,
+) -> [R; MAX_MOMENTS] {
+    mix_bias::<R, N>(m, bias_target::<R, N>(), settings.bias)
+}
+
+/// The structures and entry points for one N.
+macro_rules! order {
+    (
+        $n:literal; $($m:ident $d_m:ident $k:literal),*;
+        $Row:ident, $AdjointRow:ident, $Derivative:ident;
+        $(#[$bound_doc:meta])* $bound:ident,
+        $(#[$adjoint_doc:meta])* $adjoint:ident
+    ) => {
+        /// Moments and a query point.
+        #[derive(Clone, Copy, Debug, PartialEq, Element)]
+        #[repr(C)]
+        pub struct $Row<R> {
+            $(
+                /// The moment of that order: weights times powers of depths, summed.
+                pub $m: R,
+            )*
+            /// The query point.
+            pub eta: R,
+        }
+
+        impl<R: Real> $Row<R> {
+            #[inline(always)]
+            fn moments(&self) -> [R; MAX_MOMENTS] {
+                let mut m = [R::literal::<0>(); MAX_MOMENTS];
+                $(m[$k] = self.$m;)*
+                m
+            }
+        }
+
+        /// Moments, a query point, and what the bound is worth.
+        #[derive(Clone, Copy, Debug, PartialEq, Element)]
+        #[repr(C)]
+        pub struct $AdjointRow<R> {
+            $(
+                /// The moment of that order: weights times powers of depths, summed.
+                pub $m: R,
+            )*
+            /// The query point.
+            pub eta: R,
+            /// The derivative of a result to the bound.
+            pub d_bound: R,
+        }
+
+        /// A result's derivatives.
+        #[derive(Clone, Copy, Debug, PartialEq, Element)]
+        #[repr(C)]
+        pub struct $Derivative<R> {
+            $(
+                /// To the moment of that order.
+                pub $d_m: R,
+            )*
+            /// To the query point.
+            pub d_eta: R,
+        }
+
+        $(#[$bound_doc])*
+        #[kernel(compute, threads(64), precision(f32, f64))]
+        pub fn $bound<R: Real>(
+            #[uniform] settings: &BoundSettings<R>,
+            #[element] row: $Row<R>,
+        ) -> Bound<R> {
+            let m = biased::<R, $n>(row.moments(), settings);
+            Bound {
+                bound: bound::<R, $n>(m, row.eta).blend(settings.overestimation),
+            }
+        }
+
+        $(#[$adjoint_doc])*
+        #[kernel(compute, threads(64), precision(f32, f64))]
+        pub fn $adjoint<R: Real>(
+            #[uniform] settings: &BoundSettings<R>,
+            #[element] row: $AdjointRow<R>,
+        ) -> $Derivative<R> {
+            let mut m = [R::literal::<0>(); MAX_MOMENTS];
+            $(m[$k] = row.$m;)*
+            let target = bias_target::<R, $n>();
+            let m = mix_bias::<R, $n>(m, target, settings.bias);
+            let d = bound_adjoint::<R, $n>(
+                m,
+                row.eta,
+                settings.overestimation,
+                row.d_bound,
+            );
+            let d_m = mix_bias_adjoint::<R, $n>(d.m, target, settings.bias);
+            $Derivative {
+                $($d_m: d_m[$k],)*
+                d_eta: d.eta,
+            }
+        }
+    };
+}
+
+order! {
+    1; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2;
+    Row1, AdjointRow1, Derivative1;
+    /// Bound on the amount below a query point, from two power moments and their total.
+    moment_bound_n1,
+    /// Derivatives of the bound from two power moments and their total, times `d_bound`.
+    moment_bound_adjoint_n1
+}
+
+order! {
+    2; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4;
+    Row2, AdjointRow2, Derivative2;
+    /// Bound on the amount below a query point, from four power moments and their total.
+    moment_bound_n2,
+    /// Derivatives of the bound from four power moments and their total, times `d_bound`.
+    moment_bound_adjoint_n2
+}
+
+order! {
+    3; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6;
+    Row3, AdjointRow3, Derivative3;
+    /// Bound on the amount below a query point, from six power moments and their total.
+    moment_bound_n3,
+    /// Derivatives of the bound from six power moments and their total, times `d_bound`.
+    moment_bound_adjoint_n3
+}
+
+order! {
+    4; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6, m7 d_m7 7, m8 d_m8 8;
+    Row4, AdjointRow4, Derivative4;
+    /// Bound on the amount below a query point, from eight power moments and their total.
+    moment_bound_n4,
+    /// Derivatives of the bound from eight power moments and their total, times `d_bound`.
+    moment_bound_adjoint_n4
+}
+
+order! {
+    5; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6, m7 d_m7 7, m8 d_m8 8, m9 d_m9 9, m10 d_m10 10;
+    Row5, AdjointRow5, Derivative5;
+    /// Bound on the amount below a query point, from ten power moments and their total.
+    moment_bound_n5,
+    /// Derivatives of the bound from ten power moments and their total, times `d_bound`.
+    moment_bound_adjoint_n5
+}
+
+/// Bound on the amount below a query point, from four power moments and their total, with the
+/// ill-conditioned part in about twice the digits.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn moment_bound_compensated_n2<R: Real>(
+    #[uniform] settings: &BoundSettings<R>,
+    #[element] row: Row2<R>,
+) -> Bound<R> {
+    let m = biased::<R, 2>(row.moments(), settings);
+    Bound {
+        bound: bound_compensated::<R, 2>(m, row.eta).blend(settings.overestimation),
+    }
+}
+
+/// Bound on the amount below a query point, from six power moments and their total, with the
+/// ill-conditioned part in about twice the digits.
+#[kernel(compute, threads(64), precision(f32, f64))]
+pub fn moment_bound_compensated_n3<R: Real>(
+    #[uniform] settings: &BoundSettings<R>,
+    #[element] row: Row3<R>,
+) -> Bound<R> {
+    let m = biased::<R, 3>(row.moments(), settings);
+    Bound {
+        bound: bound_compensated::<R, 3>(m, row.eta).blend(settings.overestimation),
+    }
+}
