@@ -1,0 +1,166 @@
+//! Whether a row's moments are those of a distribution that is not degenerate.
+
+use hankel_dsl::Real;
+
+use super::Row;
+use crate::numbers::{DoubleDouble, Wide};
+
+/// What is known of a row's Hankel matrix, with the row's numbers taken as they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Validity {
+    /// Positive definite. The product of the pivots, each over its diagonal element: the share of
+    /// the digits that elimination leaves.
+    Definite(f64),
+    /// Not positive definite, or no number.
+    Not,
+    /// Too close to call with 300 bits.
+    Undecided,
+}
+
+impl Validity {
+    /// Whether the matrix is positive definite.
+    #[must_use]
+    pub const fn is_definite(self) -> bool {
+        matches!(self, Self::Definite(_))
+    }
+}
+
+/// Pivots of the Hankel matrix without exchange of rows (m_0 first), and its diagonal. From the
+/// first pivot on that is not positive, pivots mean nothing.
+#[must_use]
+pub fn pivots<R: Real>(n: usize, m: &[R; 11]) -> ([R; 6], [R; 6]) {
+    let zero = m[0] - m[0];
+    let size = n + 1;
+    let mut a = [[zero; 6]; 6];
+    for (i, row) in a.iter_mut().enumerate().take(size) {
+        for (j, cell) in row.iter_mut().enumerate().take(size) {
+            *cell = m[i + j];
+        }
+    }
+    let mut diagonal = [zero; 6];
+    let mut pivots = [zero; 6];
+    for k in 0..size {
+        diagonal[k] = m[2 * k];
+    }
+    for k in 0..size {
+        pivots[k] = a[k][k];
+        for i in k + 1..size {
+            let factor = a[i][k] / a[k][k];
+            let pivot_row = a[k];
+            for j in i..size {
+                let taken = factor * pivot_row[j];
+                a[i][j] -= taken;
+            }
+            // The lower triangle is not kept up.
+            for j in i..size {
+                a[j][i] = a[i][j];
+            }
+        }
+    }
+    (pivots, diagonal)
+}
+
+/// A row with the moments multiplied by a power of two that takes m_0 to [1, 2), and that power's
+/// exponent; `None` unless all is finite and m_0 is positive. Bounds scale with the moments.
+#[must_use]
+pub fn scaled(row: &Row<f64>) -> Option<(Row<f64>, i32)> {
+    let finite = row.m.iter().all(|m| m.is_finite()) && row.eta.is_finite();
+    if !finite || row.m[0] <= 0.0 {
+        return None;
+    }
+    // Twice, since neither 2^1074 nor 2^-1074 is a normal number.
+    let exponent = row.m[0].log2().floor() as i32;
+    let times = |x: f64, e: i32| x * 2.0_f64.powi(e / 2) * 2.0_f64.powi(e - e / 2);
+    let m = row.m.map(|m| times(m, -exponent));
+    m.iter()
+        .all(|m| m.is_finite())
+        .then_some((Row { m, eta: row.eta }, exponent))
+}
+
+/// A sign that is sure if the pivot's share of its diagonal element, times what earlier pivots
+/// left, is well above rounding errors.
+fn decide(n: usize, shares: [f64; 6], epsilon: f64) -> Validity {
+    let mut left = 1.0;
+    for share in shares.into_iter().take(n + 1) {
+        let sure = 64.0 * epsilon / left;
+        if share.is_nan() || share.abs() <= sure {
+            return Validity::Undecided;
+        }
+        if share < 0.0 {
+            return Validity::Not;
+        }
+        left *= share;
+    }
+    Validity::Definite(left)
+}
+
+/// Whether the Hankel matrix of m_0 to m_2n is positive definite: in double-double, and with 300
+/// bits where that does not tell. `row` must be [`scaled`].
+#[must_use]
+pub fn validity(n: usize, row: &Row<f64>) -> Validity {
+    if (0..=n).any(|k| row.m[2 * k] <= 0.0) {
+        return Validity::Not;
+    }
+    let (pivots_dd, diagonal) = pivots(n, &row.m.map(DoubleDouble::from));
+    let mut shares = [0.0; 6];
+    for k in 0..=n {
+        shares[k] = f64::from(pivots_dd[k]) / f64::from(diagonal[k]);
+    }
+    match decide(n, shares, 2.0_f64.powi(-102)) {
+        Validity::Undecided => {}
+        known => return known,
+    }
+    let (pivots_wide, diagonal) = pivots(n, &row.m.map(Wide::from));
+    for k in 0..=n {
+        shares[k] = f64::from(pivots_wide[k]) / f64::from(diagonal[k]);
+    }
+    // An exact zero on the way makes all that follows undefined: singular, so not definite.
+    if shares[..=n].contains(&0.0) {
+        return Validity::Not;
+    }
+    decide(n, shares, 2.0_f64.powi(-300))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(m: &[f64]) -> Row<f64> {
+        let mut row = Row::default();
+        row.m[..m.len()].copy_from_slice(m);
+        row
+    }
+
+    #[test]
+    fn distributions_are_told_from_what_is_none() {
+        // Three equal points at -1, 0, 1.
+        let three = [1.0, 0.0, 2.0 / 3.0, 0.0, 2.0 / 3.0];
+        assert!(validity(1, &row(&three[..3])).is_definite());
+        assert!(validity(2, &row(&three)).is_definite());
+        // Two points: singular for n = 2, to the last bit.
+        assert_eq!(validity(2, &row(&[1.0, 0.0, 1.0, 0.0, 1.0])), Validity::Not);
+        assert_eq!(validity(1, &row(&[1.0, 0.5, 0.2])), Validity::Not);
+        assert_eq!(validity(1, &row(&[1.0, 0.5, -1.0])), Validity::Not);
+    }
+
+    #[test]
+    fn an_excess_far_below_double_double_is_seen() {
+        let tiny = 2.0_f64.powi(-52);
+        // A third pivot of one unit in the last place.
+        let m = [1.0, 0.0, 1.0, 0.0, 1.0 + tiny];
+        let Validity::Definite(left) = validity(2, &row(&m)) else {
+            panic!("it is positive definite");
+        };
+        assert!((left / tiny - 1.0).abs() < 1e-9, "{left}");
+    }
+
+    #[test]
+    fn scaling_takes_the_smallest_numbers() {
+        let tiny = f64::from_bits(3);
+        let (scaled, exponent) = scaled(&row(&[tiny, 0.0, tiny])).unwrap();
+        assert_eq!(scaled.m[0], 1.5);
+        assert_eq!(exponent, -1073);
+        assert!(super::scaled(&row(&[0.0, 0.0, 1.0])).is_none());
+        assert!(super::scaled(&row(&[f64::NAN, 0.0, 1.0])).is_none());
+    }
+}
