@@ -19,7 +19,8 @@ Examples:
   hankel build --out shaders              all built-in kernels in every language
   hankel list                             what there is, and what it costs
   hankel parity                           does every backend compute the same?
-  hankel render scenes/scan.toml --out scan.png --compare"
+  hankel render scenes/scan.toml --out scan.png --compare
+  hankel bench bounds --quick             how fast are moment bounds here?"
 )]
 pub struct Arguments {
     /// Print nothing but results and errors.
@@ -45,6 +46,8 @@ pub enum Command {
     Eval(Eval),
     /// Render a scene with shadows.
     Render(Render),
+    /// Measure how fast kernels are.
+    Bench(Bench),
     /// Find or install rust-gpu's compiler.
     Toolchain(Toolchain),
     /// Print a completion script for a shell.
@@ -252,6 +255,87 @@ pub struct Render {
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct Bench {
+    #[command(subcommand)]
+    pub command: BenchCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Bounds and their derivatives: run time, error, and how near the machine's limits they are.
+    Bounds(BenchBounds),
+    /// Measure for another process, which asks on the standard input stream.
+    #[command(hide = true)]
+    Worker,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel bench bounds --quick
+  hankel bench bounds --out report --against diffmoments --python venv/bin/python
+  hankel bench bounds --n 2,3 --samples 200000
+
+OUT gets bounds.html, bounds.json, and a CSV file for each table. diffmoments is a Python package:
+  python3 -m pip install diffmoments numpy
+
+Environment:
+  HANKEL_PYTHON  the Python that has diffmoments, unless --python says
+  HANKEL_SIMD    the instruction set of the lanes; the others are measured all the same")]
+pub struct BenchBounds {
+    /// Only these orders; several with commas between, or repeated [default: 1 to 5].
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=5))]
+    pub n: Vec<u8>,
+    /// Rows of each call [default: 1000000; with --quick 20000].
+    #[arg(long, value_name = "NUMBER", value_parser = at_least_sixteen)]
+    pub samples: Option<usize>,
+    /// Rounds in which everything has its turn [default: 5; with --quick 3].
+    #[arg(long, value_name = "NUMBER", value_parser = at_least_one)]
+    pub rounds: Option<usize>,
+    /// Seed of the rows.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// Measure this implementation in turns with the kernels.
+    #[arg(long, value_enum)]
+    pub against: Option<Rival>,
+    /// The Python that has it [default: HANKEL_PYTHON, or python3].
+    #[arg(long, value_name = "PROGRAM", requires = "against")]
+    pub python: Option<PathBuf>,
+    /// Folder for the report; without it, tables are only printed.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// A look in seconds: fewer rows and rounds.
+    #[arg(long)]
+    pub quick: bool,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+fn at_least(least: usize, text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(number) if number >= least => Ok(number),
+        Ok(_) => Err(format!("at least {least}")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    at_least(1, text)
+}
+
+fn at_least_sixteen(text: &str) -> Result<usize, String> {
+    at_least(hankel_numerics::speed::LEAST_ROWS, text)
+}
+
+/// An implementation to compare with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Rival {
+    /// The 2025 paper's own code, a Python package.
+    Diffmoments,
 }
 
 #[derive(Debug, Args)]

@@ -8,6 +8,8 @@ use hankel_host::device::DeviceError;
 use hankel_host::eval::EvalError;
 use hankel_host::frame::FrameError;
 use hankel_host::scene::SceneError;
+use hankel_numerics::report::ReportError;
+use hankel_numerics::speed::SpeedError;
 use miette::Diagnostic;
 
 /// How a command that ran to its end ends.
@@ -182,6 +184,23 @@ impl From<FrameError> for Failure {
 
 impl From<hankel_toolchain::Error> for Failure {
     fn from(error: hankel_toolchain::Error) -> Self {
+        Self::new(Blame::Machine, &error, None)
+    }
+}
+
+impl From<SpeedError> for Failure {
+    fn from(error: SpeedError) -> Self {
+        let blame = match &error {
+            SpeedError::Order(_) | SpeedError::Rows(_) | SpeedError::Rounds => Blame::Input,
+            SpeedError::Kernel { .. } | SpeedError::Call(_) => Blame::Kernel,
+            SpeedError::Worker(..) | SpeedError::Peer(_) | SpeedError::Io(_) => Blame::Machine,
+        };
+        Self::new(blame, &error, None)
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
         Self::new(Blame::Machine, &error, None)
     }
 }

@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         Command::Parity(a) => commands::parity::run(&a, quiet),
         Command::Eval(a) => commands::eval::run(&a, quiet),
         Command::Render(a) => commands::render::run(&a, quiet),
+        Command::Bench(a) => commands::bench::run(&a, quiet),
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
         Command::Completions(a) => commands::completions::run(&a),
     };

@@ -42,6 +42,16 @@ pub struct Session {
 }
 
 impl Session {
+    /// The built-in crate as it was linked into this program, whatever has become of its sources.
+    pub fn linked(quiet: bool) -> Self {
+        Self {
+            krate: built_in(),
+            source_sha256: hankel_embedded::SOURCE_SHA256.into(),
+            sources: None,
+            quiet,
+        }
+    }
+
     /// Opens the crate at `manifest`, or else the built-in one.
     pub fn open(manifest: Option<&Path>, quiet: bool) -> Result<Self> {
         let manifest = match manifest {
@@ -50,12 +60,7 @@ impl Session {
             None => checkout().map(|root| root.join(BUILT_IN)),
         };
         let Some(manifest) = manifest else {
-            return Ok(Self {
-                krate: built_in(),
-                source_sha256: hankel_embedded::SOURCE_SHA256.into(),
-                sources: None,
-                quiet,
-            });
+            return Ok(Self::linked(quiet));
         };
         if !manifest.is_file() {
             return Err(Failure::input(

@@ -1,5 +1,6 @@
 //! One module for each command: it calls the library that does the work, and prints.
 
+pub mod bench;
 pub mod build;
 pub mod check;
 pub mod completions;
@@ -19,4 +20,20 @@ fn print_json(report: &impl Serialize) {
         // A map with keys that are no text: none of the reports has one.
         Err(error) => eprintln!("the report has no JSON form: {error}"),
     }
+}
+
+/// The command line as it was typed, as near as a program can know, for reports.
+fn command_line() -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_=./,:*@%+".contains(c);
+    std::iter::once("hankel".to_owned())
+        .chain(std::env::args_os().skip(1).map(|argument| {
+            let text = argument.to_string_lossy();
+            if !text.is_empty() && text.chars().all(plain) {
+                text.into_owned()
+            } else {
+                format!("'{}'", text.replace('\'', "'\\''"))
+            }
+        }))
+        .collect::<Vec<_>>()
+        .join(" ")
 }

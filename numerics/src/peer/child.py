@@ -1,7 +1,8 @@
 """Runs `diffmoments` for another process: a line of JSON for each request and each answer.
 
 Arrays come and go as files of plain numbers. Times are those of the extension's own functions on
-arrays that are there already, without allocation and without the Python around them.
+arrays that are there already, without allocation and without the Python around them: processor
+time of this process, which on its one core nothing else on the machine adds to.
 """
 
 import json
@@ -70,7 +71,7 @@ class Rows:
         storage, flags = self.storage[retain], self.flags[retain]
         if gradient and not self.stored[retain]:
             self.time(False, retain)
-        start = time.perf_counter()
+        start = time.process_time()
         if gradient:
             self.backward(
                 self.moments, self.eta, self.bounds, storage, self.d_moments, self.d_eta,
@@ -80,9 +81,22 @@ class Rows:
             self.forward(
                 self.moments, self.eta, self.bounds, storage, self.bias, self.overestimation, flags
             )
-        seconds = time.perf_counter() - start
+        seconds = time.process_time() - start
         self.stored[retain] = True
         return seconds
+
+    def canonical(self, path):
+        """Writes the points of the canonical representation, n + 1 columns, then their weights."""
+        suffix, dtype = SUFFIX[self.moments.dtype.itemsize]
+        count = (self.moments.shape[0] + 1) // 2
+        points = np.zeros((count, self.moments.shape[1]), dtype)
+        weights = np.zeros_like(points)
+        getattr(dmx, "compute_moment_bounds_and_roots_" + suffix)(
+            self.moments, self.eta, self.bounds, points, weights, self.bias, self.overestimation
+        )
+        with open(path, "wb") as file:
+            points.tofile(file)
+            weights.tofile(file)
 
 
 rows = None
@@ -97,6 +111,13 @@ for line in sys.stdin:
             answer(seconds=rows.time(request["gradient"], request["retain"]))
         elif request["do"] == "bounds":
             rows.bounds.tofile(request["path"])
+            answer()
+        elif request["do"] == "overestimate":
+            rows.overestimation = request["weight"]
+            rows.stored = {False: False, True: False}
+            answer()
+        elif request["do"] == "canonical":
+            rows.canonical(request["path"])
             answer()
         elif request["do"] == "gradients":
             with open(request["path"], "wb") as file:

@@ -153,7 +153,9 @@ impl Peer {
     /// Name and version.
     #[must_use]
     pub fn name(&self) -> String {
-        format!("diffmoments {}", self.version).trim_end().to_owned()
+        format!("diffmoments {}", self.version)
+            .trim_end()
+            .to_owned()
     }
 
     /// Hands over rows of order `n`, for bounds without a bias, lower ones; gradients will be those
@@ -178,7 +180,8 @@ impl Peer {
         for _ in rows {
             file.write_all(bytemuck::bytes_of(&one))?;
         }
-        file.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+        file.into_inner()
+            .map_err(std::io::IntoInnerError::into_error)?;
         self.ask(&json!({
             "do": "load",
             "path": path,
@@ -198,7 +201,8 @@ impl Peer {
         Ok(())
     }
 
-    /// Seconds that the rows' bounds or gradients take, with or without retained roots. The bounds
+    /// Seconds of processor time that the rows' bounds or gradients take, with or without retained
+    /// roots. The bounds
     /// that gradients need are computed beforehand, outside of the time.
     ///
     /// # Errors
@@ -233,6 +237,30 @@ impl Peer {
     pub fn gradients(&mut self) -> Result<Vec<Vec<f64>>, PeerError> {
         let Loaded { n, rows, .. } = self.loaded()?;
         let columns = self.fetch("gradients", rows * (2 * n + 2))?;
+        let row = |i: usize| columns.iter().skip(i).step_by(rows).copied().collect();
+        Ok((0..rows).map(row).collect())
+    }
+
+    /// From now on, bounds of the rows lie between the lower one, for 0, and the upper one, for 1.
+    ///
+    /// # Errors
+    ///
+    /// No rows were given to it, or the process ended.
+    pub fn overestimate(&mut self, weight: f64) -> Result<(), PeerError> {
+        self.loaded()?;
+        self.ask(&json!({"do": "overestimate", "weight": weight}))?;
+        Ok(())
+    }
+
+    /// The canonical representations of the rows: for each the n + 1 points, the query point among
+    /// them, and then their weights.
+    ///
+    /// # Errors
+    ///
+    /// No rows were given to it, or the process ended.
+    pub fn canonical(&mut self) -> Result<Vec<Vec<f64>>, PeerError> {
+        let Loaded { n, rows, .. } = self.loaded()?;
+        let columns = self.fetch("canonical", rows * (2 * n + 2))?;
         let row = |i: usize| columns.iter().skip(i).step_by(rows).copied().collect();
         Ok((0..rows).map(row).collect())
     }

@@ -1,17 +1,20 @@
-//! How many operations a kernel does: its own source, run with numbers that count.
+//! How many operations a kernel does: its own source, run with numbers that remember what they
+//! come from. Counted is what the results depend on, as a compiler would leave it: nothing that no
+//! result needs, nothing twice, and no arithmetic with constants alone.
 
-use std::cell::Cell;
-use std::hint::black_box;
-use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
-use hankel_dsl::Real;
 use hankel_dsl::native::layout::{Lane, Lanewise, Splat};
+use hankel_dsl::{Mask, Real};
 use hankel_shadows::moment_bounds as kernels;
 use serde::{Deserialize, Serialize};
 
 use crate::families::{Format, Row};
 
-/// Operations on numbers. Of what only moves them, nothing is counted.
+/// Operations on numbers. Of what only moves them, nothing is counted, and nothing of what combines
+/// truth values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Operations {
     /// Sums and differences.
@@ -46,7 +49,7 @@ impl Operations {
         self.sums + self.products + 2.0 * self.fused + self.quotients + self.roots
     }
 
-    fn map2(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self {
             sums: f(self.sums, other.sums),
             products: f(self.products, other.products),
@@ -60,137 +63,411 @@ impl Operations {
     }
 }
 
+/// What an operation is, or where a value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Kind {
+    Input,
+    /// The bits of an `f64`.
+    Constant(u64),
+    Truth(bool),
+    Sum,
+    Difference,
+    Product,
+    /// The rounding error of a product, which is the third operand.
+    Fused,
+    Quotient,
+    Root,
+    Less,
+    AtMost,
+    Equal,
+    Least,
+    Greatest,
+    Select,
+    Negative,
+    Magnitude,
+    Floor,
+    And,
+    Or,
+    Not,
+}
+
+/// An operation and what it is done to, by number; unused operands are `NONE`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Node {
+    kind: Kind,
+    operands: [u32; 3],
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Everything that was computed, without repetitions.
+#[derive(Default)]
+struct Graph {
+    nodes: Vec<Node>,
+    numbers: HashMap<Node, u32>,
+    outputs: Vec<u32>,
+}
+
 thread_local! {
-    static COUNT: Cell<Operations> = const { Cell::new(Operations {
-        sums: 0.0, products: 0.0, fused: 0.0, quotients: 0.0,
-        roots: 0.0, comparisons: 0.0, selections: 0.0, others: 0.0,
-    }) };
+    static GRAPH: RefCell<Graph> = RefCell::default();
 }
 
-fn count(f: impl FnOnce(&mut Operations)) {
-    COUNT.with(|cell| {
-        let mut operations = cell.get();
-        f(&mut operations);
-        cell.set(operations);
-    });
+impl Graph {
+    fn add(&mut self, node: Node) -> u32 {
+        *self.numbers.entry(node).or_insert_with(|| {
+            self.nodes.push(node);
+            (self.nodes.len() - 1) as u32
+        })
+    }
+
+    fn constant(&self, number: u32) -> Option<f64> {
+        match self.nodes.get(number as usize)?.kind {
+            Kind::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    fn is_constant(&self, number: u32) -> bool {
+        self.nodes
+            .get(number as usize)
+            .is_some_and(|node| matches!(node.kind, Kind::Constant(_) | Kind::Truth(_)))
+    }
+
+    /// What the outputs depend on.
+    fn count(&self) -> Operations {
+        let mut is_live = vec![false; self.nodes.len()];
+        let mut open = self.outputs.clone();
+        let mut operations = Operations::default();
+        while let Some(number) = open.pop() {
+            let (Some(node), Some(seen)) = (
+                self.nodes.get(number as usize),
+                is_live.get_mut(number as usize),
+            ) else {
+                continue;
+            };
+            if std::mem::replace(seen, true) {
+                continue;
+            }
+            open.extend(node.operands.iter().filter(|o| **o != NONE));
+            let o = &mut operations;
+            *match node.kind {
+                Kind::Input | Kind::Constant(_) | Kind::Truth(_) => continue,
+                Kind::And | Kind::Or | Kind::Not => continue,
+                Kind::Sum | Kind::Difference => &mut o.sums,
+                Kind::Product => &mut o.products,
+                Kind::Fused => &mut o.fused,
+                Kind::Quotient => &mut o.quotients,
+                Kind::Root => &mut o.roots,
+                Kind::Less | Kind::AtMost | Kind::Equal | Kind::Least | Kind::Greatest => {
+                    &mut o.comparisons
+                }
+                Kind::Select => &mut o.selections,
+                Kind::Negative | Kind::Magnitude | Kind::Floor => &mut o.others,
+            } += 1.0;
+        }
+        operations
+    }
 }
 
-/// What `f` does with [`Counted`] numbers, on this thread.
-pub fn operations_of<T>(f: impl FnOnce() -> T) -> Operations {
-    let before = COUNT.with(Cell::get);
-    black_box(f());
-    COUNT.with(Cell::get).map2(before, |after, before| after - before)
+/// The number of an operation's result; `constant` is that result where all operands are constant.
+fn node(kind: Kind, operands: &[u32], constant: impl FnOnce() -> Kind) -> u32 {
+    GRAPH.with_borrow_mut(|graph| {
+        if !operands.is_empty() && operands.iter().all(|o| graph.is_constant(*o)) {
+            return graph.add(Node {
+                kind: constant(),
+                operands: [NONE; 3],
+            });
+        }
+        let mut all = [NONE; 3];
+        all[..operands.len()].copy_from_slice(operands);
+        let commutes = matches!(
+            kind,
+            Kind::Sum | Kind::Product | Kind::Equal | Kind::And | Kind::Or
+        );
+        if commutes && all[0] > all[1] {
+            all.swap(0, 1);
+        }
+        graph.add(Node {
+            kind,
+            operands: all,
+        })
+    })
 }
 
-/// A number that counts what is done to it, on the thread where it is done.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub struct Counted<R>(
+fn input() -> u32 {
+    GRAPH.with_borrow_mut(|graph| {
+        // Told apart from all others by its own number.
+        let number = graph.nodes.len() as u32;
+        graph.add(Node {
+            kind: Kind::Input,
+            operands: [NONE, NONE, number],
+        })
+    })
+}
+
+fn constant_of(number: u32) -> Option<f64> {
+    GRAPH.with_borrow(|graph| graph.constant(number))
+}
+
+/// What `f` does to compute the numbers that it returns.
+pub fn operations_of<P: Format, const N: usize>(f: impl FnOnce() -> [Counted<P>; N]) -> Operations {
+    traced(|| {
+        let outputs = f().map(|x| x.number);
+        GRAPH.with_borrow_mut(|graph| graph.outputs.extend(outputs));
+    })
+}
+
+fn traced(f: impl FnOnce()) -> Operations {
+    GRAPH.set(Graph::default());
+    f();
+    let operations = GRAPH.with_borrow(Graph::count);
+    GRAPH.set(Graph::default());
+    operations
+}
+
+/// A number that remembers what it comes from, on the thread where it was made.
+#[derive(Clone, Copy, Debug)]
+pub struct Counted<P> {
     /// The value.
-    pub R,
-);
-
-macro_rules! operators {
-    ($($operator:ident $function:ident $field:ident),*) => {$(
-        impl<R: Real> $operator for Counted<R> {
-            type Output = Self;
-            fn $function(self, other: Self) -> Self {
-                count(|o| o.$field += 1.0);
-                Self(self.0.$function(other.0))
-            }
-        }
-    )*};
-    ($($operator:ident $function:ident by $with:ident),*) => {$(
-        impl<R: Real> $operator for Counted<R> {
-            fn $function(&mut self, other: Self) {
-                *self = self.$with(other);
-            }
-        }
-    )*};
+    pub value: P,
+    number: u32,
 }
 
-operators!(Add add sums, Sub sub sums, Mul mul products, Div div quotients);
-operators!(AddAssign add_assign by add, SubAssign sub_assign by sub, MulAssign mul_assign by mul);
+/// The result of comparing such numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct CountedMask {
+    value: bool,
+    number: u32,
+}
 
-impl<R: Real> Neg for Counted<R> {
+impl<P: Format> Counted<P> {
+    /// A number from outside.
+    #[must_use]
+    pub fn input(value: P) -> Self {
+        Self {
+            value,
+            number: input(),
+        }
+    }
+
+    fn fixed(value: P) -> Self {
+        let kind = Kind::Constant(value.widen().to_bits());
+        Self {
+            value,
+            number: node(kind, &[], || kind),
+        }
+    }
+
+    fn of(value: P, kind: Kind, operands: &[u32]) -> Self {
+        let number = node(kind, operands, || Kind::Constant(value.widen().to_bits()));
+        Self { value, number }
+    }
+
+    fn compared(value: bool, kind: Kind, operands: &[u32]) -> CountedMask {
+        CountedMask {
+            value,
+            number: node(kind, operands, || Kind::Truth(value)),
+        }
+    }
+
+    fn is(self, x: f64) -> bool {
+        constant_of(self.number).is_some_and(|c| c.to_bits() == x.to_bits())
+    }
+}
+
+impl BitAnd for CountedMask {
+    type Output = Self;
+    fn bitand(self, o: Self) -> Self {
+        Counted::<f32>::compared(self.value & o.value, Kind::And, &[self.number, o.number])
+    }
+}
+
+impl BitOr for CountedMask {
+    type Output = Self;
+    fn bitor(self, o: Self) -> Self {
+        Counted::<f32>::compared(self.value | o.value, Kind::Or, &[self.number, o.number])
+    }
+}
+
+impl Not for CountedMask {
+    type Output = Self;
+    fn not(self) -> Self {
+        Counted::<f32>::compared(!self.value, Kind::Not, &[self.number])
+    }
+}
+
+impl Mask for CountedMask {
+    fn any(self) -> bool {
+        self.value
+    }
+    fn all(self) -> bool {
+        self.value
+    }
+}
+
+impl<P: Format> Add for Counted<P> {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        Self::of(self.value + o.value, Kind::Sum, &[self.number, o.number])
+    }
+}
+
+impl<P: Format> Sub for Counted<P> {
+    type Output = Self;
+    fn sub(self, o: Self) -> Self {
+        if o.is(0.0) {
+            return self;
+        }
+        Self::of(
+            self.value - o.value,
+            Kind::Difference,
+            &[self.number, o.number],
+        )
+    }
+}
+
+impl<P: Format> Mul for Counted<P> {
+    type Output = Self;
+    fn mul(self, o: Self) -> Self {
+        if self.is(1.0) {
+            return o;
+        }
+        if o.is(1.0) {
+            return self;
+        }
+        Self::of(
+            self.value * o.value,
+            Kind::Product,
+            &[self.number, o.number],
+        )
+    }
+}
+
+impl<P: Format> Div for Counted<P> {
+    type Output = Self;
+    fn div(self, o: Self) -> Self {
+        // A quotient by a power of two is a product.
+        let mantissa = (1_u64 << 52) - 1;
+        match constant_of(o.number) {
+            Some(c) if c.is_normal() && c.to_bits() & mantissa == 0 => {
+                self * Self::fixed(P::round(1.0 / c))
+            }
+            _ => Self::of(
+                self.value / o.value,
+                Kind::Quotient,
+                &[self.number, o.number],
+            ),
+        }
+    }
+}
+
+impl<P: Format> Neg for Counted<P> {
     type Output = Self;
     fn neg(self) -> Self {
-        count(|o| o.others += 1.0);
-        Self(-self.0)
+        Self::of(-self.value, Kind::Negative, &[self.number])
     }
 }
 
-impl<R: Real> Real for Counted<R> {
-    type Mask = R::Mask;
+macro_rules! assign {
+    ($($operator:ident $function:ident $by:tt),*) => {$(
+        impl<P: Format> $operator for Counted<P> {
+            fn $function(&mut self, o: Self) {
+                *self = *self $by o;
+            }
+        }
+    )*};
+}
+
+assign!(AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *);
+
+impl<P: Format> Real for Counted<P> {
+    type Mask = CountedMask;
 
     fn literal<const BITS: u64>() -> Self {
-        Self(R::literal::<BITS>())
+        Self::fixed(P::literal::<BITS>())
     }
     fn epsilon() -> Self {
-        Self(R::epsilon())
+        Self::fixed(P::epsilon())
     }
     fn sqrt(self) -> Self {
-        count(|o| o.roots += 1.0);
-        Self(self.0.sqrt())
+        Self::of(self.value.sqrt(), Kind::Root, &[self.number])
     }
     fn abs(self) -> Self {
-        count(|o| o.others += 1.0);
-        Self(self.0.abs())
+        Self::of(self.value.abs(), Kind::Magnitude, &[self.number])
     }
     fn floor(self) -> Self {
-        count(|o| o.others += 1.0);
-        Self(self.0.floor())
+        Self::of(self.value.floor(), Kind::Floor, &[self.number])
     }
-    fn min(self, other: Self) -> Self {
-        count(|o| o.comparisons += 1.0);
-        Self(self.0.min(other.0))
+    fn min(self, o: Self) -> Self {
+        Self::of(
+            self.value.min(o.value),
+            Kind::Least,
+            &[self.number, o.number],
+        )
     }
-    fn max(self, other: Self) -> Self {
-        count(|o| o.comparisons += 1.0);
-        Self(self.0.max(other.0))
+    fn max(self, o: Self) -> Self {
+        Self::of(
+            self.value.max(o.value),
+            Kind::Greatest,
+            &[self.number, o.number],
+        )
     }
-    fn lt(self, other: Self) -> R::Mask {
-        count(|o| o.comparisons += 1.0);
-        self.0.lt(other.0)
+    fn lt(self, o: Self) -> CountedMask {
+        Self::compared(self.value.lt(o.value), Kind::Less, &[self.number, o.number])
     }
-    fn le(self, other: Self) -> R::Mask {
-        count(|o| o.comparisons += 1.0);
-        self.0.le(other.0)
+    fn le(self, o: Self) -> CountedMask {
+        Self::compared(
+            self.value.le(o.value),
+            Kind::AtMost,
+            &[self.number, o.number],
+        )
     }
-    fn eq(self, other: Self) -> R::Mask {
-        count(|o| o.comparisons += 1.0);
-        self.0.eq(other.0)
+    fn eq(self, o: Self) -> CountedMask {
+        Self::compared(
+            self.value.eq(o.value),
+            Kind::Equal,
+            &[self.number, o.number],
+        )
     }
-    fn select(mask: R::Mask, a: Self, b: Self) -> Self {
-        count(|o| o.selections += 1.0);
-        Self(R::select(mask, a.0, b.0))
+    fn select(mask: CountedMask, a: Self, b: Self) -> Self {
+        let chosen = if mask.value { a } else { b };
+        let is_known = GRAPH.with_borrow(|graph| graph.is_constant(mask.number));
+        if is_known || a.number == b.number {
+            return chosen;
+        }
+        Self::of(
+            chosen.value,
+            Kind::Select,
+            &[mask.number, a.number, b.number],
+        )
     }
-    fn two_sum(self, other: Self) -> (Self, Self) {
-        count(|o| o.sums += 6.0);
-        let (sum, error) = self.0.two_sum(other.0);
-        (Self(sum), Self(error))
+    // As lanes do both.
+    fn two_sum(self, o: Self) -> (Self, Self) {
+        let sum = self + o;
+        let from_o = sum - self;
+        (sum, (self - (sum - from_o)) + (o - from_o))
     }
-    fn two_product(self, other: Self) -> (Self, Self) {
-        count(|o| {
-            o.products += 1.0;
-            o.fused += 1.0;
-        });
-        let (product, error) = self.0.two_product(other.0);
-        (Self(product), Self(error))
+    fn two_product(self, o: Self) -> (Self, Self) {
+        let product = self * o;
+        let error = self.value.two_product(o.value).1;
+        let operands = [self.number, o.number, product.number];
+        (product, Self::of(error, Kind::Fused, &operands))
     }
 }
 
-/// One lane: what makes a row of plain numbers into one of counting numbers.
+/// One lane: what makes a row of plain numbers into one of such numbers, and back.
 impl<P: Format> Lane for Counted<P> {
     type Scalar = P;
     const LANES: usize = 1;
     fn splat(value: P) -> Self {
-        Self(value)
+        Self::input(value)
     }
     fn column(table: &[P], _: usize, at: usize) -> Self {
-        Self(table[at])
+        Self::input(table[at])
     }
     fn put_column(table: &mut [P], _: usize, at: usize, last: &[Self; 4]) {
-        table[at] = last[3].0;
+        table[at] = last[3].value;
+        GRAPH.with_borrow_mut(|graph| graph.outputs.push(last[3].number));
     }
 }
 
@@ -198,12 +475,8 @@ impl<P: Format> Lane for Counted<P> {
 /// precision does the same.
 #[must_use]
 pub fn per_row(function: &str, n: usize, rows: &[Row<f32>]) -> Option<Operations> {
-    let settings = Splat::<f32>::splat::<Counted<f32>>(kernels::BoundSettings {
-        overestimation: 0.0_f32,
-        bias: 0.0,
-    });
     macro_rules! kernel {
-        ($($kernel:ident $order:literal $Row:ident { $($m:ident $k:literal),* } $($d_bound:ident)?;)*) => {
+        ($($kernel:ident $order:literal $Row:ident -> $Out:ident { $($m:ident $k:literal),* } $($d_bound:ident)?;)*) => {
             match function {
                 $(stringify!($kernel) if n == $order => rows
                     .iter()
@@ -213,30 +486,37 @@ pub fn per_row(function: &str, n: usize, rows: &[Row<f32>]) -> Option<Operations
                             eta: row.eta,
                             $($d_bound: 1.0_f32,)?
                         };
-                        let counted = Lanewise::<f32>::load::<Counted<f32>>(&[plain]);
-                        operations_of(|| kernels::$kernel(&settings, counted))
+                        traced(|| {
+                            let settings = Splat::<f32>::splat::<Counted<f32>>(
+                                kernels::BoundSettings { overestimation: 0.0_f32, bias: 0.0 },
+                            );
+                            let row = Lanewise::<f32>::load::<Counted<f32>>(&[plain]);
+                            let out = kernels::$kernel(&settings, row);
+                            let mut plain: [kernels::$Out<f32>; 1] = bytemuck::Zeroable::zeroed();
+                            Lanewise::<f32>::store::<Counted<f32>>(&out, &mut plain);
+                        })
                     })
-                    .fold(Operations::default(), |sum, one| sum.map2(one, |a, b| a + b)),)*
+                    .fold(Operations::default(), |sum, one| sum.zip(one, |a, b| a + b)),)*
                 _ => return None,
             }
         };
     }
     let sum = kernel! {
-        moment_bound_n1 1 Row1 { m0 0, m1 1, m2 2 };
-        moment_bound_n2 2 Row2 { m0 0, m1 1, m2 2, m3 3, m4 4 };
-        moment_bound_n3 3 Row3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 };
-        moment_bound_n4 4 Row4 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 };
-        moment_bound_n5 5 Row5 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 };
-        moment_bound_compensated_n2 2 Row2 { m0 0, m1 1, m2 2, m3 3, m4 4 };
-        moment_bound_compensated_n3 3 Row3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 };
-        moment_bound_adjoint_n1 1 AdjointRow1 { m0 0, m1 1, m2 2 } d_bound;
-        moment_bound_adjoint_n2 2 AdjointRow2 { m0 0, m1 1, m2 2, m3 3, m4 4 } d_bound;
-        moment_bound_adjoint_n3 3 AdjointRow3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 } d_bound;
-        moment_bound_adjoint_n4 4 AdjointRow4 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 } d_bound;
-        moment_bound_adjoint_n5 5 AdjointRow5 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 } d_bound;
+        moment_bound_n1 1 Row1 -> Bound { m0 0, m1 1, m2 2 };
+        moment_bound_n2 2 Row2 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4 };
+        moment_bound_n3 3 Row3 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 };
+        moment_bound_n4 4 Row4 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 };
+        moment_bound_n5 5 Row5 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 };
+        moment_bound_compensated_n2 2 Row2 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4 };
+        moment_bound_compensated_n3 3 Row3 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 };
+        moment_bound_adjoint_n1 1 AdjointRow1 -> Derivative1 { m0 0, m1 1, m2 2 } d_bound;
+        moment_bound_adjoint_n2 2 AdjointRow2 -> Derivative2 { m0 0, m1 1, m2 2, m3 3, m4 4 } d_bound;
+        moment_bound_adjoint_n3 3 AdjointRow3 -> Derivative3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 } d_bound;
+        moment_bound_adjoint_n4 4 AdjointRow4 -> Derivative4 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 } d_bound;
+        moment_bound_adjoint_n5 5 AdjointRow5 -> Derivative5 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 } d_bound;
     };
     let count = rows.len().max(1) as f64;
-    Some(sum.map2(sum, |a, _| a / count))
+    Some(sum.zip(sum, |a, _| a / count))
 }
 
 #[cfg(test)]
@@ -252,7 +532,11 @@ mod tests {
 
     #[test]
     fn every_operation_is_counted_once() {
-        let counted = operations_of(|| assert_eq!(horner(Counted(2.0_f64)).0, -2.0));
+        let counted = operations_of(|| {
+            let y = horner(Counted::input(2.0_f64));
+            assert_eq!(y.value, -2.0);
+            [y]
+        });
         let expected = Operations {
             sums: 1.0,
             products: 1.0,
@@ -269,14 +553,63 @@ mod tests {
     }
 
     #[test]
+    fn what_a_compiler_drops_is_not_counted() {
+        let counted = operations_of(|| {
+            let (x, y) = (Counted::input(3.0_f32), Counted::input(5.0_f32));
+            let one: Counted<f32> = lit!(1.0);
+            let four = (one + one) * lit!(2.0);
+            let unused = x / y;
+            assert_eq!(unused.value, 0.6);
+            // x y twice, a product with 1, a quotient by 4, a choice that is known.
+            let sum = x * y + (y * x) * one;
+            let known = Real::select(one.lt(four), sum - lit!(0.0), unused);
+            [known / four]
+        });
+        let expected = Operations {
+            sums: 1.0,
+            products: 2.0,
+            ..Operations::default()
+        };
+        assert_eq!(counted, expected);
+    }
+
+    #[test]
+    fn inputs_are_not_constants() {
+        let counted = operations_of(|| {
+            let (x, y) = (Counted::input(1.0_f32), Counted::input(1.0_f32));
+            [x * y, x + y]
+        });
+        assert_eq!((counted.products, counted.sums), (1.0, 1.0));
+    }
+
+    #[test]
     fn error_terms_count_as_what_they_take() {
         let counted = operations_of(|| {
-            let (a, b) = (Counted(1.0_f32), Counted(1e-9_f32));
-            assert_eq!(a.two_sum(b).1.0, 1e-9);
-            a.two_product(b)
+            let (a, b) = (Counted::input(1.0_f32), Counted::input(1e-9_f32));
+            let (sum, error) = a.two_sum(b);
+            assert_eq!((sum.value, error.value), (1.0, 1e-9));
+            let (product, rest) = a.two_product(b);
+            assert_eq!((product.value, rest.value), (1e-9, 0.0));
+            [sum, error, product, rest]
         });
         assert_eq!(counted.sums, 6.0);
         assert_eq!((counted.products, counted.fused), (1.0, 1.0));
         assert_eq!(counted.flops(), 9.0);
+    }
+
+    /// The bound of one order is a known handful of operations, whatever the rows are.
+    #[test]
+    fn kernels_are_traced_through_their_entry_points() {
+        use crate::families::Family;
+        let rows = |n| {
+            let family = Family::named("paper").unwrap();
+            (0..8).map(|i| family.row(n, 1, i)).collect::<Vec<_>>()
+        };
+        let few = super::per_row("moment_bound_n2", 2, &rows(2)[..1]).unwrap();
+        let more = super::per_row("moment_bound_n2", 2, &rows(2)).unwrap();
+        assert_eq!(few, more, "no early exits");
+        assert!(few.quotients >= 1.0 && few.products > 10.0, "{few:?}");
+        assert_eq!(super::per_row("moment_bound_n2", 3, &rows(3)), None);
+        assert_eq!(super::per_row("blur", 2, &rows(2)), None);
     }
 }

@@ -120,6 +120,9 @@ fn array_bytes(quick: bool) -> usize {
     })
 }
 
+/// What is done with a part of three arrays, of which the first is written.
+type Pass<'a> = &'a (dyn Fn(&mut [f64], &[f64], &[f64]) + Sync);
+
 /// The best of several runs, on one thread and on all.
 fn bandwidth(array_bytes: usize, runs: usize) -> [Bandwidth; 2] {
     /// Numbers that a thread takes at once.
@@ -132,7 +135,7 @@ fn bandwidth(array_bytes: usize, runs: usize) -> [Bandwidth; 2] {
     let triad = |a: &mut [f64], b: &[f64], c: &[f64]| {
         dispatch!(best, simd => sums(simd, a, b, c, scale));
     };
-    let mut run = |all: bool, arrays: usize, f: &(dyn Fn(&mut [f64], &[f64], &[f64]) + Sync)| {
+    let mut run = |all: bool, arrays: usize, f: Pass<'_>| {
         (0..=runs)
             .map(|_| {
                 let start = Instant::now();
@@ -179,9 +182,7 @@ const CHAINS: usize = 7;
 fn peak<T: Format + Scalar>(name: &str, level: Level, seconds: f64) -> Peak {
     let start: [T; 2 * CHAINS] = std::array::from_fn(|i| T::round(1.0 + i as f64 / 64.0));
     let lanes = dispatch!(level, simd => lanes_of::<_, T>(simd));
-    let run = |operation: Operation, rounds: u32| {
-        dispatch!(level, simd => chains::<_, T>(simd, operation, &start, rounds))
-    };
+    let run = |operation: Operation, rounds: u32| dispatch!(level, simd => chains::<_, T>(simd, operation, &start, rounds));
     let rate = |operation: Operation| {
         let per_round = match operation {
             Operation::Simple => 2 * CHAINS,

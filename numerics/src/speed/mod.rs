@@ -3,7 +3,8 @@
 //! what the machine could do at best.
 //!
 //! Everything that is compared takes turns, round after round, so that whatever else the machine
-//! does disturbs all alike; what counts is the median. Kernels are called as any user calls them,
+//! does disturbs all alike; what counts is the median. Times on one thread are processor time, since
+//! a long call would be interrupted more often than a short one; on all cores, wall time. Kernels are called as any user calls them,
 //! through their entry points, on rows in memory; `diffmoments` through its own functions on arrays
 //! in memory, without allocations and without Python's overhead.
 
@@ -382,7 +383,8 @@ impl Run<'_> {
             .map(|(_, function)| Native::new(function, &rows))
             .collect::<Result<Vec<_>, _>>()?;
         for ((solver, function), kernel) in own.iter().zip(&kernels) {
-            self.work.extend(work_of::<T>(*solver, function, n, kernel.bytes_per_row()));
+            self.work
+                .extend(work_of::<T>(*solver, function, n, kernel.bytes_per_row()));
         }
         let mut contestants = self.hand_over::<T>(n, &own, &kernels)?;
         if peer.is_some() {
@@ -426,7 +428,8 @@ impl Run<'_> {
                 }
             }
         }
-        self.timings.extend(contestants.into_iter().map(|(timing, _)| timing));
+        self.timings
+            .extend(contestants.into_iter().map(|(timing, _)| timing));
         drop((kernels, rows));
         progress(&format!("n = {n}, {}: errors", T::PRECISION));
         self.errors.extend(errors::measure::<T>(

@@ -18,6 +18,7 @@ impl Speed {
         report.fact("rows of a call", self.rows);
         report.fact("rounds", self.rounds);
         report.fact("seed", self.seed);
+        report.fact("times", "one thread: processor time; all cores: wall time");
         match &self.peer {
             Some(peer) => report.fact("beside", peer),
             None => report.notes.push(
@@ -133,19 +134,19 @@ impl Speed {
 
     /// A row for each solver, order and precision, a column for each way to run it.
     fn times(&self) -> Table {
+        let own = || self.timings.iter().filter(|t| !t.solver.is_peer());
         let mut ways: Vec<(&str, usize)> = Vec::new();
-        for t in &self.timings {
+        for t in own() {
             let way = (t.path.as_str(), t.threads);
             if !ways.contains(&way) {
                 ways.push(way);
             }
         }
-        // From the plainest to the fastest; what nobody here compiled comes last.
+        // From the plainest to the fastest.
         let narrow_first: Vec<&str> = levels().iter().rev().map(|(name, _)| *name).collect();
         ways.sort_by_key(|(path, threads)| {
             let place = match *path {
                 "scalar" => 0,
-                "library" => usize::MAX,
                 path => 1 + narrow_first.iter().position(|n| *n == path).unwrap_or(0),
             };
             (place, *threads)
@@ -173,7 +174,7 @@ impl Speed {
             .chain(columns),
         );
         let mut seen = Vec::new();
-        for t in &self.timings {
+        for t in own() {
             let what = (t.solver, t.n, t.precision);
             if seen.contains(&what) {
                 continue;
@@ -244,7 +245,7 @@ impl Speed {
             format!(
                 "How near kernels come to the machine's limits, on one thread with {}: bytes over \
                  bandwidth, and operations over peaks (quotients and roots over their own). \
-                 Operations are counted in the kernel's source; `reached` is the greater limit's \
+                 Operations are those of the kernel's source that a result depends on; `reached` is the greater limit's \
                  share of the time measured.",
                 self.level
             ),
@@ -414,10 +415,7 @@ impl Speed {
     /// What no other variant of the same order beats in both run time and error; the orders one
     /// after the other. Between orders there is nothing to compare: a larger one gives a tighter
     /// bound.
-    fn fronts_of<'a>(
-        &'a self,
-        family: &'a str,
-    ) -> Vec<Vec<(&'a ErrorOf, &'a Timing, f64, f64)>> {
+    fn fronts_of<'a>(&'a self, family: &'a str) -> Vec<Vec<(&'a ErrorOf, &'a Timing, f64, f64)>> {
         let all: Vec<_> = self.variants(family).collect();
         self.orders()
             .into_iter()
@@ -462,26 +460,11 @@ impl Speed {
 
     fn pareto(&self, family: &str) -> Plot {
         let all: Vec<_> = self.variants(family).collect();
-        let groups: [(&str, fn(&ErrorOf, &Timing) -> bool); 5] = [
-            ("f32 lanes", |e, t| {
-                e.solver == Solver::Plain && e.precision == Precision::F32 && t.path != "scalar"
-            }),
-            ("f32 lanes, compensated", |e, t| {
-                e.solver == Solver::Compensated
-                    && e.precision == Precision::F32
-                    && t.path != "scalar"
-            }),
-            ("f64 lanes", |e, t| {
-                !e.solver.is_peer() && e.precision == Precision::F64 && t.path != "scalar"
-            }),
-            ("scalar", |e, t| !e.solver.is_peer() && t.path == "scalar"),
-            ("diffmoments", |e, _| e.solver.is_peer()),
-        ];
-        let mut series: Vec<Series> = groups
-            .iter()
-            .map(|(name, belongs)| {
-                let mine = all.iter().filter(|v| belongs(v.0, v.1));
-                Series::new(*name, Style::Dots, mine.map(|v| (v.2, v.3)))
+        let mut series: Vec<Series> = Group::ALL
+            .into_iter()
+            .map(|group| {
+                let mine = all.iter().filter(|v| Group::of(v.0, v.1) == group);
+                Series::new(group.name(), Style::Dots, mine.map(|v| (v.2, v.3)))
             })
             .filter(|series| !series.points.is_empty())
             .collect();
@@ -528,9 +511,7 @@ impl Speed {
                 let points: Vec<(f64, f64)> = self
                     .orders()
                     .into_iter()
-                    .filter_map(|n| {
-                        Some((n as f64, self.time(solver, n, precision, path, 1)?))
-                    })
+                    .filter_map(|n| Some((n as f64, self.time(solver, n, precision, path, 1)?)))
                     .collect();
                 if !points.is_empty() {
                     let name = format!("{} {precision}", solver.name());
@@ -547,6 +528,46 @@ impl Speed {
             x: Axis::linear("n"),
             y: Axis::logarithmic("time for a row [ns]"),
             series,
+        }
+    }
+}
+
+/// What has a colour of its own in a plot.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Group {
+    LanesF32,
+    CompensatedF32,
+    LanesF64,
+    Scalar,
+    Peer,
+}
+
+impl Group {
+    const ALL: [Self; 5] = [
+        Self::LanesF32,
+        Self::CompensatedF32,
+        Self::LanesF64,
+        Self::Scalar,
+        Self::Peer,
+    ];
+
+    fn of(error: &ErrorOf, timing: &Timing) -> Self {
+        match (error.solver, error.precision, timing.path.as_str()) {
+            (solver, ..) if solver.is_peer() => Self::Peer,
+            (_, _, "scalar") => Self::Scalar,
+            (_, Precision::F64, _) => Self::LanesF64,
+            (Solver::Compensated, ..) => Self::CompensatedF32,
+            _ => Self::LanesF32,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::LanesF32 => "f32 lanes",
+            Self::CompensatedF32 => "f32 lanes, compensated",
+            Self::LanesF64 => "f64 lanes",
+            Self::Scalar => "scalar",
+            Self::Peer => "diffmoments",
         }
     }
 }

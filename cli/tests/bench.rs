@@ -1,0 +1,113 @@
+//! `hankel bench` as a user types it.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn hankel(folder: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hankel"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .env_remove("HANKEL_PYTHON")
+        .output()
+        .expect("hankel starts")
+}
+
+fn fails(folder: &Path, line: &str, code: i32, words: &[&str]) {
+    let output = hankel(folder, line);
+    let error = String::from_utf8_lossy(&output.stderr).replace(['│', '\n'], " ");
+    let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(output.status.code(), Some(code), "{line}: {error}");
+    for word in words {
+        assert!(error.contains(word), "{line}: no `{word}` in {error}");
+    }
+}
+
+#[test]
+fn bounds_are_measured_on_every_instruction_set() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let line = "bench bounds --quick --n 2,1 --samples 400 --rounds 1 --out report";
+    let output = hankel(folder.path(), line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in [
+        "scalar [ns]",
+        "baseline [ns]",
+        "bound, compensated",
+        "bounds.html",
+    ] {
+        assert!(text.contains(part), "no `{part}` in\n{text}");
+    }
+
+    let report = folder.path().join("report");
+    let json = std::fs::read(report.join("bounds.json")).expect("there is a report");
+    let json: Value = serde_json::from_slice(&json).expect("it is JSON");
+    assert_eq!(json["command"], format!("hankel {line}"));
+    let tables = json["tables"].as_array().expect("it has tables");
+    let table = |id: &str| tables.iter().find(|t| t["id"] == id);
+    let times = table("times").expect("it has run times");
+    let rows = times["rows"].as_array().expect("the table has rows");
+    // Two kernels for n = 1, three for n = 2, each in both precisions.
+    assert_eq!(rows.len(), 10);
+    // Every way to run a kernel was measured.
+    for row in rows {
+        let numbers = row.as_array().expect("a row is an array").iter().skip(3);
+        assert!(numbers.into_iter().all(Value::is_number), "{row}");
+    }
+    let columns = times["columns"].as_array().expect("the table has columns");
+    for (level, _) in hankel_dsl::native::lanes::levels() {
+        assert!(columns.iter().any(|c| c["name"] == level), "no {level}");
+    }
+    // Shaders are counted, or the report says why not.
+    let notes = json["notes"].to_string();
+    match table("instructions") {
+        Some(table) => assert!(!table["rows"].as_array().expect("rows").is_empty()),
+        None => assert!(notes.contains("instruction counts"), "{notes}"),
+    }
+    let page = std::fs::read_to_string(report.join("bounds.html")).expect("there is a page");
+    assert!(page.contains("<svg") && page.contains("Pareto front"));
+}
+
+#[test]
+fn json_goes_to_the_output_stream() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let line = "bench bounds --quick --n 1 --samples 100 --rounds 1 --format json";
+    let output = hankel(folder.path(), line);
+    let json: Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+    assert!(json["facts"].to_string().contains("processor"));
+    // Nothing is written where no folder was named.
+    assert_eq!(
+        std::fs::read_dir(folder.path()).expect("a folder").count(),
+        0
+    );
+}
+
+#[test]
+fn misuse_is_explained() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    fails(folder.path(), "bench bounds --n 6", 2, &["6", "1..=5"]);
+    fails(
+        folder.path(),
+        "bench bounds --samples 3",
+        2,
+        &["at least 16"],
+    );
+    fails(folder.path(), "bench bounds --rounds 0", 2, &["at least 1"]);
+    fails(folder.path(), "bench bounds --python x", 2, &["--against"]);
+    let quick = "bench bounds --quick --n 1 --samples 100";
+    fails(
+        folder.path(),
+        &format!("{quick} --against diffmoments --python /nonexistent/python"),
+        3,
+        &["/nonexistent/python", "--python", "HANKEL_PYTHON"],
+    );
+    std::fs::write(folder.path().join("file"), "").expect("the folder can be written");
+    fails(
+        folder.path(),
+        &format!("{quick} --rounds 1 --out file"),
+        3,
+        &["file", "--out"],
+    );
+}
