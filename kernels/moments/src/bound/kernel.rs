@@ -52,7 +52,7 @@ impl<R: Real> Kernel<R> {
     pub fn new<const N: usize>(recurrence: &Recurrence<R>) -> Self {
         let zero: R = lit!(0.0);
         let one: R = lit!(1.0);
-        let least: R = lit!(1e-30);
+        let least: R = lit!(1e-37);
         let mut a = recurrence.a;
         let b = recurrence.b;
         let mut y = [one; MAX + 1];

@@ -82,7 +82,6 @@ impl<R: Real> Recurrence<R> {
     #[inline(always)]
     pub fn new<A: Arithmetic<R>, const N: usize>(m: [R; MAX_MOMENTS], eta: R, floor: R) -> Self {
         let zero: R = lit!(0.0);
-        let least: R = lit!(1e-30);
         let largest: R = lit!(1e25);
         let far: R = if const { N > 2 } {
             lit!(1e12)
@@ -95,7 +94,9 @@ impl<R: Real> Recurrence<R> {
         let query = A::of(eta);
 
         let mut current = [A::of(zero); MAX_MOMENTS];
-        let scaled_total = (total * scale).max(least);
+        let scaled_total = (total * scale).max(lit!(1e-12));
+        // Far below what rounding leaves of a pivot, and far above what is too small to divide by.
+        let least = R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)));
         current[0] = A::of(scaled_total);
         unroll!(k in 1..(2 * N + 1), max 11, {
             current[k] = A::of(finite(finite(m[k], lit!(1e37)) * scale, largest));
@@ -124,7 +125,6 @@ impl<R: Real> Recurrence<R> {
                 }
             });
             let noise = raw[2 * k].rounded().abs() * floor;
-            let least = if const { k == 1 } { scaled_total * least } else { least };
             next[k] = next[k].at_least(noise.max(least));
             beta = next[k].over(current[k - 1]).within(zero, far);
             b[k] = beta.rounded();
