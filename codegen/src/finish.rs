@@ -37,6 +37,9 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let name = kernel.name.as_str();
     let words = optimise(&spirv::words(raw, name)?, name)?;
     let mut module = spirv::load(&words, name)?;
+    if kernel.exact {
+        exact::keep(&mut module);
+    }
     trim::debug(&mut module);
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);

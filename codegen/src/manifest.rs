@@ -144,6 +144,9 @@ pub struct KernelEntry {
     pub findings: Vec<Finding>,
     /// How closely backends agree with the native scalar run.
     pub tolerance: Tolerance,
+    /// Arithmetic must be done as it is written, which the files ask of their compilers.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub exact: bool,
     /// The text in each language.
     pub languages: BTreeMap<Language, LanguageEntry>,
     /// Languages that cannot express it, and why.
@@ -409,6 +412,7 @@ pub(crate) fn entry(
             absolute: kernel.tolerance.absolute,
             why: kernel.tolerance.why.clone(),
         },
+        exact: kernel.exact,
         languages: BTreeMap::new(),
         unsupported: BTreeMap::new(),
     }

@@ -88,7 +88,7 @@ fn compilers_accept_what_is_written() {
             checked += 1;
         }
     }
-    assert_eq!(checked, 20);
+    assert_eq!(checked, 23);
 }
 
 #[test]
@@ -229,6 +229,123 @@ fn what_a_language_lacks_is_said() {
     request.options.shader_model = "5.1".parse().unwrap();
     let generated = generate(&request, &support::modules()).unwrap();
     assert!(generated.manifest.kernels["wide_f64"].unsupported[&Language::Hlsl].contains("6.2"));
+}
+
+/// The operations that glslang may neither contract nor reorder, and all of them.
+fn no_contraction(arguments: &[&str], name: &str, source: &str) -> (usize, usize) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    let module = folder.path().join("out.spv");
+    std::fs::write(&path, source).unwrap();
+    let output = ["-S", "comp", "-o", module.to_str().unwrap()];
+    glslang(&[arguments, &output].concat(), &path);
+    let module = rspirv::dr::load_bytes(std::fs::read(&module).unwrap()).unwrap();
+    use rspirv::spirv::Op::{FAdd, FMul, FSub};
+    let arithmetic = module.functions.iter().flat_map(|it| it.all_inst_iter());
+    let arithmetic: Vec<_> = arithmetic
+        .filter(|it| matches!(it.class.opcode, FAdd | FSub | FMul))
+        .filter_map(|it| it.result_id)
+        .collect();
+    let text = rspirv::binary::Disassemble::disassemble(&module);
+    let decorated = |id: &&u32| text.contains(&format!("OpDecorate %{id} NoContraction"));
+    (
+        arithmetic.iter().filter(decorated).count(),
+        arithmetic.len(),
+    )
+}
+
+#[test]
+fn exact_arithmetic_is_precise_where_the_language_can() {
+    let kernel = support::rounding();
+    let glsl = text(&kernel, Language::Glsl);
+    assert!(
+        glsl.source
+            .contains("precise float rounded_1 = (rounded - x);"),
+        "{}",
+        glsl.source
+    );
+    assert!(glsl.requires.is_empty());
+    let es = text(&kernel, Language::Essl310);
+    assert!(
+        es.source.starts_with("#version 310 es\n// ")
+            && es
+                .source
+                .contains("\n#extension GL_EXT_gpu_shader5 : require\n"),
+        "{}",
+        es.source
+    );
+    assert_eq!(es.requires, ["GL_EXT_gpu_shader5"]);
+    let hlsl = text(&kernel, Language::Hlsl);
+    assert!(
+        hlsl.source
+            .contains("        precise float rounded_1 = (rounded - x);"),
+        "{}",
+        hlsl.source
+    );
+    // What it means to a compiler; and what it would be without (reordered at once, in HLSL).
+    let entry = ["-D", "-V", "-e", hlsl.entry_point.as_str()];
+    for (arguments, name, source) in [
+        (["-V"].as_slice(), "rounding.comp", &glsl.source),
+        (["-V"].as_slice(), "rounding_es.comp", &es.source),
+        (entry.as_slice(), "rounding.hlsl", &hlsl.source),
+    ] {
+        assert_eq!(no_contraction(arguments, name, source), (8, 8), "{source}");
+        let plain = source.replace("precise ", "");
+        assert_eq!(no_contraction(arguments, name, &plain).0, 0, "{plain}");
+    }
+    // Other kernels stay as they are.
+    let bound = text(&support::bound(), Language::Hlsl).source;
+    assert!(
+        !bound.contains("precise") && !bound.contains("rounded"),
+        "{bound}"
+    );
+}
+
+#[test]
+fn exact_arithmetic_is_unsupported_where_the_language_cannot() {
+    let kernel = support::rounding();
+    let generated = generate(&support::request(), &support::modules()).unwrap();
+    let entry = &generated.manifest.kernels["rounding"];
+    assert!(entry.exact && !generated.manifest.kernels["bound"].exact);
+    for (language, why) in [
+        (Language::Wgsl, "every implementation"),
+        (Language::Msl, "MSL 2.4"),
+        (Language::Essl300, "no `precise`"),
+    ] {
+        let said = &entry.unsupported[&language];
+        assert!(
+            said.contains(why) && said.contains("as it is written"),
+            "{said}"
+        );
+    }
+    let options = Options {
+        msl_version: "3.2".parse().unwrap(),
+        ..Options::default()
+    };
+    let Written::Text(msl) = ir(&kernel).write(Language::Msl, &kernel, &options).unwrap() else {
+        panic!("MSL 3.2 can")
+    };
+    let pragmas = "#include <simd/simd.h>\n\n#pragma METAL fp math_mode(safe)\n#pragma METAL fp contract(off)\n";
+    assert!(msl.source.contains(pragmas), "{}", msl.source);
+    // Another kernel has none.
+    let bound = support::bound();
+    let Written::Text(msl) = ir(&bound).write(Language::Msl, &bound, &options).unwrap() else {
+        panic!("MSL 3.2 can")
+    };
+    assert!(!msl.source.contains("#pragma"), "{}", msl.source);
+}
+
+#[test]
+fn descriptions_without_the_attribute_are_read() {
+    let kernel = support::bound();
+    let mut json = serde_json::to_value(&kernel).unwrap();
+    assert!(json.get("exact").is_none(), "{json}");
+    assert_eq!(
+        serde_json::from_value::<Kernel>(json.clone()).unwrap(),
+        kernel
+    );
+    json["exact"] = true.into();
+    assert!(serde_json::from_value::<Kernel>(json).unwrap().exact);
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod support;
 
 use hankel_codegen::finish::{cost_after_optimisation, finish};
 use hankel_codegen::{Step, cost};
+use hankel_dsl::native::describe::Kernel;
 use rspirv::binary::Disassemble;
 
 fn disassembled(name: &str) -> String {
@@ -100,6 +101,36 @@ fn arithmetic_is_not_contracted() {
 }
 
 #[test]
+fn an_exact_kernel_forbids_contraction_for_good() {
+    let kernel = support::rounding();
+    let finished = finish(&support::spirv("rounding"), &kernel).unwrap();
+    let module = rspirv::dr::load_bytes(&finished.spirv).unwrap();
+    let text = module.disassemble();
+    // Five sums and differences for the error, a product, a sum; and nothing else is decorated.
+    assert_eq!(text.matches("NoContraction").count(), 8, "{text}");
+    for operation in module.functions[0].all_inst_iter() {
+        use rspirv::spirv::Op::{FAdd, FMul, FSub};
+        if matches!(operation.class.opcode, FAdd | FSub | FMul) {
+            let id = operation.result_id.unwrap();
+            assert!(
+                text.contains(&format!("OpDecorate %{id} NoContraction")),
+                "{text}"
+            );
+        }
+    }
+    // Without the attribute, nothing is.
+    let free = Kernel {
+        exact: false,
+        ..kernel
+    };
+    let finished = finish(&support::spirv("rounding"), &free).unwrap();
+    let text = rspirv::dr::load_bytes(&finished.spirv)
+        .unwrap()
+        .disassemble();
+    assert!(!text.contains("NoContraction"), "{text}");
+}
+
+#[test]
 fn names_are_those_of_the_source() {
     let text = disassembled("bound");
     for name in [
@@ -187,7 +218,7 @@ fn damaged_binaries_are_refused() {
 #[test]
 fn a_description_that_does_not_fit_is_refused() {
     let module = support::spirv("bound");
-    let refused = |change: &dyn Fn(&mut hankel_dsl::native::describe::Kernel)| {
+    let refused = |change: &dyn Fn(&mut Kernel)| {
         let mut kernel = support::bound();
         change(&mut kernel);
         let error = finish(&module, &kernel).unwrap_err();

@@ -661,6 +661,31 @@ fn bad_code_is_refused_with_the_kernels_name() {
     );
 }
 
+/// What naga writes lets a driver reorder.
+#[test]
+fn an_exact_kernel_runs_as_untouched_spirv_alone() {
+    let mut kernel = affine();
+    kernel.kernel.exact = true;
+    let mut gpu = vulkan();
+    let program = kernel.program(Way::Passthrough);
+    assert_eq!(affine_on(&mut gpu, &program, &[2.0, 4.0]), [1.475]);
+    for way in [Way::Naga, Way::Wgsl] {
+        let out = gpu.buffer("out", 4).unwrap();
+        let (settings, pairs) = (bytes(&[3.0f32, -0.1]), bytes(&[2.0f32, 4.0]));
+        let args = [
+            Bind::Bytes(&settings),
+            Bind::Bytes(&pairs),
+            Bind::Buffer(out),
+        ];
+        let error = gpu.dispatch(&kernel.program(way), &args).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("`affine`") && text.contains("only untouched SPIR-V"),
+            "{text}"
+        );
+    }
+}
+
 #[test]
 fn a_lost_device_says_so() {
     let mut gpu = vulkan();

@@ -25,9 +25,14 @@ pub fn run(args: &Eval, quiet: bool) -> Result<Outcome> {
         Backend::Vulkan => Some(session.words(&entry.kernel.name)?),
     };
     let mut device = open(backend)?;
+    let shader = |words| match entry.kernel.exact {
+        // naga would lose what forbids the driver to reorder.
+        true => Shader::SpirvPassthrough(words),
+        false => Shader::SpirvThroughNaga(words),
+    };
     let job = Job {
         entry,
-        shader: words.as_deref().map(Shader::SpirvThroughNaga),
+        shader: words.as_deref().map(shader),
         settings: &settings,
         input: &args.input,
         output: &args.output,

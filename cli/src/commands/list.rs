@@ -69,6 +69,9 @@ fn bindings(kernel: &Kernel) {
             if p == Precision::F32 { "f32" } else { "f64" }
         );
     }
+    if kernel.exact {
+        println!("    arithmetic as it is written: neither contracted nor reordered");
+    }
     for p in &kernel.params {
         let what = match &p.role {
             Role::Uniform { binding, layout } => {

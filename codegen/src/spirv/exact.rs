@@ -3,7 +3,8 @@
 //! spirv-opt rewrites `a * b + c` as `fma`, merges `(x / 2) * 3` into one operation, and turns
 //! `x - x` into zero: each rounds otherwise than the source. It leaves operations alone that are
 //! decorated `NoContraction`. So all are decorated while it runs, and the decoration is taken
-//! away afterwards: the driver is as free as it would be with text written by hand.
+//! away afterwards: the driver is as free as it would be with text written by hand. A kernel whose
+//! result depends on it (`exact`) keeps it, on arithmetic: [`keep`].
 //!
 //! That also keeps it from what *is* exact. [`fold`] does it instead: arithmetic on constants
 //! (correctly rounded here as on the native side) and operations that return their operand.
@@ -15,8 +16,13 @@ use rspirv::spirv::{Decoration, Op, Word};
 
 use super::{id, op};
 
-/// Operations that `NoContraction` may decorate.
+/// Operations that spirv-opt must leave alone.
 fn contracts(op: Op) -> bool {
+    arithmetic(op) || op == Op::ExtInst
+}
+
+/// Arithmetic, to which alone `NoContraction` means something.
+fn arithmetic(op: Op) -> bool {
     matches!(
         op,
         Op::FAdd
@@ -33,12 +39,21 @@ fn contracts(op: Op) -> bool {
             | Op::MatrixTimesMatrix
             | Op::OuterProduct
             | Op::Dot
-            | Op::ExtInst
     )
 }
 
 /// Decorates every floating-point operation.
 pub fn pin(module: &mut Module) {
+    decorate(module, contracts);
+}
+
+/// Decorates what a driver may not contract or reorder, and nothing else.
+pub fn keep(module: &mut Module) {
+    unpin(module);
+    decorate(module, arithmetic);
+}
+
+fn decorate(module: &mut Module, which: fn(Op) -> bool) {
     let decorated: std::collections::HashSet<Word> = module
         .annotations
         .iter()
@@ -49,7 +64,7 @@ pub fn pin(module: &mut Module) {
         .functions
         .iter()
         .flat_map(|function| function.all_inst_iter())
-        .filter(|instruction| contracts(op(instruction)))
+        .filter(|instruction| which(op(instruction)))
         .filter_map(|instruction| instruction.result_id)
         .filter(|result| !decorated.contains(result))
         .collect();
@@ -120,14 +135,14 @@ impl Float {
 
     fn binary(op: Op, a: Self, b: Self) -> Option<Self> {
         match (a, b) {
-            (Self::Single(a), Self::Single(b)) => arithmetic(op, a, b).map(Self::Single),
-            (Self::Double(a), Self::Double(b)) => arithmetic(op, a, b).map(Self::Double),
+            (Self::Single(a), Self::Single(b)) => computed(op, a, b).map(Self::Single),
+            (Self::Double(a), Self::Double(b)) => computed(op, a, b).map(Self::Double),
             _ => None,
         }
     }
 }
 
-fn arithmetic<T>(op: Op, a: T, b: T) -> Option<T>
+fn computed<T>(op: Op, a: T, b: T) -> Option<T>
 where
     T: std::ops::Add<Output = T>
         + std::ops::Sub<Output = T>

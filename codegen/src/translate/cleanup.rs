@@ -11,7 +11,8 @@
 //! - [`constant_indices`] makes `v[0]` with a constant index `v.x`;
 //! - [`drop_dead_locals`] drops variables that are only written;
 //! - [`drop_last_return`] drops the `return` at the end;
-//! - [`name_loads`] names what is loaded after the member or structure that it comes from.
+//! - [`name_loads`] names what is loaded after the member or structure that it comes from;
+//! - [`name_roundings`] names every result of arithmetic, where that must be computed as written.
 //!
 //! Each declines where it does not apply, and the validator has the last word: it runs after them,
 //! and where it rejects the result, the module stays as naga read it.
@@ -929,6 +930,44 @@ pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
         .named_expressions
         .extend(names);
 }
+
+/// Names every floating-point result that is rounded: the writers then give it a variable of its
+/// own, which a language can say things about. Other functions than the entry point too.
+pub fn name_roundings(module: &mut Module, info: &naga::valid::ModuleInfo) {
+    let types = &module.types;
+    let called = module
+        .functions
+        .iter_mut()
+        .map(|(handle, function)| (&info[handle], function));
+    let entries = module
+        .entry_points
+        .iter_mut()
+        .enumerate()
+        .map(|(index, entry)| (info.get_entry_point(index), &mut entry.function));
+    for (info, function) in called.chain(entries) {
+        let mut rounded = Vec::new();
+        each_statement(&function.body, &mut |statement| {
+            let Statement::Emit(range) = statement else {
+                return;
+            };
+            rounded.extend(range.clone().filter(|handle| {
+                let rounds = matches!(
+                    function.expressions[*handle],
+                    Expression::Binary { .. } | Expression::Math { .. }
+                );
+                let scalar = info[*handle].ty.inner_with(types).scalar();
+                rounds && scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float)
+            }));
+        });
+        for handle in rounded {
+            let name = function.named_expressions.entry(handle);
+            name.or_insert_with(|| ROUNDED.into());
+        }
+    }
+}
+
+/// What [`name_roundings`] calls them; the writers number them.
+pub const ROUNDED: &str = "rounded";
 
 fn texture_name(
     module: &Module,

@@ -11,6 +11,9 @@ use crate::Language;
 use crate::error::Failure;
 use crate::spirv::names::camel_case;
 
+/// What brings `precise` to GLSL ES before 3.20.
+const ES_PRECISE: &str = "GL_EXT_gpu_shader5";
+
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let (module, info) = job.frozen()?;
     let bound = job.bound();
@@ -70,6 +73,14 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         }
         Err(error) => return Err(job.failure(&error)),
     };
+    let mut source = job.precise(source, &["float", "double", "vec", "dvec", "mat", "dmat"])?;
+    let mut requires = Vec::new();
+    if job.kernel.exact && job.language == Language::Essl310 {
+        requires.push(ES_PRECISE.to_owned());
+        // After the first line, the version.
+        let line = format!("\n#extension {ES_PRECISE} : require\n");
+        source = source.replacen('\n', &line, 1);
+    }
     // Which samplers each texture is combined with; a map, so that the order is the bindings'.
     let of_handle = |handle| bound.iter().find(|it| it.handle == handle);
     let mut combined: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -119,7 +130,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         places,
         sizes_slot: None,
         sized: Vec::new(),
-        requires: Vec::new(),
+        requires,
     }))
 }
 

@@ -61,6 +61,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         message: "its declaration is not of the shape that is expected".into(),
         ..job.failure(&std::fmt::Error)
     })?;
+    let source = job.precise(source, &["float", "double"])?;
     let places = bound
         .iter()
         .map(|it| {

@@ -10,6 +10,8 @@
 //!   SPIR-V's implementations have checks of their own.
 //! - Specialisation constants stay overridable in SPIR-V and WGSL; the other writers cannot
 //!   express them and get the default, or the value that the options freeze.
+//! - Arithmetic of an exact kernel is neither contracted nor reordered. naga knows nothing of that:
+//!   in GLSL and HLSL each result gets a `precise` variable, MSL a pragma, and WGSL cannot say it.
 //! - What a language cannot express is [`Written::Unsupported`], with the reason; what goes wrong is an
 //!   error.
 
@@ -128,7 +130,7 @@ impl fmt::Display for ShaderModel {
 }
 
 /// Metal's language version.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MslVersion {
     /// Before the dot.
     pub major: u8,
@@ -275,7 +277,11 @@ impl Ir {
             clean: false,
         };
         // Where the clean-up does not apply, what naga read is still right.
-        Ok(raw.cleaned(kernel).unwrap_or(raw))
+        let mut ir = raw.cleaned(kernel).unwrap_or(raw);
+        if kernel.exact {
+            cleanup::name_roundings(&mut ir.module, &ir.info);
+        }
+        Ok(ir)
     }
 
     /// Whether the text will read as by hand: no private globals, no inner function, no blocks
@@ -333,7 +339,7 @@ impl Ir {
         kernel: &Kernel,
         options: &Options,
     ) -> Result<Written, Failure> {
-        if let Some(reason) = self.unsupported(language, &kernel.stage, options) {
+        if let Some(reason) = self.unsupported(language, kernel, options) {
             return Ok(Written::Unsupported(reason));
         }
         let job = Job {
@@ -362,7 +368,15 @@ impl Ir {
     }
 
     /// Why a language cannot express the kernel, where that can be told without trying.
-    fn unsupported(&self, language: Language, stage: &Stage, options: &Options) -> Option<String> {
+    fn unsupported(
+        &self,
+        language: Language,
+        kernel: &Kernel,
+        options: &Options,
+    ) -> Option<String> {
+        if let Some(reason) = inexact(language, options).filter(|_| kernel.exact) {
+            return Some(reason);
+        }
         let es = matches!(language, Language::Essl310 | Language::Essl300);
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
         if language == Language::Hlsl && old && self.has_wide(ScalarKind::Float) {
@@ -388,7 +402,7 @@ impl Ir {
             return Some(format!("{language} has no 64-bit integers"));
         }
         if language == Language::Essl300 {
-            if matches!(stage, Stage::Compute { .. }) {
+            if matches!(kernel.stage, Stage::Compute { .. }) {
                 return Some(format!("{language} has no compute shaders"));
             }
             if self
@@ -472,6 +486,25 @@ impl Ir {
         }) || functions.any(|function| function.expressions.iter().any(|(_, it)| literal(it)))
     }
 }
+
+/// Why arithmetic may be done otherwise than it is written, where a text cannot forbid it.
+fn inexact(language: Language, options: &Options) -> Option<String> {
+    let lacks = match language {
+        Language::Wgsl => "WGSL lets every implementation contract and reorder sums".into(),
+        Language::Msl if options.msl_version < EXACT_MSL => format!(
+            "MSL {} lets a compiler contract and reorder sums: `#pragma METAL fp` came with {EXACT_MSL}",
+            options.msl_version
+        ),
+        Language::Essl300 => "GLSL ES 3.00 has no `precise`".into(),
+        _ => return None,
+    };
+    Some(format!(
+        "{lacks}; the kernel is right only if it is computed as it is written"
+    ))
+}
+
+/// The first version of MSL that can forbid contraction and reordering.
+const EXACT_MSL: MslVersion = MslVersion { major: 3, minor: 2 };
 
 /// Formats of GLSL ES 3.10's images.
 fn in_es(format: StorageFormat) -> bool {
@@ -650,6 +683,40 @@ impl Job<'_> {
                 }
             }
         }
+    }
+
+    /// Makes arithmetic exact in GLSL and HLSL, if the kernel is: each of its results has a
+    /// variable ([`cleanup::name_roundings`]), which becomes `precise`.
+    fn precise(&self, source: String, scalars: &[&str]) -> Result<String, Failure> {
+        if !self.kernel.exact {
+            return Ok(source);
+        }
+        let functions = self.ir.module.functions.iter().map(|(_, it)| it);
+        let entries = self.ir.module.entry_points.iter().map(|it| &it.function);
+        let wanted: usize = functions
+            .chain(entries)
+            .flat_map(|function| function.named_expressions.values())
+            .filter(|name| *name == cleanup::ROUNDED)
+            .count();
+        let source = text::precise(&source, scalars);
+        let declared = source
+            .lines()
+            .filter(|line| {
+                let mut words = line.split_whitespace();
+                words.next() == Some("precise")
+                    && words
+                        .nth(1)
+                        .is_some_and(|name| name.starts_with(cleanup::ROUNDED))
+            })
+            .count();
+        if declared >= wanted {
+            return Ok(source);
+        }
+        Err(Failure {
+            construct: Some("arithmetic that must be `precise`".into()),
+            message: format!("{declared} of {wanted} results have a variable of their own"),
+            ..self.failure(&fmt::Error)
+        })
     }
 
     fn failure(&self, error: &dyn std::error::Error) -> Failure {

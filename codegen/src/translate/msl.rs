@@ -88,6 +88,15 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let source = source
         .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
         .replace(" - 0 - ", " - ");
+    let source = if job.kernel.exact {
+        exact(&source).ok_or_else(|| Failure {
+            construct: Some("`#include`".into()),
+            message: "the text has none, after which `#pragma` is expected".into(),
+            ..job.failure(&std::fmt::Error)
+        })?
+    } else {
+        source
+    };
     let sizes_slot = source
         .contains("_mslBufferSizes& ")
         .then_some(u32::from(buffers));
@@ -118,4 +127,13 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         },
         requires: Vec::new(),
     }))
+}
+
+/// Forbids contraction and reordering in all that follows the last header. `safe` by itself still
+/// lets a statement's product and sum become one operation.
+fn exact(source: &str) -> Option<String> {
+    const PRAGMAS: &str = "\n#pragma METAL fp math_mode(safe)\n#pragma METAL fp contract(off)\n";
+    let include = source.rfind("#include ")?;
+    let end = include + source[include..].find('\n')? + 1;
+    Some([&source[..end], PRAGMAS, &source[end..]].concat())
 }

@@ -30,6 +30,39 @@ pub fn has_name(text: &str, name: &str) -> bool {
     rename(text, name, "") != text
 }
 
+/// Puts `precise` before what functions declare of the types `scalars` and of the vectors and
+/// matrices that are named after those. Members of structures and parameters stay as they are:
+/// neither computes anything.
+pub fn precise(text: &str, scalars: &[&str]) -> String {
+    let is_float = |ty: &str| {
+        let stem = ty.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == 'x');
+        scalars.contains(&stem)
+    };
+    let mut marked = String::with_capacity(text.len() + text.len() / 8);
+    let mut in_function = false;
+    for line in text.lines() {
+        let statement = line.trim_start();
+        let indent = line.len() - statement.len();
+        if indent == 0 {
+            in_function = match statement {
+                "{" => true,
+                _ if statement.starts_with('}') => false,
+                _ => statement.ends_with(") {") || in_function,
+            };
+        }
+        let declares = statement
+            .split_once(' ')
+            .is_some_and(|(ty, rest)| is_float(ty) && rest.starts_with(is_name));
+        marked.push_str(&line[..indent]);
+        if in_function && indent > 0 && declares && statement.ends_with(';') {
+            marked.push_str("precise ");
+        }
+        marked.push_str(statement);
+        marked.push('\n');
+    }
+    marked
+}
+
 /// The last name before `mark`, on the same line: what `mark` annotates.
 pub fn name_before(text: &str, mark: &str) -> Option<String> {
     let place = text.find(mark)?;
@@ -56,6 +89,39 @@ mod tests {
         assert_eq!(rename("a ab a_ (a)a", "a", "x"), "x ab a_ (x)x");
         assert!(has_name("f(b)", "b"));
         assert!(!has_name("f(bc)", "b"));
+    }
+
+    #[test]
+    fn only_variables_of_functions_become_precise() {
+        let text = "\
+struct Pair {
+    float x;
+};
+cbuffer settings : register(b0) { Pair settings; }
+
+Pair make(float a) {
+    Pair ret = (Pair)0;
+    float2x2 m;
+    return ret;
+}
+
+[numthreads(64, 1, 1)]
+void main(uint3 id : SV_DispatchThreadID)
+{
+    uint n = 2;
+    if ((n < 2u)) {
+        float rounded = (a + b);
+        floating t = other;
+        double4 sum[2];
+        float(1.0);
+    }
+}
+";
+        let expected = text
+            .replace("    float2x2", "    precise float2x2")
+            .replace("    float rounded", "    precise float rounded")
+            .replace("    double4", "    precise double4");
+        assert_eq!(precise(text, &["float", "double"]), expected);
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub fn spirv(name: &str) -> Vec<u8> {
         "fullscreen" => include_str!("../fixtures/fullscreen.spvasm"),
         "tint" => include_str!("../fixtures/tint.spvasm"),
         "total" => include_str!("../fixtures/total.spvasm"),
+        "rounding" => include_str!("../fixtures/rounding.spvasm"),
         "wide_f64" => include_str!("../fixtures/wide.spvasm"),
         other => panic!("no fixture `{other}`"),
     })
@@ -42,6 +43,7 @@ pub fn all() -> Vec<Kernel> {
         total(),
         fullscreen(),
         tint(),
+        rounding(),
         wide(),
     ]
 }
@@ -62,6 +64,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
             absolute: 0.0,
             why: "only + - * / and sqrt".into(),
         },
+        exact: false,
     }
 }
 
@@ -279,6 +282,28 @@ pub fn tint() -> Kernel {
             ty: vector(4),
         }],
     )
+}
+
+/// Exact: right only if it is computed as it is written.
+pub fn rounding() -> Kernel {
+    let mut rounding = kernel(
+        "rounding",
+        compute([64, 1, 1], 1),
+        vec![param(
+            "input",
+            Role::Element {
+                binding: 0,
+                layout: floats("Pair", &["x", "w"]),
+            },
+        )],
+        vec![Output::Buffer {
+            binding: 1,
+            layout: floats("Pair", &["x", "w"]),
+            per_group: false,
+        }],
+    );
+    rounding.exact = true;
+    rounding
 }
 
 pub fn wide() -> Kernel {

@@ -199,6 +199,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
             absolute: 0.0,
             why: String::new(),
         },
+        exact: false,
     }
 }
 

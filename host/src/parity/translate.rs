@@ -1,5 +1,5 @@
 //! Through naga to SPIR-V, the way wgpu does it, but with the driver forbidden to fuse, factor or
-//! reorder float arithmetic. No language that naga writes can forbid that, and lavapipe does all
+//! reorder float arithmetic. What naga writes never forbids that, and lavapipe does all
 //! three; left to it, parity would measure the driver's liberties, not what naga made of the code.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -69,6 +69,7 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
             absolute: 0.0,
             why: "no rounding differs".into(),
         },
+        exact: false,
     }
 }
 

@@ -94,6 +94,7 @@ impl Kernel {
         let outputs = self.describe_outputs(variant);
         let tolerance = self.tolerance.of(variant);
         let (ulp, absolute, why) = (tolerance.ulp, tolerance.absolute, &tolerance.why);
+        let exact = self.exact;
         quote! {
             describe::Kernel {
                 name: #entry.into(),
@@ -110,6 +111,7 @@ impl Kernel {
                     absolute: #absolute,
                     why: #why.into(),
                 },
+                exact: #exact,
             }
         }
     }

@@ -24,6 +24,8 @@ pub struct Kernel {
     /// Entry points to make.
     pub variants: Vec<Variant>,
     pub tolerance: Tolerance,
+    /// Arithmetic is done as it is written.
+    pub exact: bool,
 }
 
 pub enum Stage {
@@ -186,6 +188,7 @@ impl Kernel {
             },
         };
         let variants = args.variants(&name, real.as_ref())?;
+        let exact = args.exact;
         let stage = args.into_stage(&params, &outputs, &name)?;
         let tolerance = stage.1;
         let kernel = Self {
@@ -198,6 +201,7 @@ impl Kernel {
             outputs,
             variants,
             tolerance,
+            exact,
         };
         kernel.check()?;
         Ok(kernel)
@@ -542,6 +546,7 @@ struct Args {
     phases: Option<u32>,
     per_group: bool,
     tolerance: Option<Tolerance>,
+    exact: bool,
 }
 
 impl Parse for Args {
@@ -554,6 +559,7 @@ impl Parse for Args {
                 "vertex" => args.stage = Some(Word::Vertex),
                 "fragment" => args.stage = Some(Word::Fragment),
                 "per_group" => args.per_group = true,
+                "exact" => args.exact = true,
                 "threads" => {
                     let threads = numbers(input)?;
                     let product: u64 = threads.iter().map(|t| u64::from(*t)).product();
@@ -598,7 +604,7 @@ impl Parse for Args {
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, phases, per_group or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, phases, per_group, exact or parity",
                     ));
                 }
             }

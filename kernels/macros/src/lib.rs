@@ -21,6 +21,7 @@ use syn::parse_macro_input;
 /// | `texture(FORMAT, …)` | the result is a texel; one entry point for each format |
 /// | `phases(N)` | workgroup memory: the function runs for phase 0 to N with barriers between |
 /// | `per_group` | the first invocation's result is the workgroup's output |
+/// | `exact` | the result is right only if sums and products are computed as they are written: the error of a rounding, for example. Languages that cannot forbid contraction and reordering do not get the kernel; the manifest says which |
 /// | `parity(ulp = N, absolute = X, why = "…")` | how far backends may differ; without it, not at all. `exact(FORMAT, …)` names formats that it does not concern |
 ///
 /// Each parameter says what it is bound to; bindings are numbered in order, the output last.

@@ -12,6 +12,7 @@ use hankel_dsl::{
 
 hankel_dsl::kernels![
     affine,
+    rounding,
     gather,
     histogram,
     scan,
@@ -54,6 +55,19 @@ pub fn affine<R: Real>(#[uniform] map: &Affine<R>, #[element] pair: Pair<R>) -> 
     Pair {
         x: x.sqrt() / (x + lit!(1.0)),
         w: pair.w.min(pair.w * lit!(0.5)).floor(),
+    }
+}
+
+/// The sum of the point and its weight as it is rounded, and what the rounding took off (TwoSum:
+/// Knuth, The Art of Computer Programming 2, section 4.2.2, theorem B). A compiler that reorders
+/// sums finds that nothing was.
+#[kernel(compute, threads(64), precision(f32, f64), exact)]
+pub fn rounding<R: Real>(#[element] pair: Pair<R>) -> Pair<R> {
+    let sum = pair.x + pair.w;
+    let weight = sum - pair.x;
+    Pair {
+        x: sum,
+        w: (pair.x - (sum - weight)) + (pair.w - weight),
     }
 }
 

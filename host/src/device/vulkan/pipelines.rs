@@ -119,6 +119,13 @@ impl VulkanDevice {
         if kernel.precision == Some(Precision::F64) && !self.has_f64() {
             return Err(self.missing("64-bit floats", kernel));
         }
+        if kernel.exact && !matches!(shader, Shader::SpirvPassthrough(_)) {
+            return Err(refused(
+                "its arithmetic must be done as it is written, which only untouched SPIR-V can \
+                 ask of a driver"
+                    .into(),
+            ));
+        }
         let constants = slots::constants(kernel, program.constants)?;
         let numbered: Vec<(u32, u32)> = kernel
             .params

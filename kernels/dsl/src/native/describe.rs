@@ -33,6 +33,10 @@ pub struct Kernel {
     pub outputs: Vec<Output>,
     /// How closely every backend must agree with the native scalar run.
     pub tolerance: Tolerance,
+    /// The result is right only if floating-point arithmetic is done as it is written: no compiler
+    /// may contract a product and a sum into one operation, or reorder sums.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub exact: bool,
 }
 
 /// A pipeline stage.
