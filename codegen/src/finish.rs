@@ -37,7 +37,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let name = kernel.name.as_str();
     let words = optimise(&spirv::words(raw, name)?, name)?;
     let mut module = spirv::load(&words, name)?;
-    if kernel.exact {
+    if kernel.exact || kernel.pinned {
         exact::keep(&mut module);
     }
     trim::debug(&mut module);

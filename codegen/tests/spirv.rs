@@ -121,6 +121,7 @@ fn an_exact_kernel_forbids_contraction_for_good() {
     // Without the attribute, nothing is.
     let free = Kernel {
         exact: false,
+        pinned: false,
         ..kernel
     };
     let finished = finish(&support::spirv("rounding"), &free).unwrap();

@@ -48,7 +48,7 @@ fn built_in_kernels_agree_everywhere() {
     for kernel in &report.kernels {
         for path in &kernel.paths {
             // WGSL has no f64, and cannot ask for arithmetic as it is written.
-            let beyond_wgsl = kernel.kernel.ends_with("_f64") || exact.contains(&kernel.kernel);
+            let beyond_wgsl = kernel.kernel.ends_with("_f64") || exact.contains(&&kernel.kernel);
             assert_eq!(
                 matches!(path.outcome, Outcome::Unavailable { .. }),
                 path.path == Path::Wgsl && beyond_wgsl,

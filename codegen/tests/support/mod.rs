@@ -65,6 +65,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
             why: "only + - * / and sqrt".into(),
         },
         exact: false,
+        pinned: false,
     }
 }
 

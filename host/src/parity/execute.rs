@@ -200,6 +200,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
             why: String::new(),
         },
         exact: false,
+        pinned: false,
     }
 }
 

@@ -70,6 +70,7 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
             why: "no rounding differs".into(),
         },
         exact: false,
+        pinned: false,
     }
 }
 

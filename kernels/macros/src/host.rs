@@ -94,7 +94,7 @@ impl Kernel {
         let outputs = self.describe_outputs(variant);
         let tolerance = self.tolerance.of(variant);
         let (ulp, absolute, why) = (tolerance.ulp, tolerance.absolute, &tolerance.why);
-        let exact = self.exact;
+        let (exact, pinned) = (self.exact, self.pinned);
         quote! {
             describe::Kernel {
                 name: #entry.into(),
@@ -112,6 +112,7 @@ impl Kernel {
                     why: #why.into(),
                 },
                 exact: #exact,
+                pinned: #pinned,
             }
         }
     }

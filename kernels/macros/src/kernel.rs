@@ -26,6 +26,8 @@ pub struct Kernel {
     pub tolerance: Tolerance,
     /// Arithmetic is done as it is written.
     pub exact: bool,
+    /// In SPIR-V it is.
+    pub pinned: bool,
 }
 
 pub enum Stage {
@@ -188,7 +190,7 @@ impl Kernel {
             },
         };
         let variants = args.variants(&name, real.as_ref())?;
-        let exact = args.exact;
+        let (exact, pinned) = (args.exact, args.pinned);
         let stage = args.into_stage(&params, &outputs, &name)?;
         let tolerance = stage.1;
         let kernel = Self {
@@ -202,6 +204,7 @@ impl Kernel {
             variants,
             tolerance,
             exact,
+            pinned,
         };
         kernel.check()?;
         Ok(kernel)
@@ -547,6 +550,7 @@ struct Args {
     per_group: bool,
     tolerance: Option<Tolerance>,
     exact: bool,
+    pinned: bool,
 }
 
 impl Parse for Args {
@@ -560,6 +564,7 @@ impl Parse for Args {
                 "fragment" => args.stage = Some(Word::Fragment),
                 "per_group" => args.per_group = true,
                 "exact" => args.exact = true,
+                "pinned" => args.pinned = true,
                 "threads" => {
                     let threads = numbers(input)?;
                     let product: u64 = threads.iter().map(|t| u64::from(*t)).product();
@@ -604,7 +609,7 @@ impl Parse for Args {
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, phases, per_group, exact or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, phases, per_group, exact, pinned or parity",
                     ));
                 }
             }

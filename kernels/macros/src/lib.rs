@@ -22,6 +22,7 @@ use syn::parse_macro_input;
 /// | `phases(N)` | workgroup memory: the function runs for phase 0 to N with barriers between |
 /// | `per_group` | the first invocation's result is the workgroup's output |
 /// | `exact` | the result is right only if sums and products are computed as they are written: the error of a rounding, for example. Languages that cannot forbid contraction and reordering do not get the kernel; the manifest says which |
+/// | `pinned` | SPIR-V asks for arithmetic as it is written, so that the bits are the same everywhere even where the result is ill-conditioned; languages that cannot ask for it get the kernel all the same |
 /// | `parity(ulp = N, absolute = X, why = "…")` | how far backends may differ; without it, not at all. `exact(FORMAT, …)` names formats that it does not concern |
 ///
 /// Each parameter says what it is bound to; bindings are numbered in order, the output last.

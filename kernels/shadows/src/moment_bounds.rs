@@ -89,7 +89,7 @@ macro_rules! order {
         }
 
         $(#[$bound_doc])*
-        #[kernel(compute, threads(64), precision(f32, f64))]
+        #[kernel(compute, threads(64), precision(f32, f64), pinned)]
         pub fn $bound<R: Real>(
             #[uniform] settings: &BoundSettings<R>,
             #[element] row: $Row<R>,
@@ -101,7 +101,16 @@ macro_rules! order {
         }
 
         $(#[$adjoint_doc])*
-        #[kernel(compute, threads(64), precision(f32, f64))]
+        #[kernel(
+            compute,
+            threads(64),
+            precision(f32, f64),
+            pinned,
+            parity(
+                absolute = 1e-12,
+                why = "factors of derivatives that are as good as 0 may underflow"
+            )
+        )]
         pub fn $adjoint<R: Real>(
             #[uniform] settings: &BoundSettings<R>,
             #[element] row: $AdjointRow<R>,
@@ -172,7 +181,7 @@ order! {
 
 /// Bound on the amount below a query point, from four power moments and their total, with the
 /// ill-conditioned part in about twice the digits.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(compute, threads(64), precision(f32, f64), pinned)]
 pub fn moment_bound_compensated_n2<R: Real>(
     #[uniform] settings: &BoundSettings<R>,
     #[element] row: Row2<R>,
@@ -185,7 +194,7 @@ pub fn moment_bound_compensated_n2<R: Real>(
 
 /// Bound on the amount below a query point, from six power moments and their total, with the
 /// ill-conditioned part in about twice the digits.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(compute, threads(64), precision(f32, f64), pinned)]
 pub fn moment_bound_compensated_n3<R: Real>(
     #[uniform] settings: &BoundSettings<R>,
     #[element] row: Row3<R>,

@@ -37,6 +37,10 @@ pub struct Kernel {
     /// may contract a product and a sum into one operation, or reorder sums.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
     pub exact: bool,
+    /// SPIR-V asks for arithmetic as it is written. Without it the result is as good, but other
+    /// bits: languages that cannot ask for it get the kernel all the same.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub pinned: bool,
 }
 
 /// A pipeline stage.
