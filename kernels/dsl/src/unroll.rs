@@ -41,6 +41,7 @@ macro_rules! unroll {
                 arithmetic_overflow,
                 unused_assignments,
                 clippy::out_of_bounds_indexing,
+                clippy::absurd_extreme_comparisons,
                 reason = "what is beyond the range is never reached, and after the last index \
                           nothing is read"
             )]

@@ -399,10 +399,11 @@ fn is_valid(n: usize, m: [f32; 11]) -> bool {
         if h[k][k] <= 1e-13 {
             return false;
         }
-        for i in k + 1..=n {
-            let factor = h[i][k] / h[k][k];
-            for j in k + 1..=n {
-                h[i][j] -= factor * h[k][j];
+        let (above, below) = h.split_at_mut(k + 1);
+        for row in below {
+            let factor = row[k] / above[k][k];
+            for (x, pivot) in row.iter_mut().zip(&above[k]).skip(k + 1) {
+                *x -= factor * pivot;
             }
         }
     }

@@ -67,7 +67,7 @@ pub fn mix_bias_adjoint<R: Real, const N: usize>(
     let strength = strength.saturate();
     let one: R = lit!(1.0);
     unroll!(k in 1..(2 * N + 1), max 11, {
-        d[0] = d[0] + strength * (target[k] * d[k]);
+        d[0] += strength * (target[k] * d[k]);
         d[k] = (one - strength) * d[k];
     });
     d
@@ -140,7 +140,7 @@ fn squared<R: Real, const N: usize>(p: &[R; MAX + 1]) -> [R; MAX_MOMENTS] {
     let mut square = [zero; MAX_MOMENTS];
     unroll!(i in 0..(N + 1), max 6, {
         unroll!(j in 0..(N + 1), max 6, {
-            square[i + j] = square[i + j] + p[i] * p[j];
+            square[i + j] += p[i] * p[j];
         });
     });
     square
@@ -226,7 +226,7 @@ fn single<R: Real, const N: usize>(rest: &Monic<R>, v: R) -> [R; MAX_MOMENTS] {
     let per_value = inverse(value);
     let mut power = one;
     unroll!(k in 1..N, max 6, {
-        power = power * v;
+        power *= v;
     });
     // 1 / rest at the root: all its roots are on the other side, so it is between 0 and 1.
     let share = (power * per_value).clamp(zero, one);
@@ -239,7 +239,7 @@ fn single<R: Real, const N: usize>(rest: &Monic<R>, v: R) -> [R; MAX_MOMENTS] {
     unroll!(i in 1..(2 * N + 1), max 11, {
         q[i] = constant * square[i - 1];
         if const { i > 1 } {
-            q[i] = q[i] + linear * square[i - 2];
+            q[i] += linear * square[i - 2];
         }
     });
     q
@@ -312,7 +312,7 @@ fn double<R: Real, const N: usize>(rest: &Monic<R>, v1: R, v2: R) -> [R; MAX_MOM
     unroll!(i in 0..4, max 6, {
         unroll!(j in 0..10, max 11, {
             if const { i + j < 2 * N } {
-                q[i + j + 1] = q[i + j + 1] + cubic[i] * square[j];
+                q[i + j + 1] += cubic[i] * square[j];
             }
         });
     });

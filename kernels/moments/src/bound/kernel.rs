@@ -72,11 +72,11 @@ impl<R: Real> Kernel<R> {
         let turned = below.gt(count * lit!(0.5));
         let sign = R::select(turned, -one, one);
         unroll!(k in 0..N, max 6, {
-            a[k] = a[k] * sign;
+            a[k] *= sign;
         });
         unroll!(k in 0..(N + 1), max 6, {
             if const { k % 2 == 1 } {
-                y[k] = y[k] * sign;
+                y[k] *= sign;
             }
         });
         let few = R::select(turned, count - below, below);
@@ -112,13 +112,13 @@ impl<R: Real> Kernel<R> {
                 if const { i <= k + 1 } {
                     let mut t = zero;
                     if const { i <= k } {
-                        t = t - a[k] * p[i];
+                        t -= a[k] * p[i];
                     }
-                    if const { k > 0 && i + 1 <= k } {
-                        t = t - b[k] * before[i];
+                    if const { k > 0 && i < k } {
+                        t -= b[k] * before[i];
                     }
                     if const { i > 0 } {
-                        t = t + p[i - 1];
+                        t += p[i - 1];
                     }
                     next[i] = t;
                 }
@@ -170,8 +170,8 @@ impl<R: Real> Kernel<R> {
         });
         let mut power = t;
         unroll!(k in 0..N, max 6, {
-            z[N - 1 - k] = z[N - 1 - k] * power;
-            power = power * t;
+            z[N - 1 - k] *= power;
+            power *= t;
         });
         z
     }
@@ -293,7 +293,7 @@ fn reversed<R: Real, const N: usize>(kernel: &[R; MAX + 1]) -> (Monic<R>, R) {
     let mut power = per_reach;
     unroll!(i in 1..(N + 1), max 6, {
         e[i] = (ratio(kernel[i]) * power).clamp(-largest, largest);
-        power = power * per_reach;
+        power *= per_reach;
     });
     (e, reach)
 }

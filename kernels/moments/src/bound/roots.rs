@@ -157,7 +157,7 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
                     let mut ratio = one;
                     unroll!(j in 0..5, max 6, {
                         if const { j < i } {
-                            ratio = ratio * (whole::<R>(d - j) / whole::<R>(DEGREE - j));
+                            ratio *= whole::<R>(d - j) / whole::<R>(DEGREE - j);
                         }
                     });
                     derivative[i] = e[i] * ratio;
