@@ -8,8 +8,12 @@ use hankel_host::device::DeviceError;
 use hankel_host::eval::EvalError;
 use hankel_host::frame::FrameError;
 use hankel_host::scene::SceneError;
+use hankel_numerics::accuracy::AccuracyError;
+use hankel_numerics::biases::BiasError;
+use hankel_numerics::judge::{JudgeError, TableError};
 use hankel_numerics::report::ReportError;
 use hankel_numerics::speed::SpeedError;
+use hankel_numerics::stress::StressError;
 use miette::Diagnostic;
 
 /// How a command that ran to its end ends.
@@ -202,5 +206,52 @@ impl From<SpeedError> for Failure {
 impl From<ReportError> for Failure {
     fn from(error: ReportError) -> Self {
         Self::new(Blame::Machine, &error, None)
+    }
+}
+
+/// A kernel that does not run is its own fault; the rest is that of the arguments or the machine.
+fn blame_of_stress(error: &StressError) -> Blame {
+    match error {
+        StressError::Family { .. } | StressError::Order(_) | StressError::Samples(_) => {
+            Blame::Input
+        }
+        StressError::Kernel { .. } | StressError::Backend { .. } => Blame::Kernel,
+        StressError::Peer(_) => Blame::Machine,
+    }
+}
+
+impl From<StressError> for Failure {
+    fn from(error: StressError) -> Self {
+        Self::new(blame_of_stress(&error), &error, None)
+    }
+}
+
+impl From<AccuracyError> for Failure {
+    fn from(error: AccuracyError) -> Self {
+        let blame = match &error {
+            AccuracyError::Order(_) | AccuracyError::Samples(_) => Blame::Input,
+            AccuracyError::Family(_) | AccuracyError::NoKernel { .. } => Blame::Kernel,
+            AccuracyError::Kernel(error) => blame_of_stress(error),
+            AccuracyError::Peer(_) => Blame::Machine,
+        };
+        Self::new(blame, &error, None)
+    }
+}
+
+impl From<BiasError> for Failure {
+    fn from(error: BiasError) -> Self {
+        Self::new(Blame::Input, &error, None)
+    }
+}
+
+impl From<JudgeError> for Failure {
+    fn from(error: JudgeError) -> Self {
+        Self::new(Blame::Input, &error, None)
+    }
+}
+
+impl From<TableError> for Failure {
+    fn from(error: TableError) -> Self {
+        Self::new(Blame::Input, &error, None)
     }
 }

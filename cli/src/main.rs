@@ -27,8 +27,10 @@ fn main() -> ExitCode {
         Command::New(a) => commands::new::run(&a, quiet),
         Command::Parity(a) => commands::parity::run(&a, quiet),
         Command::Eval(a) => commands::eval::run(&a, quiet),
+        Command::Judge(a) => commands::judge::run(&a, quiet),
         Command::Render(a) => commands::render::run(&a, quiet),
         Command::Bench(a) => commands::bench::run(&a, quiet),
+        Command::Stress(a) => commands::stress::run(&a, quiet),
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
         Command::Completions(a) => commands::completions::run(&a),
     };

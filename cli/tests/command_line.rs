@@ -96,6 +96,7 @@ fn help_has_examples_and_exit_codes() {
         "new",
         "parity",
         "eval",
+        "judge",
         "render",
         "toolchain install",
     ] {
@@ -326,6 +327,53 @@ fn eval_explains_bad_tables_and_writes_nothing() {
     assert!(!desk.path("out.csv").exists());
     desk.hankel("eval vsm --input good.csv --output out.csv")
         .code(0);
+}
+
+/// Half of the depths at 0.2, half at 0.8, known by two moments.
+#[test]
+fn a_linear_programme_judges_a_table() {
+    let desk = Desk::new();
+    desk.write("rows.csv", "m0,m1,m2,z\n1,0.5,0.34,0.9\n2,1,0.68,0.9\n");
+    let out = desk
+        .hankel("judge --functions z,z^2 --range line --input rows.csv --output out.csv")
+        .code(0)
+        .out();
+    assert!(out.contains("2 rows"), "{out}");
+    let text = fs::read_to_string(desk.path("out.csv")).expect("it was written");
+    let lower: Vec<f64> = text
+        .lines()
+        .skip(1)
+        .filter_map(|l| l.split(',').next()?.parse().ok())
+        .collect();
+    assert_eq!(text.lines().next(), Some("lower,upper,margin"));
+    assert!(
+        (lower[0] - 0.64).abs() < 1e-9 && (lower[1] - 1.28).abs() < 1e-9,
+        "{text}"
+    );
+    desk.hankel("judge --functions z,z^2 --range -1,1 --input rows.csv --output out.csv")
+        .code(0);
+    desk.write("bad.csv", "m0,m1,m2,z\n1,0.5,0.34,0.9\n1,0.5,0.2,0.9\n");
+    for (line, words) in [
+        (
+            "--functions z,z^2 --input bad.csv",
+            &["row 2", "no distribution", "away"][..],
+        ),
+        ("--functions z,z^99 --input rows.csv", &["z^99", "z^16"]),
+        (
+            "--functions z,z^2 --range 1,0 --input rows.csv",
+            &["1 to 0"],
+        ),
+        (
+            "--functions z,z^2 --range 1 --input rows.csv",
+            &["--range 1", "line"],
+        ),
+        ("--functions z --input rows.csv", &["m2"]),
+        ("--functions z,z^2 --input nowhere.csv", &["nowhere.csv"]),
+    ] {
+        desk.hankel(&format!("judge {line} --output new.csv"))
+            .fails(2, words);
+        assert!(!desk.path("new.csv").exists(), "{line}");
+    }
 }
 
 #[test]

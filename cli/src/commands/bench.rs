@@ -4,6 +4,7 @@ use hankel_codegen::Language;
 use hankel_codegen::build::generate;
 use hankel_codegen::lint::Construct;
 use hankel_codegen::translate::Options;
+use hankel_numerics::accuracy::table_1;
 use hankel_numerics::peer::default_python;
 use hankel_numerics::report::{Column, Table};
 use hankel_numerics::speed::{self, Program};
@@ -60,8 +61,17 @@ fn bounds(args: &BenchBounds, quiet: bool) -> Result<Outcome> {
     let progress = Progress::new(quiet || args.format == Format::Json);
     progress.begin("Measuring bounds");
     let speed = speed::measure(&options, &mut |step| progress.detail(step))?;
+    let accuracy = table_1::Options {
+        orders: options.orders.clone(),
+        samples: options.rows as u64,
+        seed: options.seed,
+        python: options.python.clone(),
+        ..table_1::Options::default()
+    };
+    let accuracy = table_1::measure(&accuracy, &mut |step| progress.detail(step))?;
     drop(progress);
     let mut report = speed.report(&command_line());
+    report.append(accuracy.report(&command_line()));
     match instructions(quiet) {
         Ok(table) => report.tables.push(table),
         Err(failure) => report.notes.push(format!(

@@ -5,10 +5,12 @@ pub mod build;
 pub mod check;
 pub mod completions;
 pub mod eval;
+pub mod judge;
 pub mod list;
 pub mod new;
 pub mod parity;
 pub mod render;
+pub mod stress;
 pub mod toolchain;
 
 use serde::Serialize;

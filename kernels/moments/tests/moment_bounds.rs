@@ -1,6 +1,7 @@
 //! The bounds for one to five pairs of power moments and a free total, against what must always
 //! hold.
 
+#[allow(dead_code, reason = "other tests use the rest of it")]
 mod common;
 
 use common::Distribution;

@@ -10,7 +10,7 @@
 //! Rounding alone can take moments out of the set that distributions have; [`validity`] says of
 //! each rounded row whether it did.
 
-mod draw;
+pub(crate) mod draw;
 mod make;
 mod precision;
 mod validity;
@@ -71,7 +71,7 @@ pub(crate) enum Depths {
 
 impl Depths {
     /// The nearest and the farthest.
-    const fn ends(self) -> (f64, f64) {
+    pub(crate) const fn ends(self) -> (f64, f64) {
         match self {
             Self::Unit => (0.0, 1.0),
             Self::Symmetric => (-1.0, 1.0),

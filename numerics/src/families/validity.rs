@@ -29,7 +29,7 @@ impl Validity {
 /// first pivot on that is not positive, pivots mean nothing.
 #[must_use]
 pub fn pivots<R: Real>(n: usize, m: &[R; 11]) -> ([R; 6], [R; 6]) {
-    let zero = m[0] - m[0];
+    let zero: R = hankel_dsl::lit!(0.0);
     let size = n + 1;
     let mut a = [[zero; 6]; 6];
     for (i, row) in a.iter_mut().enumerate().take(size) {
@@ -47,13 +47,13 @@ pub fn pivots<R: Real>(n: usize, m: &[R; 11]) -> ([R; 6], [R; 6]) {
         for i in k + 1..size {
             let factor = a[i][k] / a[k][k];
             let pivot_row = a[k];
-            for j in i..size {
-                let taken = factor * pivot_row[j];
-                a[i][j] -= taken;
+            for (x, pivot) in a[i].iter_mut().zip(pivot_row).take(size).skip(i) {
+                *x -= factor * pivot;
             }
             // The lower triangle is not kept up.
-            for j in i..size {
-                a[j][i] = a[i][j];
+            let row = a[i];
+            for (below, x) in a.iter_mut().zip(row).take(size).skip(i) {
+                below[i] = x;
             }
         }
     }

@@ -1,7 +1,5 @@
 //! Distributions of depths, and what is true of them by definition.
 
-#![allow(dead_code, reason = "each test uses a part of it")]
-
 use hankel_moments::Moments4;
 use proptest::prelude::*;
 

@@ -1,0 +1,270 @@
+//! What the bounds should be.
+
+use hankel_dsl::Real;
+use hankel_moments::{Bounds, Canonical, Gradient, bound, bound_adjoint, canonical};
+use serde::{Deserialize, Serialize};
+
+use crate::families::{Format, Row, Validity, scaled, validity};
+use crate::judge::{DepthFunction, Judge, Range};
+use crate::numbers::{DoubleDouble, Dual, Wide};
+
+/// Below this share of digits that elimination leaves, double-double has too few of its own.
+const NEEDS_WIDE: f64 = 1e-24;
+
+/// Picks the instance for an order.
+macro_rules! by_order {
+    ($n:expr, $function:ident::<$R:ty>($($argument:expr),*)) => {
+        match $n {
+            1 => $function::<$R, 1>($($argument),*),
+            2 => $function::<$R, 2>($($argument),*),
+            3 => $function::<$R, 3>($($argument),*),
+            4 => $function::<$R, 4>($($argument),*),
+            _ => $function::<$R, 5>($($argument),*),
+        }
+    };
+}
+
+/// [`bound`] of an order.
+#[inline(never)]
+pub fn bounds_of<R: Real>(n: usize, m: [R; 11], eta: R) -> Bounds<R> {
+    by_order!(n, bound::<R>(m, eta))
+}
+
+/// [`canonical`] of an order.
+#[inline(never)]
+pub fn canonical_of<R: Real>(n: usize, m: [R; 11], eta: R) -> Canonical<R> {
+    by_order!(n, canonical::<R>(m, eta))
+}
+
+/// [`bound_adjoint`] of an order.
+#[inline(never)]
+pub fn gradient_of<R: Real>(n: usize, m: [R; 11], eta: R, overestimation: R) -> Gradient<R> {
+    let one = R::literal::<{ 1.0_f64.to_bits() }>();
+    by_order!(n, bound_adjoint::<R>(m, eta, overestimation, one))
+}
+
+/// The derivatives of the lower bound, one direction after the other.
+#[must_use]
+pub fn gradient_by_duals(n: usize, m: [DoubleDouble; 11], eta: DoubleDouble) -> Gradient<f64> {
+    let directional = |direction: usize| {
+        let mut duals = m.map(Dual::constant);
+        let mut query = Dual::constant(eta);
+        match duals.get_mut(direction) {
+            Some(moment) if direction <= 2 * n => *moment = Dual::variable(m[direction]),
+            _ => query = Dual::variable(eta),
+        }
+        f64::from(bounds_of(n, duals, query).lower.derivative)
+    };
+    let mut gradient = Gradient {
+        m: [0.0; 11],
+        eta: directional(11),
+    };
+    for k in 0..=2 * n {
+        gradient.m[k] = directional(k);
+    }
+    gradient
+}
+
+/// A row's exact bounds, as shares of the total.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// Lower and upper.
+    pub shares: [DoubleDouble; 2],
+    /// Binary exponent of the power of two that the moments were multiplied by.
+    exponent: i32,
+    mass: f64,
+}
+
+impl Truth {
+    /// How far a computed bound is from it, as a share of the total: the larger error of the two.
+    /// What is not a number is wrong by 1.
+    #[must_use]
+    pub fn error(&self, bounds: [f64; 2]) -> f64 {
+        let mut worst = 0.0_f64;
+        for (bound, share) in bounds.iter().zip(self.shares) {
+            let e = self.exponent;
+            let scaled = bound * 2.0_f64.powi(-e / 2) * 2.0_f64.powi(-e + e / 2);
+            let error = DoubleDouble::from(scaled) / DoubleDouble::from(self.mass) - share;
+            let error = f64::from(error).abs();
+            worst = worst.max(if error.is_finite() { error } else { 1.0 });
+        }
+        worst
+    }
+}
+
+/// What is known of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Judgement {
+    /// Whether its moments are those of a distribution that is not degenerate.
+    pub validity: Validity,
+    /// Its bounds, if they are.
+    pub truth: Option<Truth>,
+}
+
+/// Judges a row by its own numbers.
+#[must_use]
+pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
+    let nothing = Judgement {
+        validity: Validity::Not,
+        truth: None,
+    };
+    let Some((row, exponent)) = scaled(&row.map(T::widen)) else {
+        return nothing;
+    };
+    let validity = validity(n, &row);
+    let Validity::Definite(left) = validity else {
+        return Judgement {
+            validity,
+            ..nothing
+        };
+    };
+    let mass = row.m[0];
+    let shares = if left < NEEDS_WIDE {
+        shares_wide(n, &row)
+    } else {
+        let mass = DoubleDouble::from(mass);
+        let m = row.m.map(DoubleDouble::from);
+        let bounds = bounds_of(n, m, DoubleDouble::from(row.eta));
+        [bounds.lower / mass, bounds.upper / mass]
+    };
+    Judgement {
+        validity,
+        truth: Some(Truth {
+            shares,
+            exponent,
+            mass,
+        }),
+    }
+}
+
+fn shares_wide(n: usize, row: &Row<f64>) -> [DoubleDouble; 2] {
+    let m = row.m.map(Wide::from);
+    let bounds = bounds_of(n, m, Wide::from(row.eta));
+    [bounds.lower, bounds.upper].map(|b| DoubleDouble::from(b / m[0]))
+}
+
+/// How well the reference agrees with itself in 300 bits, and with the linear programme.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Agreement {
+    /// Rows compared with 300 bits.
+    pub wide_rows: u64,
+    /// The largest difference, as a share of the total.
+    pub wide_difference: f64,
+    /// Rows that differ by more than a sixteenth of the measured precision's rounding error.
+    pub wide_beyond: u64,
+    /// Rows compared with the linear programme.
+    pub programme_rows: u64,
+    /// The largest difference.
+    pub programme_difference: f64,
+    /// Rows that differ by more than the programme's own margin.
+    pub programme_beyond: u64,
+    /// Rows that the programme could not judge: its arithmetic is `f64`.
+    pub programme_failed: u64,
+}
+
+impl Agreement {
+    /// Both together.
+    pub fn add(&mut self, other: Self) {
+        self.wide_rows += other.wide_rows;
+        self.wide_difference = self.wide_difference.max(other.wide_difference);
+        self.wide_beyond += other.wide_beyond;
+        self.programme_rows += other.programme_rows;
+        self.programme_difference = self.programme_difference.max(other.programme_difference);
+        self.programme_beyond += other.programme_beyond;
+        self.programme_failed += other.programme_failed;
+    }
+
+    /// Compares a row's reference with 300 bits.
+    pub fn check_wide<T: Format>(&mut self, n: usize, row: &Row<T>, truth: &Truth) {
+        let Some((row, _)) = scaled(&row.map(T::widen)) else {
+            return;
+        };
+        let difference = shares_wide(n, &row)
+            .iter()
+            .zip(truth.shares)
+            .map(|(&a, b)| f64::from(a - b).abs())
+            .fold(0.0, f64::max);
+        self.wide_rows += 1;
+        self.wide_difference = self.wide_difference.max(difference);
+        // The first comparison fails for what is no number.
+        let within = difference <= T::epsilon().widen() / 16.0;
+        self.wide_beyond += u64::from(!within);
+    }
+
+    /// Compares a row's reference with the linear programme.
+    pub fn check_programme<T: Format>(&mut self, n: usize, row: &Row<T>, truth: &Truth) {
+        let Some((row, _)) = scaled(&row.map(T::widen)) else {
+            return;
+        };
+        let judge = DepthFunction::powers(2 * n).and_then(|f| Judge::new(&f, Range::Line));
+        let judged = judge.and_then(|judge| judge.bounds(&row.m[..=2 * n], row.eta));
+        let Ok(judged) = judged else {
+            self.programme_failed += 1;
+            return;
+        };
+        if judged.sensitivity > crate::judge::SENSITIVITY_LIMIT {
+            self.programme_failed += 1;
+            return;
+        }
+        let difference = [judged.lower, judged.upper]
+            .iter()
+            .zip(truth.shares)
+            .map(|(&a, b)| (a / row.m[0] - f64::from(b)).abs())
+            .fold(0.0, f64::max);
+        self.programme_rows += 1;
+        self.programme_difference = self.programme_difference.max(difference);
+        let within = difference <= judged.margin / row.m[0];
+        self.programme_beyond += u64::from(!within);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::Family;
+
+    #[test]
+    fn derivatives_agree_by_two_roads() {
+        let family = Family::named("paper").unwrap();
+        for n in 1..=5 {
+            for index in 0..20 {
+                let row: Row<f64> = family.row(n, 7, index);
+                let m = row.m.map(DoubleDouble::from);
+                let eta = DoubleDouble::from(row.eta);
+                let adjoint = gradient_of(n, m, eta, DoubleDouble::from(0.0));
+                let duals = gradient_by_duals(n, m, eta);
+                for k in 0..=2 * n {
+                    let (a, b) = (f64::from(adjoint.m[k]), duals.m[k]);
+                    assert!(
+                        (a - b).abs() <= 1e-12 * b.abs().max(1.0),
+                        "n = {n}: {a} {b}"
+                    );
+                }
+                let (a, b) = (f64::from(adjoint.eta), duals.eta);
+                assert!(
+                    (a - b).abs() <= 1e-12 * b.abs().max(1.0),
+                    "n = {n}: {a} {b}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn errors_are_shares_of_the_total_at_any_scale() {
+        // One point at 0 and one at 1, a little blurred: at 1/2, half is below.
+        for mass in [1.0, 1e-30, 1e30, 2.0_f64.powi(-1060)] {
+            let mut row = Row {
+                eta: 0.5,
+                ..Row::<f64>::default()
+            };
+            row.m[..3].copy_from_slice(&[mass, 0.5 * mass, 0.75 * mass]);
+            let judged = judgement(1, &row);
+            let truth = judged.truth.unwrap();
+            let exact = truth.shares.map(f64::from);
+            assert!((truth.error([exact[0] * mass, exact[1] * mass])) < 1e-3);
+            let off = truth.error([(exact[0] + 0.25) * mass, exact[1] * mass]);
+            assert!((off - 0.25).abs() < 1e-3, "{mass}: {off}");
+            assert_eq!(truth.error([f64::NAN, 0.0]), 1.0);
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! Every family through every kernel, and faults that are planted to be found.
+
+use hankel_dsl::native::describe::Kernel;
+use hankel_numerics::accuracy::{singularities, table_1};
+use hankel_numerics::families::{FAMILIES, Family, Precision, Row, scaled, validity};
+use hankel_numerics::numbers::DoubleDouble;
+use hankel_numerics::stress::{
+    Backend, BackendError, Cell, Native, Options, Solver, Stress, StressError, run,
+};
+
+fn options(families: &[&str], samples: u64) -> Options {
+    let names: Vec<String> = families.iter().map(|f| (*f).to_owned()).collect();
+    Options {
+        families: Options::families_named(&names).unwrap(),
+        samples,
+        wide_checks: 2,
+        programme_checks: 1,
+        ..Options::default()
+    }
+}
+
+fn native(options: &Options) -> Stress {
+    run(
+        options,
+        &mut [&mut Native::scalar(), &mut Native::lanes()],
+        &mut |_| (),
+    )
+    .unwrap()
+}
+
+#[test]
+fn no_family_makes_a_kernel_fail() {
+    let stress = native(&options(&[], 200));
+    let mut seen = 0;
+    for c in &stress.cells {
+        let key = (&c.family, c.n, c.precision, c.solver, &c.backend);
+        assert_eq!(
+            (c.non_finite, c.out_of_range, c.other_bits.unwrap_or(0)),
+            (0, 0, 0),
+            "{key:?}"
+        );
+        assert_eq!(c.undecided, 0, "{key:?}");
+        seen += usize::from(c.backend == "native" && c.solver == Solver::Plain);
+    }
+    assert!(stress.passed());
+    let expected: usize = FAMILIES
+        .iter()
+        .map(|f| 2 * (1..=5).filter(|n| f.has(*n)).count())
+        .sum();
+    assert_eq!(seen, expected);
+    for (family, agreement) in &stress.agreement {
+        // The reference itself is confirmed.
+        assert_eq!(agreement.wide_beyond, 0, "{family}");
+        if !matches!(family.as_str(), "not-finite" | "all-equal" | "one-texel") {
+            assert!(agreement.wide_rows > 0, "{family}");
+        }
+    }
+    let report = stress.report("hankel stress").to_string();
+    assert!(report.contains("silhouettes"), "{report}");
+}
+
+#[test]
+fn errors_of_easy_rows_are_rounding_errors() {
+    let stress = native(&options(&["paper", "generic-symmetric"], 500));
+    for c in stress.cells.iter().filter(|c| c.n <= 2) {
+        let epsilon = match c.precision {
+            Precision::F32 => f64::from(f32::EPSILON),
+            Precision::F64 => f64::EPSILON,
+        };
+        let error = c.error.unwrap();
+        assert!(error.median < epsilon, "{c:?}");
+        assert!(error.median <= error.ninety && error.ninety <= error.ninety_nine);
+        assert!(error.ninety_nine <= error.greatest);
+    }
+}
+
+#[test]
+fn compensation_gains_ten_times_where_digits_cancel() {
+    let mut options = options(&["silhouettes", "self"], 1000);
+    options.orders = vec![2, 3];
+    options.precisions = vec![Precision::F32];
+    let stress = native(&options);
+    for plain in &stress.cells {
+        if (plain.solver, plain.backend.as_str()) != (Solver::Plain, "native") {
+            continue;
+        }
+        let same = |c: &&Cell| {
+            c.solver == Solver::Compensated && (&c.family, c.n) == (&plain.family, plain.n)
+        };
+        let compensated = stress.cells.iter().find(same).unwrap();
+        let (a, b) = (plain.error.unwrap(), compensated.error.unwrap());
+        assert!(b.ninety * 10.0 <= a.ninety, "{plain:?} {compensated:?}");
+    }
+}
+
+/// What is done to the results of a backend.
+struct Faulty<F> {
+    inner: Native,
+    fault: F,
+}
+
+impl<F: FnMut(&Kernel, &mut [f32])> Backend for Faulty<F> {
+    fn name(&self) -> String {
+        self.inner.name()
+    }
+
+    fn run(
+        &mut self,
+        kernel: &Kernel,
+        uniform: &[u8],
+        elements: &[u8],
+        output: usize,
+    ) -> Result<Vec<u8>, BackendError> {
+        let written = self.inner.run(kernel, uniform, elements, output)?;
+        let mut numbers: Vec<f32> = written
+            .as_chunks()
+            .0
+            .iter()
+            .map(|b| f32::from_ne_bytes(*b))
+            .collect();
+        (self.fault)(kernel, &mut numbers);
+        Ok(numbers.iter().flat_map(|x| x.to_ne_bytes()).collect())
+    }
+}
+
+/// The plain solver's cell in `f32` for n = 2 with a fault.
+fn with(fault: impl FnMut(&Kernel, &mut [f32])) -> (Cell, bool) {
+    let mut options = options(&["generic-symmetric"], 100);
+    options.orders = vec![2];
+    options.precisions = vec![Precision::F32];
+    let mut faulty = Faulty {
+        inner: Native::scalar(),
+        fault,
+    };
+    let stress = run(&options, &mut [&mut faulty], &mut |_| ()).unwrap();
+    let plain = |c: &&Cell| c.solver == Solver::Plain;
+    let cell = stress.cells.iter().find(plain).unwrap().clone();
+    (cell, stress.passed())
+}
+
+#[test]
+fn planted_faults_are_found() {
+    let (sound, passed) = with(|_, _| ());
+    assert!(passed);
+    assert_eq!((sound.non_finite, sound.out_of_range), (0, 0));
+
+    let (cell, passed) = with(|_, x| x[3] = f32::NAN);
+    assert_eq!((cell.non_finite, cell.out_of_range), (1, 0));
+    assert!(!passed);
+    assert_eq!(cell.error.unwrap().greatest, 1.0);
+    assert_eq!(cell.worst, Some(3));
+
+    let (cell, passed) = with(|_, x| x[5] = f32::INFINITY);
+    assert_eq!((cell.non_finite, passed), (1, false));
+
+    // The smallest step outside of the range.
+    let (cell, passed) = with(|_, x| x[7] = 1.0_f32.next_up());
+    assert_eq!((cell.non_finite, cell.out_of_range), (0, 1));
+    assert!(!passed);
+    let (cell, passed) = with(|_, x| x[7] = -f32::from_bits(1));
+    assert_eq!((cell.out_of_range, passed), (1, false));
+
+    // Both bounds off by a thousandth: in range mostly, but wrong.
+    let (cell, _) = with(|_, x| x.iter_mut().for_each(|x| *x = (*x + 1e-3).min(1.0)));
+    let error = cell.error.unwrap();
+    assert!((error.median - 1e-3).abs() < 1e-5, "{error:?}");
+}
+
+#[test]
+fn other_bits_on_lanes_are_found() {
+    let mut options = options(&["generic-symmetric"], 100);
+    options.orders = vec![1];
+    options.precisions = vec![Precision::F32];
+    let mut lanes = Faulty {
+        inner: Native::lanes(),
+        fault: |_: &Kernel, x: &mut [f32]| x[9] = x[9].next_up().min(1.0),
+    };
+    let mut scalar = Native::scalar();
+    let stress = run(&options, &mut [&mut scalar, &mut lanes], &mut |_| ()).unwrap();
+    let cell = stress.cells.iter().find(|c| c.backend == "lanes").unwrap();
+    assert_eq!(cell.other_bits, Some(1));
+    assert!(!stress.passed());
+}
+
+/// Runs nothing.
+struct Unable(BackendError);
+
+impl Backend for Unable {
+    fn name(&self) -> String {
+        "nowhere".into()
+    }
+
+    fn run(&mut self, _: &Kernel, _: &[u8], _: &[u8], _: usize) -> Result<Vec<u8>, BackendError> {
+        Err(self.0.clone())
+    }
+}
+
+#[test]
+fn what_a_backend_lacks_is_noted_and_what_fails_is_an_error() {
+    let mut options = options(&["one-texel"], 16);
+    options.orders = vec![1];
+    let mut lacks = Unable(BackendError::Lacks("no such numbers".into()));
+    let mut scalar = Native::scalar();
+    let stress = run(&options, &mut [&mut scalar, &mut lacks], &mut |_| ()).unwrap();
+    assert!(stress.notes.iter().any(|n| n.contains("no such numbers")));
+    assert!(stress.cells.iter().all(|c| c.backend == "native"));
+
+    let mut fails = Unable(BackendError::Failed("gone".into()));
+    let error = run(&options, &mut [&mut fails], &mut |_| ()).unwrap_err();
+    assert!(error.to_string().contains("on nowhere: gone"), "{error}");
+}
+
+#[test]
+fn options_out_of_range_are_refused() {
+    let error = Options::families_named(&["nosuch".into()]).unwrap_err();
+    assert!(error.to_string().contains("silhouettes-biased"), "{error}");
+    let refuse = |options: &Options| run(options, &mut [], &mut |_| ()).unwrap_err();
+    let mut wrong = options(&["paper"], 100);
+    wrong.orders = vec![6];
+    assert!(matches!(refuse(&wrong), StressError::Order(6)));
+    let few = options(&["paper"], 3);
+    assert!(matches!(refuse(&few), StressError::Samples(3)));
+}
+
+#[test]
+fn rows_are_the_same_every_time_and_in_both_precisions() {
+    for family in FAMILIES {
+        for n in (1..=5).filter(|n| family.has(*n)) {
+            for index in 0..20 {
+                let row: Row<f64> = family.row(n, 1, index);
+                let again: Row<f64> = family.row(n, 1, index);
+                let bits = |r: &Row<f64>| r.columns(n).map(f64::to_bits).collect::<Vec<_>>();
+                assert_eq!(bits(&row), bits(&again), "{family}");
+                assert_ne!(bits(&row), bits(&family.row(n, 2, index)), "{family}");
+                assert!(row.m[2 * n + 1..].iter().all(|m| *m == 0.0), "{family}");
+            }
+        }
+    }
+    for name in ["paper", "silhouettes", "self-biased", "generic-mass"] {
+        let family = Family::named(name).unwrap();
+        for index in 0..100 {
+            let double: Row<f64> = family.row(3, 1, index);
+            let single: Row<f32> = family.row(3, 1, index);
+            assert_eq!(double.map(|x| x as f32), single, "{name}");
+        }
+    }
+}
+
+#[test]
+fn families_are_what_they_say() {
+    let share = |name: &str, n: usize| {
+        let family = Family::named(name).unwrap();
+        let valid = (0..500).filter(|&index| {
+            let row: Row<f64> = family.row(n, 1, index);
+            scaled(&row).is_some_and(|(row, _)| validity(n, &row).is_definite())
+        });
+        valid.count()
+    };
+    for n in 1..=5 {
+        assert_eq!(share("paper", n), 500);
+        assert_eq!(share("not-finite", n), 0);
+        assert_eq!(share("silhouettes-biased", n), 500);
+        assert_eq!(share("degenerate-biased", n), 500);
+        // Rounding alone decides about degenerate rows.
+        assert!(share("degenerate", n) < 400);
+        assert!(share("impossible", n) < 200);
+    }
+    let mass =
+        |name: &str, index: u64| -> Row<f32> { Family::named(name).unwrap().row(2, 1, index) };
+    for index in 0..100 {
+        assert_eq!(mass("mass-1e30", index).m[0], 1e30);
+        assert_eq!(mass("mass-1e-30", index).m[0], 1e-30);
+        assert!(mass("denormal", index).m[0] < f32::MIN_POSITIVE);
+        let row = mass("not-finite", index);
+        assert!(row.columns(2).any(|x| !x.is_finite()));
+        let spread = mass("self", index);
+        let variance = spread.m[2] - spread.m[1] * spread.m[1];
+        assert!(variance < 3e-2 * 3e-2, "{spread:?}");
+        assert!(f64::from(spread.eta - spread.m[1]).abs() <= 3e-2);
+        // One texel: each moment is the one before times the depth.
+        let one = Family::named("one-texel").unwrap().row::<f64>(2, 1, index);
+        let z = one.m[1];
+        assert!((one.m[4] - z.powi(4)).abs() <= 4.0 * f64::EPSILON);
+    }
+}
+
+#[test]
+fn nothing_is_undefined_at_singularities() {
+    let options = singularities::Options {
+        samples: 40,
+        ..singularities::Options::default()
+    };
+    let found = singularities::measure(&options, &mut |_| ()).unwrap();
+    assert!(found.passed());
+    assert_eq!(found.lines.len(), 10);
+    for line in &found.lines {
+        assert!(line.queries >= line.n as u64 * 17 * 30, "{line:?}");
+        // The bound is continuous there, and as exact as anywhere.
+        if line.precision == Precision::F64 {
+            assert!(line.bound.error.ninety_nine < 1e-9, "{line:?}");
+            assert!(line.bound.limit.ninety < 1e-4, "{line:?}");
+        }
+    }
+    let mut broken = found;
+    broken.lines[0].non_finite_gradients = 1;
+    assert!(!broken.passed());
+}
+
+#[test]
+fn reproduction_and_derivatives_are_as_the_paper_has_them() {
+    let options = table_1::Options {
+        samples: 4000,
+        ..table_1::Options::default()
+    };
+    let table = table_1::measure(&options, &mut |_| ()).unwrap();
+    assert_eq!(table.lines.len(), 10);
+    for line in &table.lines {
+        let published = table_1::PUBLISHED[line.n - 1];
+        assert_eq!(line.non_finite, 0);
+        assert!(line.rows + line.near + line.singular == 4000);
+        assert!(line.rows > 3000, "{line:?}");
+        let reproduction = match line.precision {
+            Precision::F32 => published.reproduction_f32,
+            Precision::F64 => Some(published.reproduction_f64),
+        };
+        // A few rows make up most of the mean, so that it scatters.
+        if let Some(published) = reproduction {
+            assert!(line.reproduction <= 1.5 * published, "{line:?}");
+        }
+        if line.precision == Precision::F64 {
+            assert!(line.d_moments <= published.d_moments, "{line:?}");
+            assert!(line.d_eta <= published.d_eta, "{line:?}");
+        }
+    }
+    for (n, rows, difference) in table.duals {
+        assert!(rows > 0 && difference < 1e-9, "n = {n}: {difference:e}");
+    }
+    let report = table_1::measure(&options, &mut |_| ()).unwrap().report("x");
+    assert!(report.table("table-1").is_some());
+}
+
+#[test]
+fn the_reference_is_what_it_is_called() {
+    // A bound in double-double is far more exact than f64: both ends of a known distribution.
+    let third = DoubleDouble::from(1.0) / DoubleDouble::from(3.0);
+    let mut m = [DoubleDouble::from(0.0); 11];
+    for (j, m) in m.iter_mut().enumerate().take(5) {
+        // Equal weights at -1, 0 and 1.
+        *m = match j {
+            0 => DoubleDouble::from(1.0),
+            j if j % 2 == 0 => third + third,
+            _ => DoubleDouble::from(0.0),
+        };
+    }
+    let bounds = hankel_numerics::stress::bounds_of(2, m, DoubleDouble::from(0.0));
+    let lower = f64::from(bounds.lower - third).abs();
+    let upper = f64::from(bounds.upper - third - third).abs();
+    assert!(lower < 1e-28 && upper < 1e-28, "{lower:e} {upper:e}");
+}
