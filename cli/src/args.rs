@@ -380,7 +380,7 @@ pub struct Stress {
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub family: Vec<String>,
     /// Rows of each family, order and precision; moment vectors for --singularities; regions for
-    /// each strength for --biases [default: 4000; 400; 4000000].
+    /// each strength for --biases [default: 10000; 400; 4000000].
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(16..))]
     pub samples: Option<u64>,
     /// Only this precision.

@@ -407,26 +407,32 @@ impl Format {
                 6 => bound::<f32, 3>(m, query),
                 _ => bound::<f32, 4>(m, query),
             }),
-            (Criterion::Listing, _) => {
-                // Its own bias is that for [0, 1]; here it is mixed in already.
-                let biases = Biases {
-                    moment_bias: 0.0,
-                    depth_bias: 0.0,
-                };
-                let receiver = Receiver {
-                    moments: Moments4 {
-                        b1: m[1],
-                        b2: m[2],
-                        b3: m[3],
-                        b4: m[4],
-                    },
-                    depth: query,
-                };
-                let shadow = f64::from(hamburger_listing(&biases, receiver).shadow);
-                let within = shadow <= region.below + slack;
-                !within
-            }
+            (Criterion::Listing, _) => beyond(listed(&m, query)),
         }
+    }
+}
+
+/// Both bounds by the published code, which has the lower one: the upper one is that of the mirrored
+/// depths, turned over.
+fn listed(m: &[f32; 11], query: f32) -> Bounds<f32> {
+    // Its own bias is that for [0, 1]; here one is mixed in already.
+    let biases = Biases {
+        moment_bias: 0.0,
+        depth_bias: 0.0,
+    };
+    let lower = |side: f32| {
+        let moments = Moments4 {
+            b1: side * m[1],
+            b2: m[2],
+            b3: side * m[3],
+            b4: m[4],
+        };
+        let depth = side * query;
+        hamburger_listing(&biases, Receiver { moments, depth }).shadow
+    };
+    Bounds {
+        lower: lower(1.0),
+        upper: 1.0 - lower(-1.0),
     }
 }
 

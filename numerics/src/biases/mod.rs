@@ -96,7 +96,7 @@ pub enum Criterion {
     Definite,
     /// The robust solver's bounds must contain the truth.
     Robust,
-    /// The published code's lower bound must be below the truth; four power moments.
+    /// The published code's bounds must contain the truth; four power moments.
     Listing,
 }
 

@@ -115,10 +115,40 @@ pub fn validity(n: usize, row: &Row<f64>) -> Validity {
         shares[k] = f64::from(pivots_wide[k]) / f64::from(diagonal[k]);
     }
     // An exact zero on the way makes all that follows undefined: singular, so not definite.
-    if shares[..=n].contains(&0.0) {
+    if shares[..=n].contains(&0.0) || is_singular(n, row, &pivots_wide) {
         return Validity::Not;
     }
     decide(n, shares, 2.0_f64.powi(-300))
+}
+
+/// Whether a leading minor is so small that it must be 0: all moments are whole multiples of one
+/// power of two, so that a minor is one of that power's.
+fn is_singular(n: usize, row: &Row<f64>, pivots: &[Wide; 6]) -> bool {
+    let nonzero = row.m[..=2 * n].iter().filter(|m| **m != 0.0);
+    let Some(unit) = nonzero.map(|m| last_place(*m)).reduce(f64::min) else {
+        return true;
+    };
+    let (unit, half) = (Wide::from(unit), Wide::from(0.5));
+    let mut minor = Wide::from(1.0);
+    let mut least = Wide::from(1.0);
+    pivots[..=n].iter().any(|pivot| {
+        minor *= *pivot;
+        least *= unit;
+        minor.abs().lt(least * half)
+    })
+}
+
+/// The power of two that the last set bit of a number stands for.
+fn last_place(x: f64) -> f64 {
+    let (bits, exponent) = (x.to_bits(), (x.to_bits() >> 52) & 0x7ff);
+    let fraction = bits & ((1 << 52) - 1);
+    let whole = if exponent == 0 {
+        fraction
+    } else {
+        fraction | 1 << 52
+    };
+    let place = exponent.max(1) as i32 - 1075 + whole.trailing_zeros() as i32;
+    2.0_f64.powi(place / 2) * 2.0_f64.powi(place - place / 2)
 }
 
 #[cfg(test)]
@@ -152,6 +182,21 @@ mod tests {
             panic!("it is positive definite");
         };
         assert!((left / tiny - 1.0).abs() < 1e-9, "{left}");
+    }
+
+    #[test]
+    fn a_singular_matrix_is_one_to_the_last_bit() {
+        // Points at 1/2 and 3/4, weights 1/3 and 2/3 of 3: elimination divides by 3, and by 24.
+        let moments: Vec<f64> = (0..7)
+            .map(|j| 0.5_f64.powi(j) + 2.0 * 0.75_f64.powi(j))
+            .collect();
+        assert_eq!(validity(3, &row(&moments)), Validity::Not);
+        assert!(validity(1, &row(&moments)).is_definite());
+        for (x, place) in [(1.0, 1.0), (0.75, 0.25), (-6.0, 2.0), (1e-310, 0.0)] {
+            let found = last_place(x);
+            assert!(place == 0.0 || found == place, "{x}: {found}");
+            assert!(x % found == 0.0 && x % (2.0 * found) != 0.0, "{x}: {found}");
+        }
     }
 
     #[test]

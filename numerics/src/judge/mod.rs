@@ -240,8 +240,8 @@ impl Judge {
         })
     }
 
-    /// Solves the programme no more than `rounds` times; the paper's evaluation has 3. The
-    /// [`margin`](Judged::margin) tells what is lost.
+    /// Solves each programme no more than `rounds` times, where the paper's evaluation does so
+    /// three times. The [`margin`](Judged::margin) tells what is lost.
     #[must_use]
     pub fn rounds(self, rounds: usize) -> Self {
         Self { rounds, ..self }
@@ -261,7 +261,7 @@ impl Judge {
         Ok(Judged {
             lower: (below.value * total).clamp(0.0, mass),
             upper: (mass - above.value * total).clamp(0.0, mass),
-            margin: below.margin.max(above.margin) * total + 2.0 * f64::EPSILON * mass,
+            margin: (below.margin.max(above.margin) * total + 2.0 * f64::EPSILON * mass).min(mass),
             residual: below.residual.max(above.residual),
             sensitivity: below.sensitivity.max(above.sensitivity),
             lower_support: below.points(&instance),
@@ -275,7 +275,7 @@ impl Judge {
         let below = self.least(&instance, query, Side::Below)?;
         let total = instance.total;
         let value = (below.value * total).clamp(0.0, moments[0]);
-        Ok((value, below.margin * total))
+        Ok((value, (below.margin * total).min(moments[0])))
     }
 
     /// Moments and query in the programme's terms.

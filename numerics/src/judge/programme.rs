@@ -152,7 +152,10 @@ pub fn least(
         }
         let is_finer = programme.refine(&atoms, &peaks);
         if is_bounded && programme.price < SENSITIVITY_LIMIT {
-            if round < rounds {
+            if round == rounds.max(1) {
+                // The price has decided, not the moments: nothing is known of the exact bound.
+                best.iter_mut().for_each(|b| b.margin = f64::INFINITY);
+            } else {
                 // Another programme, with which this solution does not compare.
                 programme.price *= FIRST_PRICE;
                 (best, stalled) = (None, 0);

@@ -259,8 +259,15 @@ impl System {
                 let mean = shares[1].high();
                 let central = moved(&shares, mean.into(), 1.0.into());
                 let variance = central[2].high();
-                // Moments of a single depth, or of none: any unit will do.
-                let deviation = if variance > 0.0 { variance.sqrt() } else { 1.0 };
+                // No unit in which rounding of a moment exceeds the distribution's own.
+                let central_errors = moved_errors(&errors, mean, 1.0);
+                let rounded = (2..).zip(&central_errors[2..]);
+                let deviation = rounded
+                    .map(|(k, e)| 2.0 * e.powf(1.0 / f64::from(k)))
+                    .fold(variance.max(0.0).sqrt(), f64::max);
+                // A single depth at 0 has none, and moments of no distribution have any.
+                let is_possible = deviation > 0.0 && variance >= -central_errors[2];
+                let deviation = if is_possible { deviation } else { 1.0 };
                 let powers = moved(&shares, mean.into(), deviation.into());
                 let errors = moved_errors(&errors, mean, deviation);
                 // (1 + tan²)ⁿ exp(i j t) = (1 + i tan)ⁿ⁺ʲ (1 - i tan)ⁿ⁻ʲ

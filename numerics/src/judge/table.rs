@@ -184,7 +184,7 @@ fn places(
         places.push(place);
     }
     if let Some(missing) = (0..names.len()).find(|p| !places.contains(p)) {
-        return Err(bad(format!("column {} is missing", names[missing])));
+        return Err(bad(format!("column `{}` is missing", names[missing])));
     }
     Ok(places)
 }

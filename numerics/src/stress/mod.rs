@@ -99,7 +99,7 @@ impl Default for Options {
             families: FAMILIES.iter().collect(),
             orders: ORDERS.collect(),
             precisions: vec![Precision::F32, Precision::F64],
-            samples: 4000,
+            samples: 10_000,
             wide_checks: 8,
             programme_checks: 2,
             seed: 1,
