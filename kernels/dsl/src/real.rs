@@ -53,6 +53,10 @@ pub trait Real:
     /// The result of a comparison.
     type Mask: Mask;
 
+    /// Whether exponents reach as far as those of `f64`, to 1e±300 and beyond; else as far as those
+    /// of `f32`, to 1e±37. Literals must stay within.
+    const IS_WIDE: bool;
+
     /// The number whose `f64` has the bits `BITS`, rounded to this type. Write [`lit!`](crate::lit).
     fn literal<const BITS: u64>() -> Self;
     /// The distance from 1 to the next larger number.
@@ -408,6 +412,7 @@ macro_rules! scalar {
     ($($float:ident),*) => {$(
         impl Real for $float {
             type Mask = bool;
+            const IS_WIDE: bool = $float::MAX_EXP > f32::MAX_EXP;
 
             #[inline(always)]
             #[allow(clippy::cast_possible_truncation, reason = "rounding is what a literal does")]

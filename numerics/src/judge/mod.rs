@@ -197,9 +197,9 @@ pub struct Judged {
     /// The greatest weight at or below `z`, from 0 to m0. Never below the exact one but by
     /// rounding.
     pub upper: f64,
-    /// The exact bounds are within this of the given ones, in the unit of m0, while
-    /// [`sensitivity`](Self::sensitivity) is below [`SENSITIVITY_LIMIT`]. Rounding of the given
-    /// moments to `f64` is counted in.
+    /// The exact bounds are within this of the given ones, in the unit of m0; m0 itself where
+    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`]. Rounding of the
+    /// given moments to `f64` is counted in.
     pub margin: f64,
     /// How far the moments of the supports are from the given ones, beyond rounding: the larger sum
     /// of distances of the two, in an orthogonal basis, relative to the total weight.

@@ -152,10 +152,7 @@ pub fn least(
         }
         let is_finer = programme.refine(&atoms, &peaks);
         if is_bounded && programme.price < SENSITIVITY_LIMIT {
-            if round == rounds.max(1) {
-                // The price has decided, not the moments: nothing is known of the exact bound.
-                best.iter_mut().for_each(|b| b.margin = f64::INFINITY);
-            } else {
+            if round < rounds {
                 // Another programme, with which this solution does not compare.
                 programme.price *= FIRST_PRICE;
                 (best, stalled) = (None, 0);
@@ -163,6 +160,12 @@ pub fn least(
         } else if before.min(worst) <= TOLERANCE || stalled >= STALLED || !is_finer {
             break;
         }
+    }
+    // Prices that have decided, not the moments, leave the exact bound unknown.
+    if let Some(best) = &mut best
+        && best.sensitivity > 0.5 * programme.price
+    {
+        best.margin = f64::INFINITY;
     }
     best.ok_or(JudgeError::Solver {
         status: "its solution is not finite".into(),

@@ -103,6 +103,7 @@ remaining_operators!([R: Real] Dual<R>);
 
 impl<R: Real> Real for Dual<R> {
     type Mask = R::Mask;
+    const IS_WIDE: bool = R::IS_WIDE;
 
     #[inline(always)]
     fn literal<const BITS: u64>() -> Self {

@@ -265,6 +265,7 @@ remaining_operators!([] Interval);
 
 impl Real for Interval {
     type Mask = Undecided;
+    const IS_WIDE: bool = true;
 
     #[inline(always)]
     fn literal<const BITS: u64>() -> Self {

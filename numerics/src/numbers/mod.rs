@@ -55,6 +55,7 @@ macro_rules! remaining_operators {
 macro_rules! ordered {
     () => {
         type Mask = bool;
+        const IS_WIDE: bool = true;
 
         #[inline(always)]
         fn min(self, other: Self) -> Self {

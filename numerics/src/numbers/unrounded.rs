@@ -75,6 +75,7 @@ remaining_operators!([P: Copy, R: Real] Unrounded<P, R>);
 
 impl<P: Real + Into<f64>, R: Real + From<f64>> Real for Unrounded<P, R> {
     type Mask = R::Mask;
+    const IS_WIDE: bool = P::IS_WIDE;
 
     #[inline(always)]
     fn literal<const BITS: u64>() -> Self {

@@ -19,6 +19,9 @@ pub struct Table {
     /// Whether it is too long for a terminal: files have it nevertheless.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_detail: bool,
+    /// How many of its rows a terminal gets, from the first: files have all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shown: Option<usize>,
 }
 
 /// A column of a table.
@@ -241,6 +244,7 @@ impl Table {
             columns: columns.into_iter().collect(),
             rows: Vec::new(),
             is_detail: false,
+            shown: None,
         }
     }
 
@@ -313,10 +317,15 @@ impl fmt::Display for Table {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }
-        for row in self.spelled() {
+        let shown = self.shown.unwrap_or(usize::MAX);
+        for row in self.spelled().take(shown) {
             table.add_row(row);
         }
         writeln!(f, "{}", self.caption)?;
-        writeln!(f, "{table}")
+        writeln!(f, "{table}")?;
+        match self.rows.len().saturating_sub(shown) {
+            0 => Ok(()),
+            more => writeln!(f, "and {more} more rows (`--out` writes all)"),
+        }
     }
 }

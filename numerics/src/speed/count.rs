@@ -382,6 +382,7 @@ assign!(AddAssign add_assign +, SubAssign sub_assign -, MulAssign mul_assign *);
 
 impl<P: Format> Real for Counted<P> {
     type Mask = CountedMask;
+    const IS_WIDE: bool = P::IS_WIDE;
 
     fn literal<const BITS: u64>() -> Self {
         Self::fixed(P::literal::<BITS>())

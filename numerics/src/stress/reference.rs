@@ -11,6 +11,9 @@ use crate::numbers::{DoubleDouble, Dual, Wide};
 /// Below this share of digits that elimination leaves, double-double has too few of its own.
 const NEEDS_WIDE: f64 = 1e-24;
 
+/// The margin up to which the linear programme's judgement counts, as a share of the total.
+const RESOLVED: f64 = 1e-3;
+
 /// Picks the instance for an order.
 macro_rules! by_order {
     ($n:expr, $function:ident::<$R:ty>($($argument:expr),*)) => {
@@ -158,8 +161,8 @@ pub struct Agreement {
     pub programme_difference: f64,
     /// Rows that differ by more than the programme's own margin.
     pub programme_beyond: u64,
-    /// Rows that the programme could not judge: its arithmetic is `f64`.
-    pub programme_failed: u64,
+    /// Rows that the programme could not judge to 1e-3 of the total: its arithmetic is `f64`.
+    pub programme_unresolved: u64,
 }
 
 impl Agreement {
@@ -171,7 +174,7 @@ impl Agreement {
         self.programme_rows += other.programme_rows;
         self.programme_difference = self.programme_difference.max(other.programme_difference);
         self.programme_beyond += other.programme_beyond;
-        self.programme_failed += other.programme_failed;
+        self.programme_unresolved += other.programme_unresolved;
     }
 
     /// Compares a row's reference with 300 bits.
@@ -198,14 +201,13 @@ impl Agreement {
         };
         let judge = DepthFunction::powers(2 * n).and_then(|f| Judge::new(&f, Range::Line));
         let judged = judge.and_then(|judge| judge.bounds(&row.m[..=2 * n], row.eta));
-        let Ok(judged) = judged else {
-            self.programme_failed += 1;
-            return;
+        let judged = match judged {
+            Ok(judged) if judged.margin <= RESOLVED * row.m[0] => judged,
+            _ => {
+                self.programme_unresolved += 1;
+                return;
+            }
         };
-        if judged.sensitivity > crate::judge::SENSITIVITY_LIMIT {
-            self.programme_failed += 1;
-            return;
-        }
         let difference = [judged.lower, judged.upper]
             .iter()
             .zip(truth.shares)

@@ -1,7 +1,7 @@
 //! The figures as a report.
 
 use super::{Agreement, Cell, Solver, Stress};
-use crate::families::{Family, Precision};
+use crate::families::{Family, ORDERS, Precision};
 use crate::report::{Axis, Column, Plot, Report, Series, Style, Table};
 
 impl Stress {
@@ -20,6 +20,7 @@ impl Stress {
         }
         report.notes.extend(self.notes.iter().cloned());
         report.tables.push(self.totals());
+        report.tables.push(self.overview());
         report.tables.push(self.errors());
         if self.peer.is_some() {
             report.tables.push(self.against());
@@ -90,6 +91,47 @@ impl Stress {
         table
     }
 
+    /// The 90 % errors of what is run first, a line for each family and precision.
+    fn overview(&self) -> Table {
+        let solvers = ORDERS
+            .map(|n| (Solver::Plain, n))
+            .chain([2, 3].map(|n| (Solver::Compensated, n)));
+        let columns: Vec<(Solver, usize)> = solvers
+            .filter(|&(solver, n)| self.cells.iter().any(|c| (c.solver, c.n) == (solver, n)))
+            .collect();
+        let headings = columns.iter().map(|(solver, n)| {
+            Column::number(match solver {
+                Solver::Compensated => format!("n = {n}, compensated"),
+                _ => format!("n = {n}"),
+            })
+        });
+        let mut table = Table::new(
+            "overview",
+            "90 % errors of valid rows as shares of m_0 (nothing: too few valid rows, or another \
+             number of moments)",
+            [Column::text("family"), Column::text("precision")]
+                .into_iter()
+                .chain(headings),
+        );
+        for precision in [Precision::F32, Precision::F64] {
+            for (family, _) in &self.agreement {
+                let mut row: Vec<crate::report::Cell> =
+                    vec![family.as_str().into(), precision.to_string().into()];
+                for &(solver, n) in &columns {
+                    let cell = self.cells.iter().find(|c| {
+                        (c.family.as_str(), c.precision) == (family, precision)
+                            && (c.solver, c.n) == (solver, n)
+                    });
+                    row.push(cell.and_then(|c| c.error).map(|e| e.ninety).into());
+                }
+                if row[2..].iter().any(|c| *c != crate::report::Cell::Empty) {
+                    table.push(row);
+                }
+            }
+        }
+        table
+    }
+
     /// Every cell.
     fn errors(&self) -> Table {
         let mut table = Table::new(
@@ -138,7 +180,7 @@ impl Stress {
         table
     }
 
-    /// Quotients of quantiles with `diffmoments`, cells where it is better first.
+    /// Quotients of quantiles with `diffmoments`, cells where that is better first.
     fn against(&self) -> Table {
         let mut table = Table::new(
             "against-diffmoments",
@@ -200,7 +242,7 @@ impl Stress {
         }
         rows.sort_by(|a, b| b.0.total_cmp(&a.0));
         table.rows = rows.into_iter().map(|r| r.1).collect();
-        table.is_detail = table.rows.len() > 60;
+        table.shown = Some(20);
         table
     }
 
@@ -246,6 +288,7 @@ impl Stress {
                 (plain.ninety / own.ninety).into(),
             ]);
         }
+        table.is_detail = table.rows.len() > 60;
         table
     }
 
@@ -255,7 +298,7 @@ impl Stress {
             "reference",
             "The reference beside 300 bits (beyond: off by more than a sixteenth of the measured \
              precision's rounding error) and beside the linear programme (beyond: by more than its \
-             own margin; failed: too ill-conditioned for its f64)",
+             own margin; unresolved: too ill-conditioned for its f64)",
             [
                 Column::text("family"),
                 Column::count("300 bits: rows"),
@@ -264,7 +307,7 @@ impl Stress {
                 Column::count("programme: rows"),
                 Column::number("largest difference"),
                 Column::count("beyond"),
-                Column::count("failed"),
+                Column::count("unresolved"),
             ],
         );
         for (family, a) in &self.agreement {
@@ -275,7 +318,7 @@ impl Stress {
                 programme_rows,
                 programme_difference,
                 programme_beyond,
-                programme_failed,
+                programme_unresolved,
             } = *a;
             table.push([
                 family.as_str().into(),
@@ -285,7 +328,7 @@ impl Stress {
                 programme_rows.into(),
                 (programme_rows > 0).then_some(programme_difference).into(),
                 programme_beyond.into(),
-                programme_failed.into(),
+                programme_unresolved.into(),
             ]);
         }
         table

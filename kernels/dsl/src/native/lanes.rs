@@ -186,6 +186,7 @@ macro_rules! lanes {
 
         impl<S: Simd> Real for $name<S> {
             type Mask = $mask_name<S>;
+            const IS_WIDE: bool = <$float as Real>::IS_WIDE;
 
             #[inline(always)]
             fn literal<const BITS: u64>() -> Self {

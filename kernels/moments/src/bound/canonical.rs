@@ -3,7 +3,7 @@
 use hankel_dsl::{Real, lit, unroll};
 
 use super::kernel::Kernel;
-use super::recurrence::Recurrence;
+use super::recurrence::{Recurrence, finite};
 use super::roots::all;
 use super::twofold::{Arithmetic, Plain, Twofold};
 use super::{MAX, MAX_MOMENTS};
@@ -25,7 +25,9 @@ pub struct Canonical<R> {
 /// The canonical representation. Takes anything that [`bound`](super::bound) takes; weights are
 /// from 0 to the total.
 ///
-/// All roots are found, while [`bound`](super::bound) needs at most two.
+/// All roots are found, while [`bound`](super::bound) needs at most two. Rounding errors of points
+/// and weights are then corrected together by what they leave of all moments, so that these are
+/// reproduced to a few units in their last place where that is possible.
 #[inline(always)]
 pub fn canonical<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Canonical<R> {
     let floor = R::epsilon() * lit!(0.25);
@@ -56,7 +58,7 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
     };
     let per_length = kernel.reach / recurrence.unit;
     unroll!(i in 0..N, max 6, {
-        let weight = kernel.weight_of::<N>(roots[i]).clamp(zero, kernel.others);
+        let weight = kernel.small_weight_of::<N>(roots[i]).clamp(zero, kernel.others);
         found.weights[i] = weight * recurrence.total;
         found.reciprocals[i] = roots[i] * per_length;
     });
@@ -74,5 +76,100 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
             as_is.reciprocals[i],
         );
     });
-    found
+    corrected::<R, N>(&m, eta, recurrence.total, found)
+}
+
+/// One step of Newton's method for the 2N + 1 equations that the moments are in terms of weights
+/// and points.
+///
+/// Its matrix is a confluent Vandermonde matrix, and its inverse is made of Hermite's basis
+/// polynomials, by which each unknown has a formula of its own. What is left of the moments is as
+/// inexact as their last digits, so that one step is enough. Where it would go far, moments are
+/// degenerate and digits have nothing to say: there all stays as it is.
+#[inline(always)]
+fn corrected<R: Real, const N: usize>(
+    m: &[R; MAX_MOMENTS],
+    eta: R,
+    total: R,
+    found: Canonical<R>,
+) -> Canonical<R> {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let eta = finite(eta, lit!(1e12));
+    // The query point is the last.
+    let mut u = [zero; MAX + 1];
+    let mut weight = [found.own; MAX + 1];
+    unroll!(i in 0..N, max 6, {
+        let v = found.reciprocals[i];
+        u[i] = R::select(v.eq(zero), zero, one / R::select(v.eq(zero), one, v));
+        weight[i] = found.weights[i];
+    });
+
+    let mut rest = *m;
+    rest[0] = total;
+    let mut terms = weight;
+    unroll!(k in 0..(2 * N + 1), max 11, {
+        unroll!(i in 0..(N + 1), max 6, {
+            rest[k] -= terms[i];
+            terms[i] *= eta + u[if const { i < N } { i } else { MAX }];
+        });
+    });
+
+    let quarter: R = lit!(0.25);
+    let mut next = found;
+    let mut is_near = zero.le(found.own);
+    unroll!(i in 0..(N + 1), max 6, {
+        let at = u[if const { i < N } { i } else { MAX }];
+        let x = eta + at;
+        // 1 and stationary here, 0 and stationary at other points, 0 at the query point; but for
+        // the slope, which comes after.
+        let mut q = [zero; MAX_MOMENTS];
+        q[0] = one;
+        let mut slope = zero;
+        unroll!(j in 0..(2 * N), max 11, {
+            // Two factors for each other point, one for the query point in this one's place.
+            if const { j / 2 != i || j % 2 == 0 } {
+                // 1 + s (t - x); at infinity s is 0.
+                let v = found.reciprocals[const { j / 2 }];
+                let s = if const { j / 2 == i } {
+                    v
+                } else {
+                    -v / (one - v * at)
+                };
+                let constant = one - s * x;
+                slope += s;
+                unroll!(l in 0..10, max 11, {
+                    q[10 - l] = constant * q[10 - l] + s * q[9 - l];
+                });
+                q[0] = constant * q[0];
+            }
+        });
+        let mut value = zero;
+        let mut moved = zero;
+        unroll!(k in 0..(2 * N), max 11, {
+            value += q[k] * rest[k];
+            moved += q[k] * rest[k + 1];
+        });
+        if const { i == N } {
+            next.own = found.own + value + q[2 * N] * rest[2 * N];
+            is_near = is_near & zero.le(next.own) & next.own.le(total);
+        } else {
+            let v = found.reciprocals[i];
+            let present = zero.lt(found.weights[i]) & !v.eq(zero);
+            let shift = moved - x * value;
+            let by = shift / R::select(present, found.weights[i], one);
+            // How far it goes in terms of the distance to the query point.
+            let part = by * v;
+            next.weights[i] = R::select(present, found.weights[i] + (value - slope * shift), zero);
+            next.reciprocals[i] = R::select(present, v / (one + part), v);
+            let is_small = part.abs().lt(quarter) & zero.le(next.weights[i]) & next.weights[i].le(total);
+            is_near = is_near & (is_small | !present);
+        }
+    });
+    unroll!(i in 0..N, max 6, {
+        next.weights[i] = R::select(is_near, next.weights[i], found.weights[i]);
+        next.reciprocals[i] = R::select(is_near, next.reciprocals[i], found.reciprocals[i]);
+    });
+    next.own = R::select(is_near, next.own, found.own);
+    next
 }

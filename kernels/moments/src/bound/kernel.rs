@@ -207,6 +207,17 @@ impl<R: Real> Kernel<R> {
         self.c[0] * x[0] * (x[0] / square)
     }
 
+    /// The weight of a single root, small ones to their own last digits: those of roots near
+    /// infinity, which freeing would drown.
+    #[inline(always)]
+    pub fn small_weight_of<const N: usize>(&self, v: R) -> R {
+        let z = self.vector::<N>(v);
+        let least: R = lit!(1e-37);
+        let share = z[0] / self.dot::<N>(&z, &z).max(least);
+        let weight = self.c[0] * z[0] * share;
+        R::select(weight.lt(lit!(1e-3)), weight, self.weight_of::<N>(v))
+    }
+
     /// The weight of the negative side's roots together.
     #[inline(always)]
     pub fn weight<const N: usize>(&self) -> R {

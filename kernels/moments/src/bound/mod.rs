@@ -45,7 +45,8 @@ impl<R: Real> Bounds<R> {
     /// Between both: the lower one for `overestimation` 0, the upper one for 1.
     #[inline(always)]
     pub fn blend(self, overestimation: R) -> R {
-        self.lower + overestimation.saturate() * (self.upper - self.lower)
+        // Rounding must not leave the range.
+        (self.lower + overestimation.saturate() * (self.upper - self.lower)).min(self.upper)
     }
 }
 

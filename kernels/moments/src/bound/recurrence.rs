@@ -50,25 +50,57 @@ pub(crate) fn farthest<R: Real>() -> R {
     half / R::epsilon().sqrt()
 }
 
+/// 2 to that power, of which the exponent is in `f64`'s range.
+const fn two_to(power: i32) -> f64 {
+    f64::from_bits(((1023 + power) as u64) << 52)
+}
+
 /// A power of two that brings a total into the middle of `f32`'s range.
 #[inline(always)]
 fn scale<R: Real>(total: R) -> R {
-    let small = R::select(
-        total.lt(lit!(1e-27)),
-        lit!((1_u128 << 110) as f64),
-        lit!((1_u64 << 60) as f64),
-    );
-    let large = R::select(
-        total.gt(lit!(1e27)),
-        lit!(1.0 / (1_u128 << 110) as f64),
-        lit!(1.0 / (1_u64 << 60) as f64),
-    );
     let one: R = lit!(1.0);
+    let large = R::select(total.gt(lit!(1e27)), lit!(two_to(-110)), lit!(two_to(-60)));
+    let small = if const { R::IS_WIDE } {
+        let mut small = one;
+        let mut scaled = total;
+        // The least total is 2⁻¹⁰⁷⁴; none gets beyond 2³⁰.
+        raise(
+            &mut small,
+            &mut scaled,
+            lit!(two_to(512)),
+            lit!(two_to(-482)),
+        );
+        raise(
+            &mut small,
+            &mut scaled,
+            lit!(two_to(256)),
+            lit!(two_to(-226)),
+        );
+        raise(
+            &mut small,
+            &mut scaled,
+            lit!(two_to(128)),
+            lit!(two_to(-98)),
+        );
+        raise(&mut small, &mut scaled, lit!(two_to(64)), lit!(two_to(-34)));
+        raise(&mut small, &mut scaled, lit!(two_to(32)), lit!(two_to(-2)));
+        small
+    } else {
+        R::select(total.lt(lit!(1e-27)), lit!(two_to(110)), lit!(two_to(60)))
+    };
     R::select(
         total.lt(lit!(1e-9)),
         small,
         R::select(total.gt(lit!(1e9)), large, one),
     )
+}
+
+/// Multiplies both by `power` if the second is below `limit`.
+#[inline(always)]
+fn raise<R: Real>(scale: &mut R, scaled: &mut R, power: R, limit: R) {
+    let factor = R::select(scaled.lt(limit), power, lit!(1.0));
+    *scale *= factor;
+    *scaled *= factor;
 }
 
 impl<R: Real> Recurrence<R> {
@@ -124,6 +156,14 @@ impl<R: Real> Recurrence<R> {
                     next[l] = t.within(-largest, largest);
                 }
             });
+            if const { k == 2 } {
+                // As the Cholesky factorisation has it: where a bias is all that is left of the
+                // pivot, this keeps more of it.
+                let mean_square = raw[2].over(raw[0]);
+                let t = raw[4].minus(mean_square.times(raw[2]));
+                let t = t.minus(slope.times(current[2]));
+                next[2] = t.within(-largest, largest);
+            }
             let noise = raw[2 * k].rounded().abs() * floor;
             next[k] = next[k].at_least(noise.max(least));
             beta = next[k].over(current[k - 1]).within(zero, far);
