@@ -199,7 +199,8 @@ pub struct Judged {
     pub upper: f64,
     /// The exact bounds are within this of the given ones, in the unit of m0; m0 itself where
     /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`]. Rounding of the
-    /// given moments to `f64` is counted in.
+    /// given moments to `f64` is counted in to first order: where it decides whether any
+    /// distribution has them, that is too little.
     pub margin: f64,
     /// How far the moments of the supports are from the given ones, beyond rounding: the larger sum
     /// of distances of the two, in an orthogonal basis, relative to the total weight.

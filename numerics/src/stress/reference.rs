@@ -14,6 +14,9 @@ const NEEDS_WIDE: f64 = 1e-24;
 /// The margin up to which the linear programme's judgement counts, as a share of the total.
 const RESOLVED: f64 = 1e-3;
 
+/// The share of digits that elimination must leave for that.
+const RESOLVED_PIVOT: f64 = 1e-9;
+
 /// Picks the instance for an order.
 macro_rules! by_order {
     ($n:expr, $function:ident::<$R:ty>($($argument:expr),*)) => {
@@ -161,7 +164,8 @@ pub struct Agreement {
     pub programme_difference: f64,
     /// Rows that differ by more than the programme's own margin.
     pub programme_beyond: u64,
-    /// Rows that the programme could not judge to 1e-3 of the total: its arithmetic is `f64`.
+    /// Rows that the programme cannot judge: its arithmetic is `f64`, too little for a nearly singular
+    /// matrix, or its margin is above 1e-3 of the total.
     pub programme_unresolved: u64,
 }
 
@@ -199,6 +203,11 @@ impl Agreement {
         let Some((row, _)) = scaled(&row.map(T::widen)) else {
             return;
         };
+        // Where rounding decides about the moments, the programme has others.
+        if !matches!(validity(n, &row), Validity::Definite(left) if left >= RESOLVED_PIVOT) {
+            self.programme_unresolved += 1;
+            return;
+        }
         let judge = DepthFunction::powers(2 * n).and_then(|f| Judge::new(&f, Range::Line));
         let judged = judge.and_then(|judge| judge.bounds(&row.m[..=2 * n], row.eta));
         let judged = match judged {

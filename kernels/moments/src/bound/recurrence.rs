@@ -63,27 +63,21 @@ fn scale<R: Real>(total: R) -> R {
     let small = if const { R::IS_WIDE } {
         let mut small = one;
         let mut scaled = total;
-        // The least total is 2⁻¹⁰⁷⁴; none gets beyond 2³⁰.
+        // From 2⁻⁵³⁴ on up, all get from 2⁻³⁰ to 2³⁰.
         raise(
             &mut small,
             &mut scaled,
-            lit!(two_to(512)),
-            lit!(two_to(-482)),
+            lit!(two_to(270)),
+            lit!(two_to(-240)),
         );
         raise(
             &mut small,
             &mut scaled,
-            lit!(two_to(256)),
-            lit!(two_to(-226)),
+            lit!(two_to(135)),
+            lit!(two_to(-105)),
         );
-        raise(
-            &mut small,
-            &mut scaled,
-            lit!(two_to(128)),
-            lit!(two_to(-98)),
-        );
-        raise(&mut small, &mut scaled, lit!(two_to(64)), lit!(two_to(-34)));
-        raise(&mut small, &mut scaled, lit!(two_to(32)), lit!(two_to(-2)));
+        raise(&mut small, &mut scaled, lit!(two_to(68)), lit!(two_to(-38)));
+        raise(&mut small, &mut scaled, lit!(two_to(34)), lit!(two_to(-4)));
         small
     } else {
         R::select(total.lt(lit!(1e-27)), lit!(two_to(110)), lit!(two_to(60)))
@@ -93,6 +87,17 @@ fn scale<R: Real>(total: R) -> R {
         small,
         R::select(total.gt(lit!(1e9)), large, one),
     )
+}
+
+/// What brings totals down to 2⁻¹⁰⁷⁴ to where [`scale`] reaches: 1 for nearly all of them.
+#[inline(always)]
+fn lift<R: Real>(total: R) -> R {
+    let one: R = lit!(1.0);
+    if const { R::IS_WIDE } {
+        R::select(total.lt(lit!(two_to(-510))), lit!(two_to(540)), one)
+    } else {
+        one
+    }
 }
 
 /// Multiplies both by `power` if the second is below `limit`.
@@ -121,17 +126,19 @@ impl<R: Real> Recurrence<R> {
             lit!(1e9)
         };
         let total = finite(m[0], lit!(1e37)).max(zero);
-        let scale = scale(total);
+        let lift = lift(total);
+        let lifted = total * lift;
+        let scale = scale(lifted);
         let eta = finite(eta, far);
         let query = A::of(eta);
 
         let mut current = [A::of(zero); MAX_MOMENTS];
-        let scaled_total = (total * scale).max(lit!(1e-12));
+        let scaled_total = (lifted * scale).max(lit!(1e-12));
         // Far below what rounding leaves of a pivot, and far above what is too small to divide by.
         let least = R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)));
         current[0] = A::of(scaled_total);
         unroll!(k in 1..(2 * N + 1), max 11, {
-            current[k] = A::of(finite(finite(m[k], lit!(1e37)) * scale, largest));
+            current[k] = A::of(finite(finite(m[k], lit!(1e37)) * lift * scale, largest));
         });
         let raw = current;
         let mut previous = current;
