@@ -36,8 +36,22 @@ fn maps_over_rows_are_clean() {
         assert!(found.is_empty(), "{name}: {found:?}");
     }
     let names: Vec<&str> = maps.iter().map(|(name, _)| name.as_str()).collect();
-    for bound in ["hamburger_4msm", "hausdorff_4msm", "vsm", "quantize_4_unit"] {
-        assert!(names.contains(&bound), "{bound} is no map: {names:?}");
+    let bounds = (1..=5).flat_map(|n| {
+        let kinds = ["moment_bound", "moment_bound_adjoint"];
+        kinds.map(|kind| format!("{kind}_n{n}"))
+    });
+    let others = [
+        "moment_bound_compensated_n2",
+        "moment_bound_compensated_n3",
+        "hamburger_4msm",
+        "hausdorff_4msm",
+        "hamburger_6msm",
+        "trigonometric_4msm",
+        "vsm",
+        "quantize_4_unit",
+    ];
+    for map in bounds.chain(others.map(String::from)) {
+        assert!(names.contains(&map.as_str()), "{map} is no map: {names:?}");
     }
 }
 
