@@ -128,7 +128,7 @@ fn corrected<R: Real, const N: usize>(
         let mut slope = zero;
         unroll!(j in 0..(2 * N), max 11, {
             // Two factors for each other point, one for the query point in this one's place.
-            if const { j / 2 != i || j % 2 == 0 } {
+            if const { j / 2 != i || j % 2 != 1 } {
                 // 1 + s (t - x); at infinity s is 0.
                 let v = found.reciprocals[const { j / 2 }];
                 let s = if const { j / 2 == i } {
