@@ -130,7 +130,7 @@ fn completions_are_scripts() {
 fn a_build_is_whole_and_then_left_alone() {
     let desk = Desk::new();
     let first = desk.hankel("build --out shaders").code(0).out();
-    assert!(first.contains("25 kernels"), "{first}");
+    assert!(first.contains("75 kernels"), "{first}");
     for file in [
         "wgsl/hamburger_4msm.wgsl",
         "hlsl/shade_hamburger.hlsl",
@@ -162,7 +162,7 @@ fn a_build_can_be_narrowed() {
         .hankel("build --out s --target hlsl --shader-model 5.1 --kernel quantize_* --format json")
         .code(0)
         .out();
-    assert!(json.contains("\"kernels\": 4"), "{json}");
+    assert!(json.contains("\"kernels\": 8"), "{json}");
     assert!(desk.path("s/hlsl/quantize_4_unit.hlsl").is_file());
     assert!(!desk.path("s/wgsl").exists());
 }
@@ -374,6 +374,37 @@ fn a_linear_programme_judges_a_table() {
             .fails(2, words);
         assert!(!desk.path("new.csv").exists(), "{line}");
     }
+}
+
+#[test]
+fn bounds_are_put_under_stress() {
+    let desk = Desk::new();
+    let out = desk
+        .hankel("stress --family paper,self --n 1,2 --samples 100 --backend vulkan --out report")
+        .code(0)
+        .out();
+    for words in ["not finite", "n = 2, compensated", "lanes", "programme"] {
+        assert!(out.contains(words), "{words}: {out}");
+    }
+    for file in ["stress.html", "stress.json", "stress-errors.csv"] {
+        assert!(desk.path("report").join(file).is_file(), "{file}");
+    }
+    let out = desk
+        .hankel("stress --singularities --n 1 --samples 16 --precision f64")
+        .code(0)
+        .out();
+    assert!(out.contains("| 1 | f64       | plain"), "{out}");
+    let json = desk
+        .hankel("stress --family one-texel --n 1 --samples 50 --format json")
+        .code(0)
+        .out();
+    assert!(json.contains("\"id\": \"overview\""), "{json}");
+    desk.hankel("stress --family nosuch")
+        .fails(2, &["`nosuch`", "silhouettes"]);
+    desk.hankel("stress --biases --samples 20")
+        .fails(2, &["20 regions", "1000"]);
+    desk.hankel("stress --family paper --samples 16 --against diffmoments --python nowhere")
+        .fails(3, &["nowhere", "--python"]);
 }
 
 #[test]

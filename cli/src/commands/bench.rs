@@ -9,7 +9,7 @@ use hankel_numerics::peer::default_python;
 use hankel_numerics::report::{Column, Table};
 use hankel_numerics::speed::{self, Program};
 
-use super::{command_line, print_json};
+use super::{command_line, deliver};
 use crate::args::{Bench, BenchBounds, BenchCommand, Format, Rival};
 use crate::failure::{Failure, Outcome, Result};
 use crate::progress::Progress;
@@ -78,21 +78,7 @@ fn bounds(args: &BenchBounds, quiet: bool) -> Result<Outcome> {
             "instruction counts of shaders are left out: {failure}"
         )),
     }
-    let paths = match &args.out {
-        Some(folder) => report.write(folder, "bounds")?,
-        None => Vec::new(),
-    };
-    match args.format {
-        Format::Json => print_json(&report),
-        Format::Text => {
-            println!("{report}");
-            if !quiet {
-                for path in paths {
-                    println!("{}", path.display());
-                }
-            }
-        }
-    }
+    deliver(&report, args.out.as_deref(), "bounds", args.format, quiet)?;
     Ok(Outcome::Fine)
 }
 

@@ -13,7 +13,39 @@ pub mod render;
 pub mod stress;
 pub mod toolchain;
 
+use std::path::Path;
+
+use hankel_numerics::report::Report;
 use serde::Serialize;
+
+use crate::args::Format;
+use crate::failure::Result;
+
+/// Writes a report's files where a folder is given for them, and prints it.
+fn deliver(
+    report: &Report,
+    out: Option<&Path>,
+    name: &str,
+    format: Format,
+    quiet: bool,
+) -> Result<()> {
+    let paths = match out {
+        Some(folder) => report.write(folder, name)?,
+        None => Vec::new(),
+    };
+    match format {
+        Format::Json => print_json(report),
+        Format::Text => {
+            println!("{report}");
+            if !quiet {
+                for path in paths {
+                    println!("{}", path.display());
+                }
+            }
+        }
+    }
+    Ok(())
+}
 
 /// Prints a report as JSON.
 fn print_json(report: &impl Serialize) {

@@ -9,7 +9,7 @@ use hankel_numerics::peer::default_python;
 use hankel_numerics::report::Report;
 use hankel_numerics::stress::{self, BackendError, Native};
 
-use super::{command_line, print_json};
+use super::{command_line, deliver};
 use crate::args::{self, Format, Rival, Stress};
 use crate::failure::{Outcome, Result};
 use crate::progress::Progress;
@@ -36,21 +36,7 @@ pub fn run(args: &Stress, quiet: bool) -> Result<Outcome> {
         (report, passed && there)
     };
     drop(progress);
-    let paths = match &args.out {
-        Some(folder) => report.write(folder, "stress")?,
-        None => Vec::new(),
-    };
-    match args.format {
-        Format::Json => print_json(&report),
-        Format::Text => {
-            println!("{report}");
-            if !quiet {
-                for path in paths {
-                    println!("{}", path.display());
-                }
-            }
-        }
-    }
+    deliver(&report, args.out.as_deref(), "stress", args.format, quiet)?;
     Ok(Outcome::of(passed))
 }
 
