@@ -389,6 +389,27 @@ fn bounds_are_put_under_stress() {
     for file in ["stress.html", "stress.json", "stress-errors.csv"] {
         assert!(desk.path("report").join(file).is_file(), "{file}");
     }
+    // Through naga, where nothing forbids a driver to reorder sums, error terms are still there.
+    desk.hankel("stress -q --family silhouettes,self --n 2,3 --samples 500 --precision f32 --backend vulkan --out gpu")
+        .code(0);
+    let errors = fs::read_to_string(desk.path("gpu/stress-errors.csv")).expect("it was written");
+    let ninety = |solver: &str| -> Vec<f64> {
+        let on_device = |l: &&str| {
+            l.contains(&format!(",f32,{solver},"))
+                && !l.contains(",native,")
+                && !l.contains(",lanes,")
+        };
+        let lines = errors.lines().filter(on_device);
+        // Columns from the last: device names have commas.
+        lines
+            .filter_map(|l| l.rsplit(',').nth(6)?.parse().ok())
+            .collect()
+    };
+    let (plain, compensated) = (ninety("plain"), ninety("compensated"));
+    assert_eq!((plain.len(), compensated.len()), (4, 4), "{errors}");
+    for (plain, compensated) in plain.iter().zip(&compensated) {
+        assert!(compensated * 10.0 < *plain, "{errors}");
+    }
     let out = desk
         .hankel("stress --singularities --n 1 --samples 16 --precision f64")
         .code(0)

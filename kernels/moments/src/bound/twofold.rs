@@ -67,8 +67,8 @@ impl<R: Real> Arithmetic<R> for Plain<R> {
 /// An unevaluated sum of two numbers, the second within the first's rounding error: about twice
 /// the digits (T. Dekker, *A floating-point technique for extending the available precision*, 1971).
 ///
-/// If a compiler contracts or reassociates what it should not, error terms come out wrong by as
-/// much as they are large: the result is then about as good as [`Plain`]'s, not worse.
+/// Every error term comes from [`Real::two_sum`] and [`Real::two_product`], which hide it from
+/// compilers that reorder sums: `(high + low) - high` written out, a driver makes it `low`.
 #[derive(Clone, Copy)]
 pub(crate) struct Twofold<R> {
     high: R,
@@ -79,11 +79,8 @@ impl<R: Real> Twofold<R> {
     /// `high + low` where `low` is small: both parts renewed.
     #[inline(always)]
     fn of_parts(high: R, low: R) -> Self {
-        let sum = high + low;
-        Self {
-            high: sum,
-            low: low - (sum - high),
-        }
+        let (high, low) = high.two_sum(low);
+        Self { high, low }
     }
 }
 
