@@ -55,8 +55,16 @@ pub enum Command {
     Stress(Stress),
     /// Find or install rust-gpu's compiler.
     Toolchain(Toolchain),
+    /// What of other people's compilers, drivers and browsers is there, and what installs the rest.
+    Doctor(Doctor),
     /// Print a completion script for a shell.
     Completions(Completions),
+    /// A process that the matrix runs kernels in.
+    #[command(name = "matrix-runner", hide = true)]
+    MatrixRunner {
+        /// `vulkan` or `gl`.
+        which: String,
+    },
 }
 
 /// Which kernels.
@@ -187,7 +195,12 @@ Examples:
   hankel parity --kernel 'hamburger*' --seed 7
   hankel parity --manifest-path my-kernels/Cargo.toml --format json
 
-VK_DRIVER_FILES chooses among several Vulkan drivers; HANKEL_SIMD the lanes' instruction set.")]
+  hankel parity --matrix --require all --html matrix.html
+  hankel parity --matrix --column hlsl-dxc --column msl --kernel 'shade_*'
+
+With --matrix, every generated language goes through the compilers that will meet it; `hankel doctor`
+shows which are there. VK_DRIVER_FILES chooses among several Vulkan drivers; HANKEL_SIMD the lanes'
+instruction set.")]
 pub struct Parity {
     #[command(flatten)]
     pub source: Source,
@@ -197,6 +210,52 @@ pub struct Parity {
     /// Seed of the generated inputs.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+    /// Every kernel in every language on every compiler and driver.
+    #[arg(long)]
+    pub matrix: bool,
+    #[command(flatten)]
+    pub of_matrix: OfMatrix,
+}
+
+/// Choices for the matrix.
+#[derive(Debug, Args)]
+pub struct OfMatrix {
+    /// Only this column; may be repeated.
+    #[arg(long = "column", value_name = "NAME", requires = "matrix")]
+    pub columns: Vec<String>,
+    /// A column that must run, or `all`: what is not installed fails; may be repeated.
+    #[arg(long, value_name = "NAME", requires = "matrix")]
+    pub require: Vec<String>,
+    /// Writes the report as a page.
+    #[arg(long, value_name = "FILE", requires = "matrix")]
+    pub html: Option<PathBuf>,
+    /// Writes the report as JSON.
+    #[arg(long, value_name = "FILE", requires = "matrix")]
+    pub json: Option<PathBuf>,
+    /// List of known differences; without it, the built-in kernels have their own.
+    #[arg(long, value_name = "FILE", requires = "matrix")]
+    pub known: Option<PathBuf>,
+    /// Seconds that a compiler or device may take for one kernel.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120, requires = "matrix",
+          value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub limit: u64,
+    /// Runs everything anew.
+    #[arg(long, requires = "matrix")]
+    pub no_cache: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel doctor
+  hankel doctor --format json
+
+Environment: HANKEL_TOOLS, the folder of DXC's library and npm's packages; HANKEL_CLANG, HANKEL_GLSLANG,
+HANKEL_DXC, HANKEL_NODE, HANKEL_CHROMIUM, HANKEL_SWIFTSHADER (its driver's JSON file), each a path.")]
+pub struct Doctor {
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

@@ -32,7 +32,9 @@ fn main() -> ExitCode {
         Command::Bench(a) => commands::bench::run(&a, quiet),
         Command::Stress(a) => commands::stress::run(&a, quiet),
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
+        Command::Doctor(a) => commands::doctor::run(&a),
         Command::Completions(a) => commands::completions::run(&a),
+        Command::MatrixRunner { which } => commands::matrix::serve(&which),
     };
     match outcome {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,

@@ -171,7 +171,8 @@ fn constants(kernel: &Kernel) -> impl Iterator<Item = &str> {
 }
 
 /// Whether a name fits a pattern with `*` for any letters.
-fn matches(pattern: &str, name: &str) -> bool {
+#[must_use]
+pub fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((head, tail)) => name.strip_prefix(head).is_some_and(|rest| {

@@ -59,9 +59,9 @@ fn every_stage_agrees_on_every_path() {
         assert_eq!(kernel.paths.len(), 4);
         for path in &kernel.paths {
             assert_eq!(path.outcome, Outcome::Passed, "{text}");
-            assert_eq!((path.beyond, path.largest_ulp), (0, 0), "{text}");
+            assert_eq!((path.found.beyond, path.found.largest_ulp), (0, 0), "{text}");
             assert!(
-                path.values >= 1000 || kernel.kernel == "histogram" || kernel.kernel == "sums",
+                path.found.values >= 1000 || kernel.kernel == "histogram" || kernel.kernel == "sums",
                 "{text}"
             );
         }
@@ -129,8 +129,8 @@ fn a_changed_constant_in_the_spirv_is_caught_there_and_not_in_the_wgsl() {
     assert_eq!(*outcome(kernel, Path::SpirvThroughNaga), Outcome::Failed);
     assert_eq!(*outcome(kernel, Path::Wgsl), Outcome::Passed);
     let found = &kernel.paths[1];
-    assert!(found.beyond > 100, "{report}");
-    let first = found.first.as_ref().unwrap();
+    assert!(found.found.beyond > 100, "{report}");
+    let first = found.found.first.as_ref().unwrap();
     assert!(first.value.starts_with("output[1]."), "{first:?}");
     assert!((1..=2).contains(&first.ulp), "{first:?}");
     assert!(

@@ -14,6 +14,9 @@ use crate::progress::Progress;
 use crate::session::Session;
 
 pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
+    if args.matrix {
+        return super::matrix::run(args, quiet);
+    }
     // Whether there is a driver shows before the long work starts.
     let mut vulkan = VulkanDevice::new()?;
     let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;

@@ -1,10 +1,11 @@
 //! HLSL. naga reads every sampler from a heap; here a sampler is a `SamplerState` in a register
-//! of its own, as hand-written shaders and root signatures have it.
+//! of its own, as hand-written shaders and root signatures have it. naga drops the formats of storage
+//! textures; here they are said in the attribute that DXC reads.
 
 use std::collections::BTreeMap;
 
-use naga::ResourceBinding;
-use naga::back::hlsl::{BindTarget, Options, PipelineOptions, Writer};
+use naga::back::hlsl::{BindTarget, Options, PipelineOptions, ShaderModel, Writer};
+use naga::{ImageClass, ResourceBinding, StorageFormat, TypeInner};
 
 use super::{BoundsChecks, Job, Kind, Place, Text, Written, text};
 use crate::error::Failure;
@@ -61,7 +62,21 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         message: "its declaration is not of the shape that is expected".into(),
         ..job.failure(&std::fmt::Error)
     })?;
-    let source = job.precise(source, &["float", "double"])?;
+    let mut source = job.precise(source, &["float", "double"])?;
+    // fxc, which has models up to 5.1, does not know attributes of Vulkan.
+    if job.options.shader_model.0 > ShaderModel::V5_1 {
+        for it in bound.iter().filter(|it| it.kind == Kind::Image) {
+            let (class, register) = registers[&it.binding];
+            if let TypeInner::Image {
+                class: ImageClass::Storage { format, .. },
+                ..
+            } = module.types[module.global_variables[it.handle].ty].inner
+                && let Some(format) = vulkan_format(format)
+            {
+                source = with_format(&source, &format!("{class}{register}"), format);
+            }
+        }
+    }
     let places = bound
         .iter()
         .map(|it| {
@@ -116,9 +131,83 @@ fn plain_samplers(source: &str) -> Option<String> {
     (!plain.contains("SamplerHeap[")).then_some(plain)
 }
 
+/// Says the format of the storage texture in `register`, which a Direct3D texture type only says
+/// in part. Without it DXC takes 32-bit floats when it makes SPIR-V; for Direct3D it ignores it.
+fn with_format(source: &str, register: &str, format: &str) -> String {
+    let end = format!(" : register({register});");
+    source
+        .lines()
+        .map(|line| {
+            if line.ends_with(&end) {
+                format!("[[vk::image_format(\"{format}\")]] {line}\n")
+            } else {
+                format!("{line}\n")
+            }
+        })
+        .collect()
+}
+
+/// DXC's name of a format; none for those that its SPIR-V cannot have.
+const fn vulkan_format(format: StorageFormat) -> Option<&'static str> {
+    use StorageFormat::*;
+    Some(match format {
+        R8Unorm => "r8",
+        R8Snorm => "r8snorm",
+        R8Uint => "r8ui",
+        R8Sint => "r8i",
+        R16Uint => "r16ui",
+        R16Sint => "r16i",
+        R16Float => "r16f",
+        R16Unorm => "r16",
+        R16Snorm => "r16snorm",
+        Rg8Unorm => "rg8",
+        Rg8Snorm => "rg8snorm",
+        Rg8Uint => "rg8ui",
+        Rg8Sint => "rg8i",
+        R32Uint => "r32ui",
+        R32Sint => "r32i",
+        R32Float => "r32f",
+        Rg16Uint => "rg16ui",
+        Rg16Sint => "rg16i",
+        Rg16Float => "rg16f",
+        Rg16Unorm => "rg16",
+        Rg16Snorm => "rg16snorm",
+        Rgba8Unorm => "rgba8",
+        Rgba8Snorm => "rgba8snorm",
+        Rgba8Uint => "rgba8ui",
+        Rgba8Sint => "rgba8i",
+        Rgb10a2Uint => "rgb10a2ui",
+        Rgb10a2Unorm => "rgb10a2",
+        Rg11b10Ufloat => "r11g11b10f",
+        R64Uint => "r64ui",
+        Rg32Uint => "rg32ui",
+        Rg32Sint => "rg32i",
+        Rg32Float => "rg32f",
+        Rgba16Uint => "rgba16ui",
+        Rgba16Sint => "rgba16i",
+        Rgba16Float => "rgba16f",
+        Rgba16Unorm => "rgba16",
+        Rgba16Snorm => "rgba16snorm",
+        Rgba32Uint => "rgba32ui",
+        Rgba32Sint => "rgba32i",
+        Rgba32Float => "rgba32f",
+        Bgra8Unorm => return None,
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use super::plain_samplers;
+    use super::{plain_samplers, with_format};
+
+    #[test]
+    fn storage_textures_say_their_format() {
+        let source = "RWTexture2D<float4> a : register(u0);\nRWTexture2D<float4> b : register(u1);\n";
+        assert_eq!(
+            with_format(source, "u1", "rgba16f"),
+            "RWTexture2D<float4> a : register(u0);\n\
+             [[vk::image_format(\"rgba16f\")]] RWTexture2D<float4> b : register(u1);\n"
+        );
+    }
 
     #[test]
     fn samplers_get_registers() {

@@ -129,8 +129,17 @@ fn upload<'a>(
     Ok(binds)
 }
 
+/// What a driver may do with the arithmetic of code that naga wrote.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// Nothing: it is forbidden to fuse, factor and reorder ([`super::translate`]).
+    Pinned,
+    /// What it does anywhere: the code reaches it as wgpu hands it over.
+    Free,
+}
+
 /// Runs a case on Vulkan, whatever its stage: vertices and fragments are drawn as points, each in
-/// a pixel of its own. What goes through naga is strict ([`super::translate`]).
+/// a pixel of its own.
 ///
 /// # Errors
 /// The device's, and [`ExecuteError::Stage`] for an interface that targets cannot hold.
@@ -138,26 +147,34 @@ pub fn on_vulkan(
     device: &mut dyn Device,
     program: &Program<'_>,
     case: &Case,
+    arithmetic: Arithmetic,
 ) -> Result<Written, ExecuteError> {
     let kernel = program.kernel;
+    // A vertex stage is rewritten as SPIR-V to be read back.
+    let as_it_is = arithmetic == Arithmetic::Free && kernel.stage != Stage::Vertex;
     let translated = match program.shader {
-        Some(Shader::SpirvThroughNaga(words)) => Some(super::translate::spirv_to_spirv(words)),
-        Some(Shader::Wgsl { text, entry_point }) => Some(super::translate::wgsl_to_spirv(
-            text,
-            entry_point,
-            &kernel.name,
-        )),
-        Some(Shader::SpirvPassthrough(_)) | None => None,
+        Some(Shader::SpirvThroughNaga(words)) if !as_it_is => {
+            Some(super::translate::spirv_to_spirv(words, arithmetic))
+        }
+        Some(Shader::Wgsl { text, entry_point }) if !as_it_is => {
+            Some(super::translate::wgsl_to_spirv(
+                text,
+                entry_point,
+                &kernel.name,
+                arithmetic,
+            ))
+        }
+        _ => None,
     };
     let translated = translated.transpose().map_err(|e| bad(kernel, e))?;
-    let strict = Program {
+    let given = Program {
         shader: translated
             .as_deref()
             .map(Shader::SpirvPassthrough)
             .or(program.shader),
         ..*program
     };
-    let program = &strict;
+    let program = &given;
     match kernel.stage {
         Stage::Compute { .. } => Ok(dispatch(device, program, case)?),
         Stage::Fragment | Stage::Vertex => {
@@ -443,8 +460,13 @@ fn vertex(
             size: 4,
         };
         // wgpu matches the stages of a pipeline only if it has read both, or neither.
-        let reader = super::translate::wgsl_to_spirv(&text, "hankel_take", "hankel_take")
-            .map_err(|e| bad(kernel, e))?;
+        let reader = super::translate::wgsl_to_spirv(
+            &text,
+            "hankel_take",
+            "hankel_take",
+            Arithmetic::Pinned,
+        )
+        .map_err(|e| bad(kernel, e))?;
         let take = helper(
             "hankel_take",
             Stage::Fragment,

@@ -16,6 +16,7 @@
 pub mod capture;
 pub mod compare;
 pub mod execute;
+pub mod numbers;
 mod table;
 pub mod translate;
 
@@ -30,8 +31,8 @@ use crate::device::slots::{self, Use};
 use crate::device::{Device, NativeDevice, Shader};
 use crate::flat;
 use crate::inputs::{self, Case, Class, Input};
-use compare::{Distance, Kind};
-use execute::Written;
+use execute::Arithmetic;
+use numbers::{Found, Numbers, Rules};
 
 /// A way to run a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -129,19 +130,9 @@ pub struct PathReport {
     pub path: Path,
     /// How it ended.
     pub outcome: Outcome,
-    /// Invocations compared.
-    pub cases: u64,
-    /// Numbers compared.
-    pub values: u64,
-    /// The largest distance in units in the last place, or in steps of an integer or normalised
-    /// format.
-    pub largest_ulp: u64,
-    /// The largest difference as numbers; `None` if it is not finite.
-    pub largest_absolute: Option<f64>,
-    /// Numbers beyond the tolerance.
-    pub beyond: u64,
-    /// The first number beyond the tolerance; else the first that differs at all.
-    pub first: Option<Difference>,
+    /// What the comparison found.
+    #[serde(flatten)]
+    pub found: Found,
 }
 
 /// How a way to run a kernel ended.
@@ -162,25 +153,6 @@ pub enum Outcome {
         /// Why.
         reason: String,
     },
-}
-
-/// Two numbers that differ.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Difference {
-    /// Class of the inputs.
-    pub class: Class,
-    /// Invocation, or texel counted row by row.
-    pub invocation: u64,
-    /// Which number of the output.
-    pub value: String,
-    /// The reference's.
-    pub expected: String,
-    /// What came out.
-    pub got: String,
-    /// How far apart, in units in the last place or steps.
-    pub ulp: u64,
-    /// What that invocation read as its own: names and values.
-    pub inputs: Vec<(String, String)>,
 }
 
 /// What the lanes promise.
@@ -246,8 +218,8 @@ fn kernel(
             }
         }
     }
-    let outputs = outputs(kernel);
-    report.non_finite = references.iter().map(|w| non_finite(&outputs, w)).sum();
+    let numbers = Numbers::of(kernel);
+    report.non_finite = references.iter().map(|w| numbers.non_finite(w)).sum();
     for path in Path::ALL {
         let (shader, tolerance) = match path {
             Path::NativeLanes => (Ok(None), lanes_tolerance()),
@@ -275,19 +247,15 @@ fn kernel(
                 kernel.tolerance.clone(),
             ),
         };
-        let mut found = PathReport {
+        let rules = Rules::of(kernel, tolerance);
+        let mut there = PathReport {
             path,
             outcome: Outcome::Passed,
-            cases: 0,
-            values: 0,
-            largest_ulp: 0,
-            largest_absolute: Some(0.0),
-            beyond: 0,
-            first: None,
+            found: Found::default(),
         };
         match shader {
             Err(reason) => {
-                found.outcome = Outcome::Unavailable {
+                there.outcome = Outcome::Unavailable {
                     reason: reason.clone(),
                 }
             }
@@ -297,27 +265,26 @@ fn kernel(
                     let result = if path == Path::NativeLanes {
                         execute::dispatch(lanes, &program, case).map_err(|e| e.to_string())
                     } else {
-                        execute::on_vulkan(vulkan, &program, case).map_err(|e| e.to_string())
+                        execute::on_vulkan(vulkan, &program, case, Arithmetic::Pinned)
+                            .map_err(|e| e.to_string())
                     };
                     match result {
                         Ok(written) => {
-                            compare(
-                                kernel, case, &outputs, &tolerance, reference, &written, &mut found,
-                            );
+                            numbers.compare(case, &rules, reference, &written, &mut there.found);
                         }
                         Err(message) => {
                             let message = format!("{} inputs: {message}", case.class);
-                            found.outcome = Outcome::Error { message };
+                            there.outcome = Outcome::Error { message };
                             break;
                         }
                     }
                 }
             }
         }
-        if found.beyond > 0 && found.outcome == Outcome::Passed {
-            found.outcome = Outcome::Failed;
+        if there.found.beyond > 0 && there.outcome == Outcome::Passed {
+            there.outcome = Outcome::Failed;
         }
-        report.paths.push(found);
+        report.paths.push(there);
     }
     report.passed = report
         .paths
@@ -334,157 +301,6 @@ fn count(cases: &[Case]) -> Vec<(Class, u64)> {
             (class, of_class.map(|c| c.invocations as u64).sum())
         })
         .collect()
-}
-
-/// The numbers of one thing that is written.
-struct Out {
-    /// Bytes of an element or texel.
-    stride: usize,
-    /// Name, type and place of each number of it.
-    values: Vec<(String, Kind, usize)>,
-}
-
-/// What a kernel writes, in the order of its slots.
-fn outputs(kernel: &Kernel) -> Vec<Out> {
-    let mut all = Vec::new();
-    for slot in slots::slots(kernel)
-        .into_iter()
-        .filter(|s| s.role.is_written())
-    {
-        let leaves = match slot.role {
-            Use::Output { layout, .. } => flat::leaves(layout),
-            Use::Interface(ty) => flat::type_leaves(ty),
-            Use::Atomic => {
-                let ty = hankel_dsl::native::describe::Type::Scalar {
-                    scalar: hankel_dsl::native::describe::Scalar::U32,
-                };
-                flat::type_leaves(&ty)
-            }
-            Use::StorageTexture { format, .. } => {
-                let kind = Kind::of(format);
-                let values = ["r", "g", "b", "a"]
-                    .into_iter()
-                    .take(format.channels())
-                    .enumerate()
-                    .map(|(i, c)| (format!("{}.{c}", slot.name), kind, i * kind.bytes()))
-                    .collect();
-                all.push(Out {
-                    stride: format.bytes(),
-                    values,
-                });
-                continue;
-            }
-            _ => continue,
-        };
-        let values = leaves
-            .into_iter()
-            .map(|l| {
-                (
-                    flat::join(&slot.name, &l.path),
-                    Kind::Scalar(l.scalar),
-                    l.offset,
-                )
-            })
-            .collect();
-        all.push(Out {
-            stride: slot.role.element_bytes().unwrap_or(1),
-            values,
-        });
-    }
-    all
-}
-
-/// Calls `f` with every number of what was written: element, name, distance.
-fn each(
-    outputs: &[Out],
-    reference: &Written,
-    written: &Written,
-    flush: bool,
-    mut f: impl FnMut(usize, &str, Distance),
-) {
-    for ((out, a), b) in outputs.iter().zip(reference).zip(written) {
-        let elements = a.chunks_exact(out.stride).zip(b.chunks_exact(out.stride));
-        for (i, (a, b)) in elements.enumerate() {
-            for (name, kind, offset) in &out.values {
-                f(i, name, kind.compare(&a[*offset..], &b[*offset..], flush));
-            }
-        }
-    }
-}
-
-fn non_finite(outputs: &[Out], written: &Written) -> u64 {
-    let mut n = 0;
-    each(outputs, written, written, false, |_, _, d| {
-        n += u64::from(!d.a.is_finite())
-    });
-    n
-}
-
-fn difference(kernel: &Kernel, case: &Case, i: usize, name: &str, d: &Distance) -> Difference {
-    Difference {
-        class: case.class,
-        invocation: i as u64,
-        value: name.into(),
-        expected: format!("{:?}", d.a),
-        got: format!("{:?}", d.b),
-        ulp: d.ulp,
-        inputs: inputs::of_invocation(kernel, case, i),
-    }
-}
-
-fn compare(
-    kernel: &Kernel,
-    case: &Case,
-    outputs: &[Out],
-    tolerance: &Tolerance,
-    reference: &Written,
-    written: &Written,
-    found: &mut PathReport,
-) {
-    found.cases += case.invocations as u64;
-    let exact = tolerance.ulp == 0 && tolerance.absolute == 0.0;
-    if case.class == Class::Hostile && !exact {
-        each(outputs, reference, written, false, |i, name, d| {
-            found.values += 1;
-            if d.a.is_finite() && !d.b.is_finite() {
-                found.beyond += 1;
-                if found.beyond == 1 {
-                    found.first = Some(difference(kernel, case, i, name, &d));
-                }
-            }
-        });
-        return;
-    }
-    let fits = |d: &Distance| d.ulp <= tolerance.ulp.into() || d.absolute <= tolerance.absolute;
-    let lengths_differ = reference
-        .iter()
-        .map(Vec::len)
-        .ne(written.iter().map(Vec::len));
-    if lengths_differ {
-        found.beyond += 1;
-    }
-    each(
-        outputs,
-        reference,
-        written,
-        inputs::flushes(kernel),
-        |i, name, d| {
-            found.values += 1;
-            if d.ulp == 0 {
-                return;
-            }
-            let first_beyond = !fits(&d) && found.beyond == 0;
-            found.beyond += u64::from(!fits(&d));
-            found.largest_ulp = found.largest_ulp.max(d.ulp);
-            found.largest_absolute = found
-                .largest_absolute
-                .map(|x| x.max(d.absolute))
-                .filter(|x| x.is_finite());
-            if found.first.is_none() || first_beyond {
-                found.first = Some(difference(kernel, case, i, name, &d));
-            }
-        },
-    );
 }
 
 /// Whether a case's arguments hold only finite numbers, for tests of the inputs themselves.

@@ -54,11 +54,11 @@ impl fmt::Display for Report {
                     Outcome::Unavailable { .. } => ("none", false),
                 };
                 let number = |text: String| if ran { text } else { String::new() };
-                let ulp = match path.largest_ulp {
+                let ulp = match path.found.largest_ulp {
                     u64::MAX => "NaN".to_string(),
                     n => n.to_string(),
                 };
-                let absolute = match path.largest_absolute {
+                let absolute = match path.found.largest_absolute {
                     None => "inf".to_string(),
                     Some(0.0) => "0".to_string(),
                     Some(x) => format!("{x:.2e}"),
@@ -66,7 +66,7 @@ impl fmt::Display for Report {
                 table.add_row([
                     kernel.kernel.clone(),
                     path.path.to_string(),
-                    number(path.cases.to_string()),
+                    number(path.found.cases.to_string()),
                     number(ulp),
                     number(absolute),
                     if exact {
@@ -105,7 +105,7 @@ fn details(f: &mut fmt::Formatter<'_>, kernel: &super::KernelReport) -> fmt::Res
     }
     let mut differs = false;
     for path in &kernel.paths {
-        differs |= path.largest_ulp > 0;
+        differs |= path.found.largest_ulp > 0;
         match &path.outcome {
             Outcome::Passed => {}
             Outcome::Error { message } => writeln!(f, "{name}, {}: {message}", path.path)?,
@@ -114,9 +114,9 @@ fn details(f: &mut fmt::Formatter<'_>, kernel: &super::KernelReport) -> fmt::Res
                 writeln!(
                     f,
                     "{name}, {}: {} of {} numbers are beyond the tolerance",
-                    path.path, path.beyond, path.values
+                    path.path, path.found.beyond, path.found.values
                 )?;
-                if let Some(d) = &path.first {
+                if let Some(d) = &path.found.first {
                     writeln!(
                         f,
                         "  first: {} of invocation {} ({} inputs): expected {}, got {}",

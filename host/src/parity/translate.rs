@@ -1,5 +1,5 @@
-//! Through naga to SPIR-V, the way wgpu does it, but with the driver forbidden to fuse, factor or
-//! reorder float arithmetic. What naga writes never forbids that, and lavapipe does all
+//! Through naga to SPIR-V, the way wgpu does it, but where it is asked for with the driver
+//! forbidden to fuse, factor or reorder float arithmetic. What naga writes never forbids that, and lavapipe does all
 //! three; left to it, parity would measure the driver's liberties, not what naga made of the code.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,13 +8,14 @@ use naga::back::pipeline_constants::process_overrides;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
+use super::execute::Arithmetic;
 use crate::device::vulkan::words;
 
 /// SPIR-V read and written anew by naga, with its specialisation constants at their defaults.
 ///
 /// # Errors
 /// naga's words.
-pub fn spirv_to_spirv(code: &[u32]) -> Result<Vec<u32>, String> {
+pub fn spirv_to_spirv(code: &[u32], arithmetic: Arithmetic) -> Result<Vec<u32>, String> {
     guarded(|| {
         let options = naga::front::spv::Options {
             adjust_coordinate_space: false,
@@ -24,7 +25,7 @@ pub fn spirv_to_spirv(code: &[u32]) -> Result<Vec<u32>, String> {
         let module = naga::front::spv::Frontend::new(code.iter().copied(), &options)
             .parse()
             .map_err(|e| format!("naga cannot read its SPIR-V: {e}"))?;
-        write(&module)
+        write(&module, arithmetic)
     })
 }
 
@@ -32,7 +33,12 @@ pub fn spirv_to_spirv(code: &[u32]) -> Result<Vec<u32>, String> {
 ///
 /// # Errors
 /// naga's words.
-pub fn wgsl_to_spirv(text: &str, entry_point: &str, name: &str) -> Result<Vec<u32>, String> {
+pub fn wgsl_to_spirv(
+    text: &str,
+    entry_point: &str,
+    name: &str,
+    arithmetic: Arithmetic,
+) -> Result<Vec<u32>, String> {
     guarded(|| {
         let mut module = naga::front::wgsl::parse_str(text)
             .map_err(|e| format!("naga cannot read its WGSL: {}", e.emit_to_string(text)))?;
@@ -41,11 +47,11 @@ pub fn wgsl_to_spirv(text: &str, entry_point: &str, name: &str) -> Result<Vec<u3
                 entry.name = name.into();
             }
         }
-        write(&module)
+        write(&module, arithmetic)
     })
 }
 
-fn write(module: &naga::Module) -> Result<Vec<u32>, String> {
+fn write(module: &naga::Module, arithmetic: Arithmetic) -> Result<Vec<u32>, String> {
     let info = Validator::new(ValidationFlags::all(), Capabilities::all())
         .validate(module)
         .map_err(|e| format!("naga finds it invalid: {}", e.into_inner()))?;
@@ -58,7 +64,10 @@ fn write(module: &naga::Module) -> Result<Vec<u32>, String> {
     };
     let written = spv::write_vec(&module, &info, &options, None)
         .map_err(|e| format!("naga cannot write it: {e}"))?;
-    words::forbid_reordering(&written)
+    match arithmetic {
+        Arithmetic::Pinned => words::forbid_reordering(&written),
+        Arithmetic::Free => Ok(written),
+    }
 }
 
 fn guarded(work: impl FnOnce() -> Result<Vec<u32>, String>) -> Result<Vec<u32>, String> {

@@ -1,0 +1,35 @@
+use hankel_matrix::tools::{Status, Tool};
+
+use super::print_json;
+use crate::args::{Doctor, Format};
+use crate::failure::{Outcome, Result};
+
+pub fn run(args: &Doctor) -> Result<Outcome> {
+    let tools = super::matrix::tools();
+    let all: Vec<Status> = Tool::ALL.into_iter().map(|t| tools.status(t)).collect();
+    if args.format == Format::Json {
+        print_json(&all);
+    } else {
+        for status in &all {
+            print(status);
+        }
+    }
+    Ok(Outcome::of(all.iter().all(Status::is_there)))
+}
+
+fn print(status: &Status) {
+    let found = match (&status.path, &status.problem) {
+        (Some(path), None) => format!(
+            "{} ({})",
+            status.version.as_deref().unwrap_or("of unknown version"),
+            path.display()
+        ),
+        (_, Some(problem)) => format!("cannot be used: {problem}"),
+        (None, None) => "not installed".into(),
+    };
+    println!("{}: {found}", status.name);
+    println!("    {}; licence: {}", status.purpose, status.licence);
+    if !status.is_there() {
+        println!("    {}", status.install);
+    }
+}

@@ -1,0 +1,129 @@
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use hankel_codegen::build::generate;
+use hankel_codegen::files::write_whole;
+use hankel_codegen::translate::Options;
+use hankel_matrix::column::Column;
+use hankel_matrix::compile::SHADER_MODEL;
+use hankel_matrix::known::Known;
+use hankel_matrix::run::Request;
+use hankel_matrix::subject::Subject;
+use hankel_matrix::tools::Tools;
+
+use super::print_json;
+use crate::args::{Format, Parity};
+use crate::failure::{Failure, Outcome, Result};
+use crate::progress::Progress;
+use crate::session::Session;
+
+/// Known differences of the built-in kernels.
+const KNOWN: &str = include_str!("../../../snapshots/known-differences.toml");
+
+pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
+    let own = &args.of_matrix;
+    let columns = columns(&own.columns)?;
+    let required = if own.require.iter().any(|r| r == "all") {
+        Column::ALL.into()
+    } else {
+        columns_named(&own.require)?
+    };
+    let built_in = args.source.manifest_path.is_none();
+    let known = match &own.known {
+        Some(file) => Known::read(file),
+        None if built_in => Known::parse(KNOWN),
+        None => Ok(Known::default()),
+    }
+    .map_err(|e| Failure::input(e, "Mend the list of known differences."))?;
+    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let options = Options {
+        shader_model: SHADER_MODEL.parse()?,
+        ..Options::default()
+    };
+    let request = session.request_for(args.kernels.clone(), Vec::new(), options);
+    let generated = generate(&request, &session.modules()?)?;
+    let subjects = Subject::all(&generated, &session.krate.entries);
+
+    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
+    let at_once = std::thread::available_parallelism().map_or(1, usize::from);
+    let this = std::env::current_exe()
+        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))?;
+    let request = Request {
+        columns,
+        seed: args.seed,
+        limit: Duration::from_secs(own.limit),
+        tools: tools(),
+        runner: vec![this.into_os_string(), OsString::from("matrix-runner")],
+        cache: cache.filter(|_| !own.no_cache),
+        at_once,
+        known,
+        whole: args.kernels.is_empty() && own.columns.is_empty(),
+        required,
+    };
+    let progress = Progress::new(quiet);
+    progress.begin(&format!(
+        "Running {} kernels in {} columns",
+        subjects.len(),
+        request.columns.len()
+    ));
+    let report = hankel_matrix::run::run(&request, &subjects, &|what| progress.detail(what))
+        .map_err(|e| Failure::machine(e.to_string(), None))?;
+    drop(progress);
+    if let Some(file) = &own.json {
+        let text = serde_json::to_string_pretty(&report)
+            .map_err(|e| Failure::machine(format!("the report has no JSON form: {e}"), None))?;
+        write(file, text.as_bytes())?;
+    }
+    if let Some(file) = &own.html {
+        write(file, hankel_matrix::html::page(&report).as_bytes())?;
+    }
+    match args.format {
+        Format::Json => print_json(&report),
+        Format::Text => println!("{report}"),
+    }
+    Ok(Outcome::of(report.passed))
+}
+
+/// A process that the matrix runs kernels in.
+pub fn serve(which: &str) -> Result<Outcome> {
+    hankel_matrix::serve(which)
+        .map(|()| Outcome::Fine)
+        .map_err(|e| Failure::machine(e, None))
+}
+
+/// Where foreign programs are looked for.
+pub fn tools() -> Tools {
+    let folder = std::env::var_os("HANKEL_TOOLS")
+        .filter(|v| !v.is_empty())
+        .map(PathBuf::from)
+        .or_else(|| {
+            let cache = hankel_toolchain::Options::from_env().cache_folder().ok()?;
+            Some(cache.join("tools"))
+        })
+        .unwrap_or_else(|| "tools".into());
+    Tools { folder }
+}
+
+fn columns(names: &[String]) -> Result<Vec<Column>> {
+    if names.is_empty() {
+        Ok(Column::ALL.into())
+    } else {
+        columns_named(names)
+    }
+}
+
+fn columns_named(names: &[String]) -> Result<Vec<Column>> {
+    let mut all = names
+        .iter()
+        .map(|n| n.parse::<Column>())
+        .collect::<std::result::Result<Vec<_>, _>>()
+        .map_err(|e| Failure::input(e, "Give one of these names."))?;
+    all.sort();
+    all.dedup();
+    Ok(all)
+}
+
+fn write(file: &std::path::Path, bytes: &[u8]) -> Result<()> {
+    write_whole(file, bytes).map_err(|e| Failure::machine(e.to_string(), None))
+}

@@ -1,0 +1,249 @@
+//! The numbers that a kernel writes, and how far two runs of it are apart.
+
+use hankel_dsl::native::describe::{Kernel, Scalar, Tolerance, Type};
+use serde::{Deserialize, Serialize};
+
+use super::compare::{Distance, Kind};
+use super::execute::Written;
+use crate::device::slots::{self, Use};
+use crate::flat;
+use crate::inputs::{self, Case, Class};
+
+/// What a comparison found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// Invocations compared.
+    pub cases: u64,
+    /// Numbers compared.
+    pub values: u64,
+    /// The largest distance in units in the last place, or in steps of an integer or normalised
+    /// format.
+    pub largest_ulp: u64,
+    /// The largest difference as numbers; `None` if it is not finite.
+    pub largest_absolute: Option<f64>,
+    /// Numbers beyond the tolerance.
+    pub beyond: u64,
+    /// The first number beyond the tolerance; else the first that differs at all.
+    pub first: Option<Difference>,
+}
+
+impl Default for Found {
+    fn default() -> Self {
+        Self {
+            cases: 0,
+            values: 0,
+            largest_ulp: 0,
+            largest_absolute: Some(0.0),
+            beyond: 0,
+            first: None,
+        }
+    }
+}
+
+/// Two numbers that differ.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// Class of the inputs.
+    pub class: Class,
+    /// Invocation, or texel counted row by row.
+    pub invocation: u64,
+    /// Which number of the output.
+    pub value: String,
+    /// The reference's.
+    pub expected: String,
+    /// What came out.
+    pub got: String,
+    /// How far apart, in units in the last place or steps.
+    pub ulp: u64,
+    /// What that invocation read as its own: names and values.
+    pub inputs: Vec<(String, String)>,
+}
+
+/// What a way to run a kernel may differ by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rules {
+    /// Of ordinary inputs and of those at the edges.
+    pub tolerance: Tolerance,
+    /// Subnormal numbers may be taken for zero.
+    pub flushes: bool,
+    /// Of absurd inputs the results are compared like others; else only in that what is finite in
+    /// the reference is finite.
+    pub hostile: bool,
+}
+
+impl Rules {
+    /// A kernel's own tolerance, which is for inputs as in use: with one, absurd inputs, for which
+    /// no condition is bounded, need only give finite results.
+    #[must_use]
+    pub fn of(kernel: &Kernel, tolerance: Tolerance) -> Self {
+        Self {
+            hostile: tolerance.ulp == 0 && tolerance.absolute == 0.0,
+            tolerance,
+            flushes: inputs::flushes(kernel),
+        }
+    }
+}
+
+/// The numbers that a kernel writes.
+#[derive(Debug)]
+pub struct Numbers<'a> {
+    kernel: &'a Kernel,
+    outputs: Vec<Out>,
+}
+
+impl<'a> Numbers<'a> {
+    /// Those of `kernel`.
+    #[must_use]
+    pub fn of(kernel: &'a Kernel) -> Self {
+        Self {
+            kernel,
+            outputs: outputs(kernel),
+        }
+    }
+
+    /// How many are not finite.
+    #[must_use]
+    pub fn non_finite(&self, written: &Written) -> u64 {
+        let mut n = 0;
+        self.each(written, written, false, |_, _, d| {
+            n += u64::from(!d.a.is_finite());
+        });
+        n
+    }
+
+    /// Compares what a case wrote with the reference, and adds what it finds to `found`.
+    pub fn compare(
+        &self,
+        case: &Case,
+        rules: &Rules,
+        reference: &Written,
+        written: &Written,
+        found: &mut Found,
+    ) {
+        found.cases += case.invocations as u64;
+        let lengths = |w: &Written| w.iter().map(Vec::len).collect::<Vec<_>>();
+        if lengths(reference) != lengths(written) {
+            found.beyond += 1;
+        }
+        if case.class == Class::Hostile && !rules.hostile {
+            self.each(reference, written, false, |i, name, d| {
+                found.values += 1;
+                if d.a.is_finite() && !d.b.is_finite() {
+                    found.beyond += 1;
+                    if found.beyond == 1 {
+                        found.first = Some(self.difference(case, i, name, &d));
+                    }
+                }
+            });
+            return;
+        }
+        let tolerance = &rules.tolerance;
+        let fits =
+            |d: &Distance| d.ulp <= tolerance.ulp.into() || d.absolute <= tolerance.absolute;
+        self.each(reference, written, rules.flushes, |i, name, d| {
+            found.values += 1;
+            if d.ulp == 0 {
+                return;
+            }
+            let first_beyond = !fits(&d) && found.beyond == 0;
+            found.beyond += u64::from(!fits(&d));
+            found.largest_ulp = found.largest_ulp.max(d.ulp);
+            found.largest_absolute = found
+                .largest_absolute
+                .map(|x| x.max(d.absolute))
+                .filter(|x| x.is_finite());
+            if found.first.is_none() || first_beyond {
+                found.first = Some(self.difference(case, i, name, &d));
+            }
+        });
+    }
+
+    /// Calls `f` with every number of what was written: element, name, distance.
+    fn each(
+        &self,
+        reference: &Written,
+        written: &Written,
+        flush: bool,
+        mut f: impl FnMut(usize, &str, Distance),
+    ) {
+        for ((out, a), b) in self.outputs.iter().zip(reference).zip(written) {
+            let elements = a.chunks_exact(out.stride).zip(b.chunks_exact(out.stride));
+            for (i, (a, b)) in elements.enumerate() {
+                for (name, kind, offset) in &out.values {
+                    f(i, name, kind.compare(&a[*offset..], &b[*offset..], flush));
+                }
+            }
+        }
+    }
+
+    fn difference(&self, case: &Case, i: usize, name: &str, d: &Distance) -> Difference {
+        Difference {
+            class: case.class,
+            invocation: i as u64,
+            value: name.into(),
+            expected: format!("{:?}", d.a),
+            got: format!("{:?}", d.b),
+            ulp: d.ulp,
+            inputs: inputs::of_invocation(self.kernel, case, i),
+        }
+    }
+}
+
+/// The numbers of one thing that is written.
+#[derive(Debug)]
+struct Out {
+    /// Bytes of an element or texel.
+    stride: usize,
+    /// Name, type and place of each number of it.
+    values: Vec<(String, Kind, usize)>,
+}
+
+/// What a kernel writes, in the order of its slots.
+fn outputs(kernel: &Kernel) -> Vec<Out> {
+    let mut all = Vec::new();
+    for slot in slots::slots(kernel)
+        .into_iter()
+        .filter(|s| s.role.is_written())
+    {
+        let leaves = match slot.role {
+            Use::Output { layout, .. } => flat::leaves(layout),
+            Use::Interface(ty) => flat::type_leaves(ty),
+            Use::Atomic => {
+                let ty = Type::Scalar {
+                    scalar: Scalar::U32,
+                };
+                flat::type_leaves(&ty)
+            }
+            Use::StorageTexture { format, .. } => {
+                let kind = Kind::of(format);
+                let values = ["r", "g", "b", "a"]
+                    .into_iter()
+                    .take(format.channels())
+                    .enumerate()
+                    .map(|(i, c)| (format!("{}.{c}", slot.name), kind, i * kind.bytes()))
+                    .collect();
+                all.push(Out {
+                    stride: format.bytes(),
+                    values,
+                });
+                continue;
+            }
+            _ => continue,
+        };
+        let values = leaves
+            .into_iter()
+            .map(|l| {
+                (
+                    flat::join(&slot.name, &l.path),
+                    Kind::Scalar(l.scalar),
+                    l.offset,
+                )
+            })
+            .collect();
+        all.push(Out {
+            stride: slot.role.element_bytes().unwrap_or(1),
+            values,
+        });
+    }
+    all
+}

@@ -1,0 +1,226 @@
+//! SPIR-V that a foreign compiler made of generated text, made to fit where the kernel's own SPIR-V
+//! fits: the entry point has the kernel's name, everything is bound by the numbers of the
+//! kernel's description, and GLSL's combined samplers are a texture and a sampler again, as the
+//! description has them. The code itself stays as the compiler wrote it.
+
+use std::collections::BTreeMap;
+
+use rspirv::binary::Assemble;
+use rspirv::dr::{self, Builder, Instruction, Operand};
+use rspirv::spirv::{Decoration, Op, StorageClass, Word};
+
+use crate::job::{Job, Role};
+
+/// What is added to the registers of each class, so that a number tells both.
+pub const SHIFTS: [(&str, u32); 4] = [("b", 0), ("t", 1000), ("u", 2000), ("s", 3000)];
+
+/// Makes `code`, compiled from the text of `job` in HLSL, fit. Registers were shifted by
+/// [`SHIFTS`].
+///
+/// # Errors
+/// In words: what is not as expected.
+pub fn hlsl(code: &[u8], entry_point: &str, job: &Job) -> Result<Vec<u8>, String> {
+    let mut numbers = BTreeMap::new();
+    for slot in &job.slots {
+        if let (Some(binding), Some(place)) = (slot.binding, &slot.place) {
+            let shift = SHIFTS.iter().find(|(class, _)| *class == place.class);
+            let (Some((_, shift)), Some(index)) = (shift, place.index) else {
+                return Err(format!("`{}` has no register", slot.name));
+            };
+            numbers.insert(shift + index, binding);
+        }
+    }
+    let mut module = load(code)?;
+    rename(&mut module, entry_point, &job.kernel)?;
+    for i in &mut module.annotations {
+        if let [
+            _,
+            Operand::Decoration(Decoration::Binding),
+            Operand::LiteralBit32(number),
+        ] = &mut i.operands[..]
+        {
+            *number = *numbers.get(number).ok_or_else(|| {
+                let class = SHIFTS
+                    .iter()
+                    .rev()
+                    .find(|(_, shift)| *shift <= *number)
+                    .map_or_else(String::new, |(class, shift)| {
+                        format!("{class}{}", *number - shift)
+                    });
+                format!("register {class} is in no entry of the manifest")
+            })?;
+        }
+    }
+    Ok(bytes(&module))
+}
+
+/// Makes `code`, compiled from the text of `job` in GLSL, fit.
+///
+/// # Errors
+/// In words: what is not as expected.
+pub fn glsl(code: &[u8], job: &Job) -> Result<Vec<u8>, String> {
+    let mut module = load(code)?;
+    rename(&mut module, "main", &job.kernel)?;
+    let mut b = Builder::new_from_module(module);
+    for slot in &job.slots {
+        if let (Some(binding), Role::Texture { .. }, Some(_)) =
+            (slot.binding, &slot.role, &slot.place)
+        {
+            let sampler = job.slots.iter().find_map(|s| {
+                let place = s.place.as_ref()?;
+                place
+                    .combined_with
+                    .contains(&binding)
+                    .then_some(s.binding)?
+            });
+            split(&mut b, binding, sampler)?;
+        }
+    }
+    Ok(bytes(&b.module()))
+}
+
+fn load(code: &[u8]) -> Result<dr::Module, String> {
+    dr::load_bytes(code).map_err(|e| format!("the compiler's SPIR-V cannot be read: {e}"))
+}
+
+fn bytes(module: &dr::Module) -> Vec<u8> {
+    module
+        .assemble()
+        .into_iter()
+        .flat_map(u32::to_le_bytes)
+        .collect()
+}
+
+fn rename(module: &mut dr::Module, from: &str, to: &str) -> Result<(), String> {
+    let name = module
+        .entry_points
+        .iter_mut()
+        .filter_map(|e| e.operands.get_mut(2))
+        .find(|o| **o == Operand::LiteralString(from.into()))
+        .ok_or_else(|| format!("the compiler's SPIR-V has no entry point `{from}`"))?;
+    *name = Operand::LiteralString(to.into());
+    Ok(())
+}
+
+/// The instruction that defines `id` among types and globals.
+fn global(module: &dr::Module, id: Word) -> Option<&Instruction> {
+    module
+        .types_global_values
+        .iter()
+        .find(|i| i.result_id == Some(id))
+}
+
+/// Takes the combined variable at `binding` apart. A texture that no sampler belongs to is only
+/// loaded from, and stays alone.
+fn split(b: &mut Builder, binding: u32, sampler: Option<u32>) -> Result<(), String> {
+    let module = b.module_ref();
+    let found = module.annotations.iter().find_map(|i| match i.operands[..] {
+        [
+            Operand::IdRef(id),
+            Operand::Decoration(Decoration::Binding),
+            Operand::LiteralBit32(n),
+        ] if n == binding => Some(id),
+        _ => None,
+    });
+    // A compiler drops what is not used.
+    let Some(variable) = found else { return Ok(()) };
+    let pointee = |id: Word| match global(module, id)?.operands.get(1)? {
+        Operand::IdRef(inner) => Some(*inner),
+        _ => None,
+    };
+    let combined = global(module, variable)
+        .and_then(|v| v.result_type)
+        .and_then(pointee)
+        .ok_or_else(|| format!("binding {binding} is no variable"))?;
+    let image = match global(module, combined) {
+        Some(i) if i.class.opcode == Op::TypeSampledImage => match i.operands.first() {
+            Some(Operand::IdRef(image)) => *image,
+            _ => return Err(format!("binding {binding} has no image")),
+        },
+        // It is separate already.
+        _ => return Ok(()),
+    };
+    let pointer = b.type_pointer(None, StorageClass::UniformConstant, image);
+    let second = sampler.map(|number| {
+        let ty = b.type_sampler();
+        let pointer = b.type_pointer(None, StorageClass::UniformConstant, ty);
+        let variable = b.variable(pointer, None, StorageClass::UniformConstant, None);
+        b.decorate(
+            variable,
+            Decoration::DescriptorSet,
+            [Operand::LiteralBit32(0)],
+        );
+        b.decorate(
+            variable,
+            Decoration::Binding,
+            [Operand::LiteralBit32(number)],
+        );
+        (ty, variable)
+    });
+    retype(b.module_mut(), variable, pointer);
+
+    let mut next = b.id();
+    let mut fresh = || {
+        next += 1;
+        next - 1
+    };
+    // Without a sampler, what was loaded is the image, and taking the image out of it is a copy.
+    let mut plain = Vec::new();
+    let instruction = |op: Op, ty: Word, id: Word, operands: &[Word]| {
+        let operands = operands.iter().map(|&id| Operand::IdRef(id)).collect();
+        Instruction::new(op, Some(ty), Some(id), operands)
+    };
+    for block in b
+        .module_mut()
+        .functions
+        .iter_mut()
+        .flat_map(|f| &mut f.blocks)
+    {
+        let mut all = Vec::with_capacity(block.instructions.len() + 4);
+        for i in block.instructions.drain(..) {
+            let reads = |id: Word| i.operands.first() == Some(&Operand::IdRef(id));
+            match (i.class.opcode, i.result_id) {
+                (Op::Load, Some(id)) if reads(variable) => match second {
+                    Some((sampler_type, sampler)) => {
+                        let (texture, s) = (fresh(), fresh());
+                        all.push(instruction(Op::Load, image, texture, &[variable]));
+                        all.push(instruction(Op::Load, sampler_type, s, &[sampler]));
+                        all.push(instruction(Op::SampledImage, combined, id, &[texture, s]));
+                    }
+                    None => {
+                        plain.push(id);
+                        all.push(instruction(Op::Load, image, id, &[variable]));
+                    }
+                },
+                (Op::Image, Some(id)) if plain.iter().any(|&p| reads(p)) => {
+                    let from = i.operands.first().and_then(Operand::id_ref_any);
+                    all.push(instruction(
+                        Op::CopyObject,
+                        image,
+                        id,
+                        &[from.unwrap_or(id)],
+                    ));
+                }
+                _ => all.push(i),
+            }
+        }
+        block.instructions = all;
+    }
+    if let Some(header) = &mut b.module_mut().header {
+        header.bound = next + 1;
+    }
+    // The builder counts on from the header of the module that it is made from.
+    let module = std::mem::replace(b, Builder::new()).module();
+    *b = Builder::new_from_module(module);
+    Ok(())
+}
+
+/// Gives a variable another type, after the declaration of which it then stands.
+fn retype(module: &mut dr::Module, variable: Word, pointer: Word) {
+    let all = &mut module.types_global_values;
+    if let Some(at) = all.iter().position(|i| i.result_id == Some(variable)) {
+        let mut declaration = all.remove(at);
+        declaration.result_type = Some(pointer);
+        all.push(declaration);
+    }
+}

@@ -1,0 +1,123 @@
+//! From generated text to SPIR-V, through the compilers that other people have.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use crate::adopt;
+use crate::job::{Job, Stage};
+use crate::process::{Failure, Finished, run};
+use crate::tools::Dxc;
+
+/// GLSL 4.50 through glslang.
+///
+/// # Errors
+/// [`Failure::Refused`] with the compiler's words; a crash or time-out.
+pub fn glsl(glslang: &Path, job: &Job, out: &Path, limit: Duration) -> Result<Vec<u8>, Failure> {
+    let mut command = Command::new(glslang);
+    command
+        .args(["-V", "--target-env", "vulkan1.1", "-S", stage(job), "-o"])
+        .args([out, &job.code]);
+    finish(run(&mut command, limit)?, "glslangValidator", &job.code)?;
+    adopt::glsl(&compiled(out)?, job).map_err(Failure::refused)
+}
+
+/// HLSL through glslang's second front end. It does not know the attribute that says a storage
+/// texture's format, so the format is the texture's own.
+///
+/// # Errors
+/// As for [`glsl`].
+pub fn hlsl_glslang(
+    glslang: &Path,
+    job: &Job,
+    out: &Path,
+    limit: Duration,
+) -> Result<Vec<u8>, Failure> {
+    let mut command = Command::new(glslang);
+    command.args(["-D", "-V", "--target-env", "vulkan1.1", "-S", stage(job)]);
+    command.args(["-e", &job.entry_point, "--no-storage-format"]);
+    for (class, shift) in adopt::SHIFTS {
+        // `u` is the class of unordered access; `b` is a uniform buffer's.
+        let option = match class {
+            "b" => "--shift-cbuffer-binding",
+            "t" => "--shift-texture-binding",
+            "u" => "--shift-UAV-binding",
+            _ => "--shift-sampler-binding",
+        };
+        command.args([option, &shift.to_string()]);
+        if class == "t" {
+            // Read-only buffers have registers of textures.
+            command.args(["--shift-ssbo-binding", &shift.to_string()]);
+        }
+    }
+    command.arg("-o").args([out, &job.code]);
+    finish(run(&mut command, limit)?, "glslangValidator", &job.code)?;
+    adopt::hlsl(&compiled(out)?, &job.entry_point, job).map_err(Failure::refused)
+}
+
+/// HLSL through DXC. Constant buffers are laid out as Direct3D does.
+///
+/// # Errors
+/// As for [`glsl`].
+pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec<u8>, Failure> {
+    let model = match job.stage {
+        Stage::Compute { .. } => "cs",
+        Stage::Vertex => "vs",
+        Stage::Fragment => "ps",
+    };
+    let profile = format!("{model}_{DXC_MODEL}");
+    let mut arguments: Vec<String> = ["-spirv", "-fspv-target-env=vulkan1.1", "-fvk-use-dx-layout"]
+        .map(String::from)
+        .into();
+    for (class, shift) in adopt::SHIFTS {
+        arguments.extend([
+            format!("-fvk-{class}-shift"),
+            shift.to_string(),
+            "all".into(),
+        ]);
+    }
+    let mut command = dxc.command(&job.code, &job.entry_point, &profile, out);
+    command.args(arguments);
+    finish(run(&mut command, limit)?, "dxc", &job.code)?;
+    adopt::hlsl(&compiled(out)?, &job.entry_point, job).map_err(Failure::refused)
+}
+
+/// The shader model that HLSL is written and compiled for: the first with 64-bit floats in
+/// buffers.
+pub const SHADER_MODEL: &str = "6.2";
+
+const DXC_MODEL: &str = "6_2";
+
+const fn stage(job: &Job) -> &'static str {
+    match job.stage {
+        Stage::Compute { .. } => "comp",
+        Stage::Vertex => "vert",
+        Stage::Fragment => "frag",
+    }
+}
+
+/// Judges how a compiler ended. Its words name the file; here they need not say where it lies.
+fn finish(done: Finished, program: &str, source: &Path) -> Result<(), Failure> {
+    if done.status.success() {
+        return Ok(());
+    }
+    let folder = source.parent().map(PathBuf::from).unwrap_or_default();
+    let words = done
+        .words()
+        .replace(&format!("{}/", folder.display()), "");
+    match done.crash() {
+        Some(how) => Err(Failure::Crashed {
+            program: program.into(),
+            how,
+            log: words,
+        }),
+        None => Err(Failure::Refused {
+            message: format!("{program}: {words}"),
+        }),
+    }
+}
+
+fn compiled(out: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(out).map_err(|e| Failure::refused(format!("the compiler left no SPIR-V: {e}")))
+}

@@ -1,0 +1,241 @@
+//! What a runner is asked to do: one kernel in one language, with the inputs of all its cases.
+//!
+//! Runners are programs of their own, so that a driver that crashes takes nothing with it, and may
+//! be written in any language: a job is one line of JSON, the inputs are a file of bytes, and so
+//! are the results.
+//!
+//! - A runner starts by printing one line `{"ready": "name and versions of the device"}`.
+//! - It reads a [`Job`] from each line of its standard input, and answers each with one line,
+//!   a [`Reply`].
+//! - [`Job::inputs`] holds the bytes that the arguments point into; of a texture they are packed,
+//!   row by row, slice by slice, a texel's samples together.
+//! - [`Job::results`] is written whole before the reply: for every case in order, for every slot
+//!   that is written in order, its bytes. A buffer or texture has as many as its argument. What a
+//!   vertex or fragment stage returns has `invocations` tightly packed values.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// A kernel to be run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// Its number, for the reply.
+    pub id: u64,
+    /// The kernel's name.
+    pub kernel: String,
+    /// The entry point's name in the code.
+    pub entry_point: String,
+    /// The stage.
+    pub stage: Stage,
+    /// The text, or the SPIR-V.
+    pub code: PathBuf,
+    /// The arguments, as `hankel_host::device::slots::slots` orders them.
+    pub slots: Vec<Slot>,
+    /// MSL: slot of the buffer with the sizes of others in bytes, one `u32` each.
+    #[serde(default)]
+    pub sizes_slot: Option<u32>,
+    /// MSL: bindings whose sizes that buffer holds, in order.
+    #[serde(default)]
+    pub sized: Vec<u32>,
+    /// The runs.
+    pub cases: Vec<Case>,
+    /// File with the bytes of the inputs.
+    pub inputs: PathBuf,
+    /// File to be written.
+    pub results: PathBuf,
+}
+
+/// A pipeline stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Stage {
+    /// A compute shader.
+    Compute {
+        /// Invocations of a workgroup.
+        threads: [u32; 3],
+    },
+    /// A vertex shader, one invocation for each vertex: the results are what each of them returns.
+    Vertex,
+    /// A fragment shader: invocation `i` gets the `i`th value of each varying, not interpolated.
+    Fragment,
+}
+
+/// An argument of a kernel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Slot {
+    /// The parameter's name.
+    pub name: String,
+    /// Number in descriptor set 0, if it is bound.
+    pub binding: Option<u32>,
+    /// Where it is bound in this language; none for what the kernel does not use.
+    pub place: Option<Place>,
+    /// What it is for.
+    pub role: Role,
+}
+
+/// Where a binding is in a language: see `hankel_codegen::translate::Place`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    /// The variable's name in the text.
+    pub name: Option<String>,
+    /// What numbers it.
+    pub class: String,
+    /// The number.
+    pub index: Option<u32>,
+    /// GLSL: name of the block around a buffer.
+    pub block: Option<String>,
+    /// GLSL: bindings of the textures that this sampler has become one with.
+    pub combined_with: Vec<u32>,
+}
+
+/// What an argument is for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Role {
+    /// A uniform buffer.
+    Uniform,
+    /// A storage buffer that is read.
+    Read,
+    /// A storage buffer of `u32` counters; written.
+    Atomic,
+    /// A storage buffer that is written.
+    Write,
+    /// A texture that is read.
+    Texture {
+        /// 2 or 3.
+        dimensions: u32,
+        /// Whether it has several samples.
+        multisampled: bool,
+    },
+    /// A sampler.
+    Sampler,
+    /// A texture that is written.
+    StorageTexture {
+        /// WebGPU's name of its format.
+        format: String,
+        /// 2 or 3.
+        dimensions: u32,
+    },
+    /// A vertex attribute, tightly packed.
+    Attribute {
+        /// Its location.
+        location: u32,
+        /// Its type.
+        value: Value,
+    },
+    /// A value of each fragment, tightly packed.
+    Varying {
+        /// Its location.
+        location: u32,
+        /// Its type.
+        value: Value,
+    },
+    /// The position that a vertex stage returns: four floats; written.
+    Position,
+    /// Another value that a vertex stage returns; written.
+    Passed {
+        /// Its location.
+        location: u32,
+        /// Its type.
+        value: Value,
+    },
+    /// A colour that a fragment stage returns; written.
+    Target {
+        /// Its location.
+        location: u32,
+        /// Its type.
+        value: Value,
+    },
+}
+
+impl Role {
+    /// Whether the kernel writes it.
+    #[must_use]
+    pub const fn is_written(&self) -> bool {
+        matches!(
+            self,
+            Self::Atomic
+                | Self::Write
+                | Self::StorageTexture { .. }
+                | Self::Position
+                | Self::Passed { .. }
+                | Self::Target { .. }
+        )
+    }
+}
+
+/// A scalar or vector of 32-bit components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Value {
+    /// Its components.
+    pub scalar: Scalar,
+    /// How many, 1 to 4.
+    pub size: u32,
+}
+
+/// A 32-bit component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scalar {
+    /// Float.
+    F32,
+    /// Unsigned.
+    U32,
+    /// Signed.
+    I32,
+}
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Case {
+    /// Invocations whose results count: vertices, fragments.
+    pub invocations: u32,
+    /// Compute: how many workgroups.
+    pub groups: [u32; 3],
+    /// One for each slot.
+    pub args: Vec<Arg>,
+}
+
+/// What is given for a slot.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Arg {
+    /// A buffer, or what each vertex or fragment has of its own.
+    Bytes {
+        /// Where its contents begin in the inputs.
+        offset: u64,
+        /// How many bytes.
+        length: u64,
+    },
+    /// A texture, one mip level.
+    Texture {
+        /// WebGPU's name of its format.
+        format: String,
+        /// Texels along each axis.
+        size: [u32; 3],
+        /// 1 or 4.
+        samples: u32,
+        /// Where its texels begin in the inputs.
+        offset: u64,
+        /// How many bytes.
+        length: u64,
+    },
+    /// A sampler; the same filter and address mode in all directions, one mip level.
+    Sampler {
+        /// Linear, else nearest.
+        linear: bool,
+        /// Repeats, else clamps to the edge.
+        repeat: bool,
+    },
+}
+
+/// A runner's answer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reply {
+    /// The job's number.
+    pub id: u64,
+    /// What went wrong; none if the results are there.
+    #[serde(default)]
+    pub error: Option<String>,
+}

@@ -1,0 +1,737 @@
+// Runs a kernel that was compiled as C++: reads what it is given, calls it for every invocation,
+// writes the results. Linked to what is generated for the kernel.
+//
+//     PROGRAM plan inputs results
+//
+// The plan is words between white space; see `plan` in mod.rs. Anything that is wrong ends the
+// program with words on the standard error and a status that is not 0.
+
+#include "runner.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <ucontext.h>
+#include <unistd.h>
+
+namespace {
+
+// ---- memory with nothing around it ----
+
+// A slot's memory: it ends where pages begin that cannot be touched, so that an access beyond it
+// faults; before it too.
+struct Region {
+    unsigned char *mapped;
+    size_t mapped_bytes;
+    // Pages that can be touched, and where the contents lie in them.
+    unsigned char *open;
+    size_t open_bytes;
+    unsigned char *data;
+    size_t bytes;
+    const char *name;
+};
+
+constexpr size_t page = 4096;
+// What a 32-bit index into elements of a few words reaches.
+constexpr size_t reserved_after = size_t(64) << 30;
+constexpr size_t reserved_before = size_t(1) << 30;
+constexpr unsigned char canary = 0xA7;
+constexpr unsigned max_regions = 128;
+Region regions[max_regions];
+unsigned region_count = 0;
+
+const msl_call *current = nullptr;
+
+Region *reserve(const char *name, size_t bytes, size_t align) {
+    if (region_count == max_regions)
+        msl_fail("too many buffers");
+    Region &r = regions[region_count];
+    // A plan's names begin with a mark, so that none is empty.
+    r.name = name[0] == '_' ? name + 1 : name;
+    r.bytes = bytes;
+    r.open_bytes = (bytes + align + page - 1) / page * page;
+    r.mapped_bytes = reserved_before + r.open_bytes + reserved_after;
+    void *p = mmap(nullptr, r.mapped_bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE,
+                   -1, 0);
+    if (p == MAP_FAILED)
+        msl_fail("no address space for a buffer and what must not be touched around it");
+    r.mapped = static_cast<unsigned char *>(p);
+    r.open = r.mapped + reserved_before;
+    if (mprotect(r.open, r.open_bytes, PROT_READ | PROT_WRITE) != 0)
+        msl_fail("no memory for a buffer");
+    // As near to the end as the type's alignment lets it.
+    size_t start = (r.open_bytes - bytes) / align * align;
+    r.data = r.open + start;
+    memset(r.open, canary, r.open_bytes);
+    region_count++;
+    return &r;
+}
+
+void make_read_only(const Region &r) {
+    if (mprotect(r.open, r.open_bytes, PROT_READ) != 0)
+        msl_fail("a buffer cannot be made read-only");
+}
+
+// What the pages hold beside the contents must be as it was.
+void check_canaries(const Region &r) {
+    for (size_t i = 0; i < r.open_bytes; i++) {
+        unsigned char *at = r.open + i;
+        if ((at < r.data || at >= r.data + r.bytes) && *at != canary) {
+            fprintf(stderr, "write out of bounds: `%s` has %zu bytes, byte %td was written\n",
+                    r.name, r.bytes, at - r.data);
+            exit(1);
+        }
+    }
+}
+
+void release_all() {
+    for (unsigned i = 0; i < region_count; i++) {
+        check_canaries(regions[i]);
+        munmap(regions[i].mapped, regions[i].mapped_bytes);
+    }
+    region_count = 0;
+}
+
+void on_fault(int signal, siginfo_t *info, void *) {
+    if (signal == SIGILL || signal == SIGTRAP || signal == SIGFPE) {
+        fprintf(stderr, "an operation without a defined result (overflow of a signed integer, "
+                        "division by zero, a float beyond the integers, an index beyond an array)");
+    } else {
+        auto at = static_cast<unsigned char *>(info->si_addr);
+        const Region *found = nullptr;
+        for (unsigned i = 0; i < region_count; i++)
+            if (at >= regions[i].mapped && at < regions[i].mapped + regions[i].mapped_bytes)
+                found = &regions[i];
+        if (found == nullptr)
+            fprintf(stderr, "access to memory that is no buffer's");
+        else if (at >= found->data && at < found->data + found->bytes)
+            fprintf(stderr, "write to `%s`, which is only read", found->name);
+        else
+            fprintf(stderr, "access out of bounds: `%s` has %zu bytes, byte %td was touched",
+                    found->name, found->bytes, at - found->data);
+    }
+    if (current != nullptr)
+        fprintf(stderr, ", by thread (%u, %u, %u)", current->thread_position_in_grid[0],
+                current->thread_position_in_grid[1], current->thread_position_in_grid[2]);
+    fprintf(stderr, "\n");
+    // Dies by the signal itself, once the instruction is met again.
+    struct sigaction plain = {};
+    plain.sa_handler = SIG_DFL;
+    sigaction(signal, &plain, nullptr);
+}
+
+void watch_faults() {
+    static unsigned char stack[1 << 16];
+    stack_t other = {};
+    other.ss_sp = stack;
+    other.ss_size = sizeof stack;
+    sigaltstack(&other, nullptr);
+    struct sigaction action = {};
+    action.sa_sigaction = on_fault;
+    action.sa_flags = SA_SIGINFO | SA_ONSTACK;
+    const int signals[] = {SIGSEGV, SIGBUS, SIGILL, SIGTRAP, SIGFPE};
+    for (int signal : signals)
+        sigaction(signal, &action, nullptr);
+}
+
+} // namespace
+
+extern "C" void msl_fail(const char *why) {
+    fprintf(stderr, "%s\n", why);
+    exit(1);
+}
+
+// ---- textures ----
+
+enum Format { r32float, rgba32float, rgba16float, rgba16unorm, rgba8unorm, r32uint, rgba32uint };
+
+namespace {
+struct FormatOf {
+    const char *name;
+    Format format;
+    unsigned bytes;
+};
+constexpr FormatOf formats[] = {
+    {"r32float", r32float, 4},       {"rgba32float", rgba32float, 16},
+    {"rgba16float", rgba16float, 8}, {"rgba16unorm", rgba16unorm, 8},
+    {"rgba8unorm", rgba8unorm, 4},   {"r32uint", r32uint, 4},
+    {"rgba32uint", rgba32uint, 16},
+};
+} // namespace
+
+struct msl_texture {
+    Format format;
+    unsigned texel_bytes;
+    unsigned size[3];
+    unsigned samples;
+    unsigned char *texels;
+
+    bool is_integer() const { return format == r32uint || format == rgba32uint; }
+    bool has(const unsigned *at, unsigned sample, unsigned lod) const {
+        return lod == 0 && at[0] < size[0] && at[1] < size[1] && at[2] < size[2] &&
+               sample < samples;
+    }
+    unsigned char *texel(const unsigned *at, unsigned sample) const {
+        size_t i = (size_t(at[2]) * size[1] + at[1]) * size[0] + at[0];
+        return texels + (i * samples + sample) * texel_bytes;
+    }
+};
+
+namespace {
+// To the nearest step, ties to even; NaN is 0.
+unsigned unorm(float x, float steps) {
+    return x > 0 ? unsigned(rintf((x < 1 ? x : 1) * steps)) : 0;
+}
+
+void load(const msl_texture &t, const unsigned *at, unsigned sample, float *out) {
+    const unsigned char *texel = t.texel(at, sample);
+    out[0] = out[1] = out[2] = 0;
+    out[3] = 1;
+    switch (t.format) {
+    case r32float:
+        memcpy(out, texel, 4);
+        break;
+    case rgba32float:
+        memcpy(out, texel, 16);
+        break;
+    case rgba16float:
+        for (int i = 0; i < 4; i++) {
+            _Float16 h;
+            memcpy(&h, texel + 2 * i, 2);
+            out[i] = float(h);
+        }
+        break;
+    case rgba16unorm:
+        for (int i = 0; i < 4; i++) {
+            uint16_t n;
+            memcpy(&n, texel + 2 * i, 2);
+            out[i] = float(n) / 65535.0f;
+        }
+        break;
+    case rgba8unorm:
+        for (int i = 0; i < 4; i++)
+            out[i] = float(texel[i]) / 255.0f;
+        break;
+    case r32uint:
+    case rgba32uint:
+        msl_fail("a texture of integers is read as one of floats");
+    }
+}
+} // namespace
+
+extern "C" {
+unsigned msl_texture_size(const msl_texture *t, int axis) { return t->size[axis]; }
+unsigned msl_texture_samples(const msl_texture *t) { return t->samples; }
+
+void msl_load_float(const msl_texture *t, const unsigned *at, unsigned sample, unsigned lod,
+                    float *out) {
+    if (t->has(at, sample, lod))
+        load(*t, at, sample, out);
+    else
+        out[0] = out[1] = out[2] = out[3] = 0;
+}
+
+void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned sample, unsigned lod,
+                   unsigned *out) {
+    if (!t->is_integer())
+        msl_fail("a texture of floats is read as one of integers");
+    out[0] = out[1] = out[2] = out[3] = 0;
+    if (!t->has(at, sample, lod))
+        return;
+    out[3] = 1;
+    memcpy(out, t->texel(at, sample), t->texel_bytes);
+}
+
+void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const float *value) {
+    if (t->is_integer())
+        msl_fail("floats are written to a texture of integers");
+    if (!t->has(at, 0, lod))
+        return;
+    unsigned char *texel = t->texel(at, 0);
+    for (unsigned i = 0; i < 4; i++) {
+        switch (t->format) {
+        case rgba16float: {
+            auto h = static_cast<_Float16>(value[i]);
+            memcpy(texel + 2 * i, &h, 2);
+            break;
+        }
+        case rgba16unorm: {
+            auto n = static_cast<uint16_t>(unorm(value[i], 65535));
+            memcpy(texel + 2 * i, &n, 2);
+            break;
+        }
+        case rgba8unorm:
+            texel[i] = static_cast<unsigned char>(unorm(value[i], 255));
+            break;
+        default:
+            if (4 * i < t->texel_bytes)
+                memcpy(texel + 4 * i, value + i, 4);
+        }
+    }
+}
+
+void msl_store_uint(msl_texture *t, const unsigned *at, unsigned lod, const unsigned *value) {
+    if (!t->is_integer())
+        msl_fail("integers are written to a texture of floats");
+    if (t->has(at, 0, lod))
+        memcpy(t->texel(at, 0), value, t->texel_bytes);
+}
+}
+
+// ---- sampling, with weights in full precision ----
+
+namespace {
+// The texels around a coordinate, and how much of the second in each direction.
+struct Taps {
+    int64_t base[3];
+    float weight[3];
+};
+
+int64_t whole(float x) {
+    if (!(x == x))
+        return 0;
+    constexpr float limit = 4611686018427387904.0f;
+    return x >= limit ? int64_t(1) << 62 : x <= -limit ? -(int64_t(1) << 62) : int64_t(x);
+}
+
+Taps taps(const msl_texture &t, unsigned flags, const float *at, const int *offset) {
+    Taps r;
+    bool linear = (flags & msl_linear) != 0;
+    for (int d = 0; d < 3; d++) {
+        float x = (flags & msl_pixels) != 0 ? at[d] : at[d] * float(t.size[d]);
+        if (linear)
+            x = x - 0.5f;
+        float below = floorf(x);
+        r.base[d] = whole(below) + offset[d];
+        r.weight[d] = linear ? x - below : 0.0f;
+        // What has no depth is not filtered along it.
+        if (d == 2 && t.size[d] == 1) {
+            r.base[d] = 0;
+            r.weight[d] = 0;
+        }
+    }
+    return r;
+}
+
+unsigned wrap(int64_t i, unsigned size, unsigned flags) {
+    auto n = int64_t(size);
+    if ((flags & msl_repeat) != 0)
+        return unsigned(((i % n) + n) % n);
+    return unsigned(i < 0 ? 0 : i >= n ? n - 1 : i);
+}
+
+void tap(const msl_texture &t, const Taps &taps, unsigned flags, int dx, int dy, int dz,
+         float *out) {
+    if (t.samples != 1)
+        msl_fail("a texture with several samples is sampled");
+    const int step[3] = {dx, dy, dz};
+    unsigned at[3];
+    for (int d = 0; d < 3; d++)
+        at[d] = wrap(taps.base[d] + step[d], t.size[d], flags);
+    load(t, at, 0, out);
+}
+
+void slice(const msl_texture &t, const Taps &taps, unsigned flags, int dz, float *out) {
+    float a[4], b[4], c[4], d[4];
+    tap(t, taps, flags, 0, 0, dz, a);
+    tap(t, taps, flags, 1, 0, dz, b);
+    tap(t, taps, flags, 0, 1, dz, c);
+    tap(t, taps, flags, 1, 1, dz, d);
+    float x = taps.weight[0], y = taps.weight[1];
+    for (int i = 0; i < 4; i++) {
+        float near = a[i] * (1.0f - x) + b[i] * x;
+        float far = c[i] * (1.0f - x) + d[i] * x;
+        out[i] = near * (1.0f - y) + far * y;
+    }
+}
+} // namespace
+
+extern "C" {
+void msl_sample_float(const msl_texture *t, unsigned flags, const float *at, const int *offset,
+                      float *out) {
+    Taps around = taps(*t, flags, at, offset);
+    if ((flags & msl_linear) == 0) {
+        tap(*t, around, flags, 0, 0, 0, out);
+        return;
+    }
+    slice(*t, around, flags, 0, out);
+    float z = around.weight[2];
+    if (z == 0)
+        return;
+    float back[4];
+    slice(*t, around, flags, 1, back);
+    for (int i = 0; i < 4; i++)
+        out[i] = out[i] * (1.0f - z) + back[i] * z;
+}
+
+void msl_gather_float(const msl_texture *t, unsigned flags, const float *at, const int *offset,
+                      unsigned channel, float *out) {
+    Taps around = taps(*t, flags | msl_linear, at, offset);
+    const int order[4][2] = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
+    for (int i = 0; i < 4; i++) {
+        float v[4];
+        tap(*t, around, flags, order[i][0], order[i][1], 0, v);
+        out[i] = v[channel];
+    }
+}
+}
+
+// ---- invocations ----
+
+namespace {
+bool discarded = false;
+
+struct Fiber {
+    ucontext_t context;
+    msl_call call;
+    // The barrier that it waits at; 0 for none.
+    unsigned waits_at;
+    bool done;
+};
+ucontext_t scheduler;
+Fiber *fibers = nullptr;
+Fiber *running = nullptr;
+unsigned char *stacks = nullptr;
+constexpr size_t stack_bytes = size_t(1) << 18;
+unsigned fiber_capacity = 0;
+
+void fiber_main() {
+    msl_invoke(&running->call);
+    running->done = true;
+    // Ends here: the scheduler never comes back.
+    swapcontext(&running->context, &scheduler);
+}
+
+void make_fibers(unsigned count) {
+    if (count <= fiber_capacity)
+        return;
+    fibers = static_cast<Fiber *>(calloc(count, sizeof(Fiber)));
+    // The lowest page of each stack cannot be touched.
+    void *p = mmap(nullptr, count * stack_bytes, PROT_READ | PROT_WRITE,
+                   MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (fibers == nullptr || p == MAP_FAILED)
+        msl_fail("no memory for the threads of a workgroup");
+    stacks = static_cast<unsigned char *>(p);
+    for (unsigned i = 0; i < count; i++)
+        mprotect(stacks + i * stack_bytes, page, PROT_NONE);
+    fiber_capacity = count;
+}
+
+// The threads of a workgroup up to each barrier in turn, every time in another order: a result that
+// needs a barrier that is not there is then a wrong one.
+void run_workgroup(unsigned count) {
+    static uint64_t state = 0x9E3779B97F4A7C15u;
+    static unsigned *order = nullptr;
+    static unsigned ordered = 0;
+    if (ordered < count) {
+        order = static_cast<unsigned *>(realloc(order, count * sizeof(unsigned)));
+        if (order == nullptr)
+            msl_fail("no memory for the threads of a workgroup");
+        ordered = count;
+    }
+    for (unsigned i = 0; i < count; i++) {
+        Fiber &f = fibers[i];
+        f.done = false;
+        f.waits_at = 0;
+        getcontext(&f.context);
+        f.context.uc_stack.ss_sp = stacks + i * stack_bytes + page;
+        f.context.uc_stack.ss_size = stack_bytes - page;
+        f.context.uc_link = &scheduler;
+        makecontext(&f.context, fiber_main, 0);
+    }
+    for (;;) {
+        for (unsigned i = 0; i < count; i++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            unsigned j = unsigned((state >> 33) % (i + 1));
+            order[i] = order[j];
+            order[j] = i;
+        }
+        for (unsigned i = 0; i < count; i++) {
+            running = &fibers[order[i]];
+            running->waits_at = 0;
+            current = &running->call;
+            swapcontext(&scheduler, &running->context);
+        }
+        current = nullptr;
+        unsigned done = 0;
+        for (unsigned i = 0; i < count; i++) {
+            done += fibers[i].done ? 1 : 0;
+            if (fibers[i].done != fibers[0].done || fibers[i].waits_at != fibers[0].waits_at) {
+                fprintf(stderr,
+                        "a barrier that not all threads reach: thread 0 of a workgroup is %s "
+                        "(line %u), thread %u %s (line %u)\n",
+                        fibers[0].done ? "done" : "at one", fibers[0].waits_at, i,
+                        fibers[i].done ? "done" : "at one", fibers[i].waits_at);
+                exit(1);
+            }
+        }
+        if (done == count)
+            return;
+    }
+}
+} // namespace
+
+extern "C" {
+void msl_barrier(unsigned line) {
+    if (running == nullptr)
+        msl_fail("a barrier outside of a workgroup");
+    Fiber *me = running;
+    me->waits_at = line;
+    swapcontext(&me->context, &scheduler);
+}
+void msl_discard() { discarded = true; }
+bool msl_discarded() {
+    bool was = discarded;
+    discarded = false;
+    return was;
+}
+}
+
+// ---- the plan ----
+
+namespace {
+FILE *plan_file = nullptr;
+
+uint64_t number() {
+    unsigned long long n = 0;
+    if (fscanf(plan_file, "%llu", &n) != 1)
+        msl_fail("the plan is cut off");
+    return n;
+}
+
+void word(char (&text)[64]) {
+    if (fscanf(plan_file, "%63s", text) != 1)
+        msl_fail("the plan is cut off");
+}
+
+struct Slot {
+    char name[64];
+    // One of: buffer, sizes, texture, sampler, in, out.
+    char kind[64];
+    bool written;
+    // Of a case.
+    unsigned char *data;
+    size_t bytes;
+    msl_texture texture;
+    unsigned sampler;
+};
+
+unsigned char *inputs = nullptr;
+size_t input_bytes = 0;
+
+const unsigned char *input(uint64_t offset, uint64_t bytes) {
+    if (offset > input_bytes || bytes > input_bytes - offset)
+        msl_fail("the inputs are shorter than the plan says");
+    return inputs + offset;
+}
+
+size_t align_of(unsigned slot) {
+    for (unsigned i = 0; i < msl_buffer_count; i++)
+        if (msl_buffers[i].slot == slot)
+            return msl_buffers[i].align;
+    return 1;
+}
+
+void read_inputs(const char *path) {
+    FILE *f = fopen(path, "rb");
+    if (f == nullptr)
+        msl_fail("the inputs cannot be opened");
+    fseek(f, 0, SEEK_END);
+    long bytes = ftell(f);
+    rewind(f);
+    input_bytes = bytes < 0 ? 0 : size_t(bytes);
+    inputs = static_cast<unsigned char *>(malloc(input_bytes + 1));
+    if (inputs == nullptr || fread(inputs, 1, input_bytes, f) != input_bytes)
+        msl_fail("the inputs cannot be read");
+    fclose(f);
+}
+
+// Reads what a case gives for a slot, and makes it.
+void prepare(Slot &s, unsigned index, unsigned invocations) {
+    s.bytes = 0;
+    if (strcmp(s.kind, "sampler") == 0) {
+        s.sampler = unsigned(number());
+        return;
+    }
+    if (strcmp(s.kind, "out") == 0) {
+        s.bytes = size_t(number()) * invocations;
+        s.data = reserve(s.name, s.bytes, 1)->data;
+        memset(s.data, 0, s.bytes);
+        return;
+    }
+    if (strcmp(s.kind, "sizes") == 0) {
+        // Bytes of other buffers.
+        s.bytes = size_t(number()) * 4;
+        Region *r = reserve(s.name, s.bytes, align_of(index));
+        for (size_t i = 0; i < s.bytes; i += 4) {
+            auto size = static_cast<unsigned>(number());
+            memcpy(r->data + i, &size, 4);
+        }
+        s.data = r->data;
+        make_read_only(*r);
+        return;
+    }
+    if (strcmp(s.kind, "texture") == 0) {
+        char name[64];
+        word(name);
+        const FormatOf *format = nullptr;
+        for (const FormatOf &f : formats)
+            if (strcmp(f.name, name) == 0)
+                format = &f;
+        if (format == nullptr)
+            msl_fail("a texture of an unknown format");
+        s.texture.format = format->format;
+        s.texture.texel_bytes = format->bytes;
+        size_t texels = 1;
+        for (unsigned &size : s.texture.size) {
+            size = unsigned(number());
+            texels *= size;
+        }
+        s.texture.samples = unsigned(number());
+        if (texels == 0 || s.texture.samples == 0)
+            msl_fail("a texture without texels");
+        uint64_t offset = number();
+        s.bytes = number();
+        if (s.bytes != texels * s.texture.samples * format->bytes)
+            msl_fail("a texture's bytes are not as many as its texels need");
+        Region *r = reserve(s.name, s.bytes, 1);
+        memcpy(r->data, input(offset, s.bytes), s.bytes);
+        s.data = s.texture.texels = r->data;
+        if (!s.written)
+            make_read_only(*r);
+        return;
+    }
+    bool stream = strcmp(s.kind, "in") == 0;
+    uint64_t stride = stream ? number() : 0;
+    uint64_t offset = number();
+    s.bytes = number();
+    if (stream && s.bytes < stride * invocations)
+        msl_fail("fewer values of a vertex or fragment than invocations");
+    Region *r = reserve(s.name, s.bytes, align_of(index));
+    memcpy(r->data, input(offset, s.bytes), s.bytes);
+    s.data = r->data;
+    if (!s.written)
+        make_read_only(*r);
+}
+
+void *argument(Slot &s) {
+    if (strcmp(s.kind, "sampler") == 0)
+        return &s.sampler;
+    if (strcmp(s.kind, "texture") == 0)
+        return &s.texture;
+    return s.data;
+}
+
+void run_compute(msl_call call, const unsigned *threads, const unsigned *groups) {
+    unsigned count = threads[0] * threads[1] * threads[2];
+    void *shared[64] = {};
+    const Region *shared_regions[64] = {};
+    if (msl_workgroup_count > 64)
+        msl_fail("too many variables of workgroups");
+    for (unsigned i = 0; i < msl_workgroup_count; i++) {
+        shared_regions[i] =
+            reserve("threadgroup memory", msl_workgroup[i].size, msl_workgroup[i].align);
+        shared[i] = shared_regions[i]->data;
+    }
+    call.workgroup = shared;
+    for (int d = 0; d < 3; d++) {
+        call.threads_per_threadgroup[d] = threads[d];
+        call.threadgroups_per_grid[d] = groups[d];
+        call.threads_per_grid[d] = threads[d] * groups[d];
+    }
+    if (msl_has_barriers)
+        make_fibers(count);
+    unsigned g[3], t[3];
+    for (g[2] = 0; g[2] < groups[2]; g[2]++)
+        for (g[1] = 0; g[1] < groups[1]; g[1]++)
+            for (g[0] = 0; g[0] < groups[0]; g[0]++) {
+                // It begins with anything: here with what is unlikely to do.
+                for (unsigned i = 0; i < msl_workgroup_count; i++)
+                    memset(shared[i], 0xFF, msl_workgroup[i].size);
+                unsigned index = 0;
+                for (t[2] = 0; t[2] < threads[2]; t[2]++)
+                    for (t[1] = 0; t[1] < threads[1]; t[1]++)
+                        for (t[0] = 0; t[0] < threads[0]; t[0]++) {
+                            for (int d = 0; d < 3; d++) {
+                                call.threadgroup_position_in_grid[d] = g[d];
+                                call.thread_position_in_threadgroup[d] = t[d];
+                                call.thread_position_in_grid[d] = g[d] * threads[d] + t[d];
+                            }
+                            call.thread_index_in_threadgroup[0] = index;
+                            if (msl_has_barriers) {
+                                fibers[index].call = call;
+                            } else {
+                                current = &call;
+                                msl_invoke(&call);
+                            }
+                            index++;
+                        }
+                current = nullptr;
+                if (msl_has_barriers)
+                    run_workgroup(count);
+            }
+}
+} // namespace
+
+int main(int argc, char **argv) {
+    if (argc != 4)
+        msl_fail("arguments: plan inputs results");
+    watch_faults();
+    read_inputs(argv[2]);
+    plan_file = fopen(argv[1], "r");
+    FILE *results = fopen(argv[3], "wb");
+    if (plan_file == nullptr || results == nullptr)
+        msl_fail("the plan or the results cannot be opened");
+    char stage[64];
+    word(stage);
+    unsigned threads[3];
+    for (unsigned &n : threads)
+        n = unsigned(number());
+    auto slot_count = unsigned(number());
+    auto cases = number();
+    auto slots = static_cast<Slot *>(calloc(slot_count + 1, sizeof(Slot)));
+    auto arguments = static_cast<void **>(calloc(slot_count + 1, sizeof(void *)));
+    if (slots == nullptr || arguments == nullptr)
+        msl_fail("no memory for the plan");
+    for (unsigned i = 0; i < slot_count; i++) {
+        word(slots[i].name);
+        word(slots[i].kind);
+        slots[i].written = number() != 0;
+    }
+    for (uint64_t c = 0; c < cases; c++) {
+        auto invocations = unsigned(number());
+        unsigned groups[3];
+        for (unsigned &n : groups)
+            n = unsigned(number());
+        for (unsigned i = 0; i < slot_count; i++) {
+            prepare(slots[i], i, invocations);
+            arguments[i] = argument(slots[i]);
+        }
+        msl_call call = {};
+        call.slots = arguments;
+        if (strcmp(stage, "compute") == 0) {
+            run_compute(call, threads, groups);
+        } else {
+            for (unsigned i = 0; i < invocations; i++) {
+                call.invocation[0] = i;
+                // For the words of a fault.
+                call.thread_position_in_grid[0] = i;
+                current = &call;
+                msl_invoke(&call);
+            }
+            current = nullptr;
+        }
+        for (unsigned i = 0; i < slot_count; i++)
+            if (slots[i].written && fwrite(slots[i].data, 1, slots[i].bytes, results) !=
+                                        slots[i].bytes)
+                msl_fail("the results cannot be written");
+        release_all();
+    }
+    if (fclose(results) != 0)
+        msl_fail("the results cannot be written");
+    return 0;
+}

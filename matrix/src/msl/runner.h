@@ -1,0 +1,69 @@
+// Between the three parts of a program that runs one kernel: the stand-in for Metal's library, what
+// is generated for the kernel, and runner.cpp. Nothing here needs another header.
+#ifndef MSL_RUNNER
+#define MSL_RUNNER
+
+// One invocation: what it is given for each slot, and where it is.
+struct msl_call {
+    // Of a buffer its memory, of a texture a `msl_texture`, of a sampler its flags, of a vertex's or
+    // fragment's own values the array of all of them.
+    void *const *slots;
+    void *const *workgroup;
+    unsigned thread_position_in_grid[3];
+    unsigned thread_position_in_threadgroup[3];
+    unsigned threadgroup_position_in_grid[3];
+    unsigned threads_per_threadgroup[3];
+    unsigned threadgroups_per_grid[3];
+    unsigned threads_per_grid[3];
+    unsigned thread_index_in_threadgroup[3];
+    // Of a vertex or fragment.
+    unsigned invocation[3];
+    unsigned zero[3];
+};
+
+// A parameter that is memory: which slot, or which of the workgroup's; its type's size and alignment.
+struct msl_memory {
+    unsigned slot;
+    unsigned long size;
+    unsigned long align;
+};
+
+// Flags of a sampler.
+enum { msl_linear = 1, msl_repeat = 2, msl_pixels = 4 };
+
+struct msl_texture;
+
+extern "C" {
+// Generated for the kernel.
+extern const msl_memory msl_buffers[];
+extern const unsigned msl_buffer_count;
+extern const msl_memory msl_workgroup[];
+extern const unsigned msl_workgroup_count;
+extern const bool msl_has_barriers;
+void msl_invoke(const msl_call *call);
+
+// For the library.
+unsigned msl_texture_size(const msl_texture *texture, int axis);
+unsigned msl_texture_samples(const msl_texture *texture);
+// A texel; zero outside.
+void msl_load_float(const msl_texture *texture, const unsigned *at, unsigned sample, unsigned lod,
+                    float *out);
+void msl_load_uint(const msl_texture *texture, const unsigned *at, unsigned sample, unsigned lod,
+                   unsigned *out);
+// Does nothing outside.
+void msl_store_float(msl_texture *texture, const unsigned *at, unsigned lod, const float *value);
+void msl_store_uint(msl_texture *texture, const unsigned *at, unsigned lod, const unsigned *value);
+void msl_sample_float(const msl_texture *texture, unsigned flags, const float *at,
+                      const int *offset, float *out);
+// The four texels that a linear filter reads, in the order in which Metal gathers them.
+void msl_gather_float(const msl_texture *texture, unsigned flags, const float *at,
+                      const int *offset, unsigned channel, float *out);
+// Waits for the workgroup's other threads. `line` tells one barrier from another.
+__attribute__((convergent)) void msl_barrier(unsigned line);
+// What this fragment returns is dropped.
+void msl_discard();
+bool msl_discarded();
+[[noreturn]] void msl_fail(const char *why);
+}
+
+#endif

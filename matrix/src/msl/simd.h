@@ -1,0 +1,2 @@
+// Answers `#include <simd/simd.h>`: the types are those of the other header.
+#include <metal_stdlib>

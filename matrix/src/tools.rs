@@ -1,0 +1,498 @@
+//! What of other people's the matrix runs on: where it is, which version it is, what installs it,
+//! and under which licence it comes. Nothing of it is part of Hankel.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::process::run;
+
+/// Something that columns need.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Tool {
+    /// A Vulkan driver, as the loader finds it.
+    Vulkan,
+    /// SwiftShader's Vulkan driver.
+    SwiftShader,
+    /// An EGL without a display, with OpenGL ES.
+    Egl,
+    /// glslang's command line.
+    Glslang,
+    /// DXC, as a program or a library.
+    Dxc,
+    /// clang++.
+    Clang,
+    /// Node.js.
+    Node,
+    /// The npm package `webgpu`: Dawn for Node.js.
+    Dawn,
+    /// Chromium, or a browser that is made of it.
+    Chromium,
+}
+
+/// Version of the npm package `webgpu` that is asked for.
+const DAWN_VERSION: &str = "0.6.2";
+
+/// The PyPI source distribution that carries DXC's library, and the library in it.
+const DXC_PACKAGE: &str = "compushady-0.17.5";
+const DXC_LIBRARY: &str = "libdxcompiler_x86_64.so.3.7";
+const DXC_SHA256: &str = "fb549976da7abff1ee56bdfa4f5ab156b95e971d4270b5b4447b61682d105809";
+
+/// The driver around that library.
+const DXC_DRIVER: &str = include_str!("dxc.cpp");
+
+/// How long a tool may take to say its version, or to be made.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// Where one is, or what would install it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Status {
+    /// Which.
+    pub tool: Tool,
+    /// Its name for people.
+    pub name: String,
+    /// What the matrix uses it for.
+    pub purpose: String,
+    /// Its licence.
+    pub licence: String,
+    /// Where it is.
+    pub path: Option<PathBuf>,
+    /// Its version, as it says itself.
+    pub version: Option<String>,
+    /// Why it cannot be used, if it is not simply missing.
+    pub problem: Option<String>,
+    /// The command that installs it.
+    pub install: String,
+}
+
+impl Status {
+    /// Whether it can be used.
+    #[must_use]
+    pub const fn is_there(&self) -> bool {
+        self.path.is_some() && self.problem.is_none()
+    }
+}
+
+/// DXC.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Dxc {
+    /// Its own command line.
+    Program(PathBuf),
+    /// Its library behind our driver.
+    Library {
+        /// The driver.
+        driver: PathBuf,
+        /// The library.
+        library: PathBuf,
+    },
+}
+
+impl Dxc {
+    /// A command that compiles; further arguments of DXC may follow.
+    #[must_use]
+    pub fn command(&self, source: &Path, entry: &str, profile: &str, out: &Path) -> Command {
+        match self {
+            Self::Program(dxc) => {
+                let mut command = Command::new(dxc);
+                command.args(["-T", profile, "-E", entry, "-Fo"]);
+                command.args([out, source]);
+                command
+            }
+            Self::Library { driver, library } => {
+                let mut command = Command::new(driver);
+                command.args([library, source]).args([entry, profile]);
+                command.arg(out);
+                command
+            }
+        }
+    }
+}
+
+/// Where tools are looked for.
+#[derive(Clone, Debug)]
+pub struct Tools {
+    /// What the set-up puts here: `node_modules`, DXC's library, and the driver made for it.
+    pub folder: PathBuf,
+}
+
+impl Tool {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Vulkan,
+        Self::SwiftShader,
+        Self::Egl,
+        Self::Glslang,
+        Self::Dxc,
+        Self::Clang,
+        Self::Node,
+        Self::Dawn,
+        Self::Chromium,
+    ];
+
+    /// The name on the command line and in messages.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Vulkan => "Vulkan driver",
+            Self::SwiftShader => "SwiftShader",
+            Self::Egl => "EGL and OpenGL ES",
+            Self::Glslang => "glslangValidator",
+            Self::Dxc => "DXC",
+            Self::Clang => "clang++",
+            Self::Node => "Node.js",
+            Self::Dawn => "Dawn for Node.js",
+            Self::Chromium => "Chromium",
+        }
+    }
+
+    const fn purpose(self) -> &'static str {
+        match self {
+            Self::Vulkan => "runs SPIR-V, WGSL, and what GLSL and HLSL compile to",
+            Self::SwiftShader => "runs SPIR-V with other arithmetic; Dawn and Chromium run on it",
+            Self::Egl => "compiles and runs GLSL ES",
+            Self::Glslang => "compiles GLSL 4.50, and HLSL as a second opinion",
+            Self::Dxc => "compiles HLSL",
+            Self::Clang => "compiles MSL as C++, with a stand-in for Metal's library",
+            Self::Node => "runs Dawn, and serves Chromium its page",
+            Self::Dawn => "runs WGSL through Tint",
+            Self::Chromium => "runs WGSL in a page",
+        }
+    }
+
+    const fn licence(self) -> &'static str {
+        match self {
+            Self::Vulkan => "Mesa: MIT",
+            Self::SwiftShader => "Apache-2.0",
+            Self::Egl => "Mesa: MIT",
+            Self::Glslang => "BSD-3-Clause and others",
+            Self::Dxc => "University of Illinois/NCSA; the package around it: MIT",
+            Self::Clang => "Apache-2.0 with LLVM exceptions",
+            Self::Node => "MIT and others",
+            Self::Dawn => "MIT; Dawn: BSD-3-Clause",
+            Self::Chromium => "BSD-3-Clause and others",
+        }
+    }
+
+    fn install(self, tools: &Tools) -> String {
+        let folder = tools.folder.display();
+        match self {
+            Self::Vulkan => "apt-get install libvulkan1 mesa-vulkan-drivers".into(),
+            Self::SwiftShader | Self::Chromium => "apt-get install chromium".into(),
+            Self::Egl => "apt-get install libegl1 libgles2".into(),
+            Self::Glslang => "apt-get install glslang-tools".into(),
+            Self::Dxc => format!(
+                "pip download --no-deps --no-binary :all: --dest {folder} {} && \
+                 tar -xzf {folder}/{DXC_PACKAGE}.tar.gz -C {folder} --strip-components=3 \
+                 {DXC_PACKAGE}/compushady/backends/{DXC_LIBRARY}",
+                DXC_PACKAGE.replacen('-', "==", 1)
+            ),
+            Self::Clang => "apt-get install clang-19".into(),
+            Self::Node => "apt-get install nodejs npm".into(),
+            Self::Dawn => {
+                format!("npm install --no-save --prefix {folder} webgpu@{DAWN_VERSION}")
+            }
+        }
+    }
+}
+
+impl Tools {
+    /// Looks for one.
+    #[must_use]
+    pub fn status(&self, tool: Tool) -> Status {
+        let mut status = Status {
+            tool,
+            name: tool.name().into(),
+            purpose: tool.purpose().into(),
+            licence: tool.licence().into(),
+            path: None,
+            version: None,
+            problem: None,
+            install: tool.install(self),
+        };
+        match self.find(tool) {
+            Ok(Some((path, version))) => {
+                status.path = Some(path);
+                status.version = Some(version);
+            }
+            Ok(None) => {}
+            Err(problem) => status.problem = Some(problem),
+        }
+        status
+    }
+
+    /// Where one is and its version; an error for one that is there and cannot be used.
+    fn find(&self, tool: Tool) -> Result<Option<(PathBuf, String)>, String> {
+        let said = |found: Option<PathBuf>, arguments: &[&str]| {
+            found
+                .map(|path| version(&path, arguments).map(|v| (path, v)))
+                .transpose()
+        };
+        match tool {
+            Tool::Vulkan => Ok(vulkan_driver().map(|p| {
+                let version = manifest_version(&p);
+                (p, version)
+            })),
+            Tool::SwiftShader => Ok(self.swiftshader().map(|p| {
+                let version = manifest_version(&p);
+                (p, version)
+            })),
+            Tool::Egl => Ok(library("libEGL.so.1")
+                .filter(|_| library("libGLESv2.so.2").is_some())
+                .map(|p| {
+                    let version = real_name(&p);
+                    (p, version)
+                })),
+            Tool::Glslang => said(self.glslang(), &["--version"]),
+            Tool::Dxc => self.dxc_status(),
+            Tool::Clang => said(self.clang(), &["--version"]),
+            Tool::Node => said(program(&["node"], "HANKEL_NODE"), &["--version"]),
+            Tool::Dawn => self.dawn(),
+            Tool::Chromium => said(self.chromium(), &["--version"]),
+        }
+    }
+
+    /// glslang's program.
+    #[must_use]
+    pub fn glslang(&self) -> Option<PathBuf> {
+        program(&["glslangValidator", "glslang"], "HANKEL_GLSLANG")
+    }
+
+    /// clang's program for C++: 19 first, which is what is tested.
+    #[must_use]
+    pub fn clang(&self) -> Option<PathBuf> {
+        let names = [
+            "clang++-19",
+            "clang++-20",
+            "clang++-21",
+            "clang++-18",
+            "clang++-17",
+            "clang++",
+        ];
+        program(&names, "HANKEL_CLANG")
+    }
+
+    /// Node.js.
+    #[must_use]
+    pub fn node(&self) -> Option<PathBuf> {
+        program(&["node"], "HANKEL_NODE")
+    }
+
+    /// The browser.
+    #[must_use]
+    pub fn chromium(&self) -> Option<PathBuf> {
+        let names = [
+            "chromium",
+            "chromium-browser",
+            "google-chrome",
+            "google-chrome-stable",
+        ];
+        program(&names, "HANKEL_CHROMIUM")
+    }
+
+    /// The manifest of SwiftShader's driver, which comes with Chromium.
+    #[must_use]
+    pub fn swiftshader(&self) -> Option<PathBuf> {
+        if let Some(path) = variable("HANKEL_SWIFTSHADER") {
+            return path.is_file().then_some(path);
+        }
+        [
+            "/usr/lib/chromium",
+            "/usr/lib/chromium-browser",
+            "/opt/google/chrome",
+        ]
+        .iter()
+        .map(|folder| Path::new(folder).join("vk_swiftshader_icd.json"))
+        .find(|path| path.is_file())
+    }
+
+    /// Folder of npm's packages.
+    #[must_use]
+    pub fn node_modules(&self) -> PathBuf {
+        self.folder.join("node_modules")
+    }
+
+    fn dawn(&self) -> Result<Option<(PathBuf, String)>, String> {
+        let package = self.node_modules().join("webgpu");
+        let file = package.join("package.json");
+        let Ok(text) = fs::read_to_string(&file) else {
+            return Ok(None);
+        };
+        let version = serde_json::from_str::<serde_json::Value>(&text)
+            .ok()
+            .and_then(|v| Some(v.get("version")?.as_str()?.to_owned()))
+            .ok_or_else(|| format!("{} names no version", file.display()))?;
+        Ok(Some((package, version)))
+    }
+
+    /// DXC, ready to be run: where there is only the library, its driver is made with a C++
+    /// compiler, once.
+    ///
+    /// # Errors
+    /// In words: it is not there, it is another library than is known, the driver cannot be made.
+    pub fn dxc(&self) -> Result<Dxc, String> {
+        if let Some(dxc) = program(&["dxc"], "HANKEL_DXC") {
+            return Ok(Dxc::Program(dxc));
+        }
+        let library = self.folder.join(DXC_LIBRARY);
+        let bytes = fs::read(&library).map_err(|e| format!("{}: {e}", library.display()))?;
+        let found = hankel_codegen::files::sha256(&bytes);
+        if found != DXC_SHA256 {
+            return Err(format!(
+                "{} has the SHA-256 {found}, not {DXC_SHA256}: install it again",
+                library.display()
+            ));
+        }
+        let hash = hankel_codegen::files::sha256(DXC_DRIVER.as_bytes());
+        let driver = self.folder.join(format!("dxc-{}", &hash[..16]));
+        if !driver.is_file() {
+            self.make_driver(&driver)?;
+        }
+        Ok(Dxc::Library { driver, library })
+    }
+
+    /// Compiles the driver; it appears whole or not at all.
+    fn make_driver(&self, driver: &Path) -> Result<(), String> {
+        let compiler = program(&["c++", "g++", "clang++", "clang++-19"], "CXX")
+            .ok_or("there is no C++ compiler for the driver of DXC's library: install g++")?;
+        let work = tempfile::tempdir_in(&self.folder).map_err(|e| e.to_string())?;
+        let (source, made) = (work.path().join("dxc.cpp"), work.path().join("dxc"));
+        fs::write(&source, DXC_DRIVER).map_err(|e| e.to_string())?;
+        let mut command = Command::new(&compiler);
+        command.args(["-O1", "-std=c++17", "-o"]);
+        command.args([&made, &source]).arg("-ldl");
+        let done = run(&mut command, LIMIT).map_err(|e| e.to_string())?;
+        if !done.status.success() {
+            return Err(format!(
+                "{} does not compile the driver of DXC's library: {}",
+                compiler.display(),
+                done.words()
+            ));
+        }
+        fs::rename(&made, driver).map_err(|e| format!("{}: {e}", driver.display()))
+    }
+
+    fn dxc_status(&self) -> Result<Option<(PathBuf, String)>, String> {
+        let there = program(&["dxc"], "HANKEL_DXC").is_some();
+        if !there && !self.folder.join(DXC_LIBRARY).is_file() {
+            return Ok(None);
+        }
+        Ok(Some(match self.dxc()? {
+            Dxc::Program(path) => {
+                let v = version(&path, &["--version"])?;
+                (path, v)
+            }
+            Dxc::Library { driver, library } => {
+                let mut command = Command::new(&driver);
+                command.args([library.as_os_str(), "--version".as_ref()]);
+                let done = run(&mut command, LIMIT).map_err(|e| e.to_string())?;
+                if !done.status.success() {
+                    return Err(done.words());
+                }
+                (
+                    library,
+                    format!("libdxcompiler {} ({DXC_PACKAGE})", done.stdout.trim()),
+                )
+            }
+        }))
+    }
+}
+
+/// A path that an environment variable gives.
+fn variable(name: &str) -> Option<PathBuf> {
+    env::var_os(name)
+        .filter(|v| !v.is_empty())
+        .map(PathBuf::from)
+}
+
+/// The first of some programs that is there; the variable's where it is set.
+fn program(names: &[&str], override_: &str) -> Option<PathBuf> {
+    if let Some(path) = variable(override_) {
+        return if path.components().count() > 1 {
+            path.is_file().then_some(path)
+        } else {
+            in_path(&path)
+        };
+    }
+    names.iter().find_map(|name| in_path(Path::new(name)))
+}
+
+fn in_path(name: &Path) -> Option<PathBuf> {
+    let name = name.with_extension(env::consts::EXE_EXTENSION);
+    env::split_paths(&env::var_os("PATH")?)
+        .map(|folder| folder.join(&name))
+        .find(|path| path.is_file())
+}
+
+/// The first line that names a version.
+fn version(program: &Path, arguments: &[&str]) -> Result<String, String> {
+    let done = run(Command::new(program).args(arguments), LIMIT).map_err(|e| e.to_string())?;
+    let words = done.words();
+    words
+        .lines()
+        .find(|line| line.contains(|c: char| c.is_ascii_digit()))
+        .map(|line| line.trim().to_owned())
+        .filter(|_| done.status.success())
+        .ok_or_else(|| format!("{} does not say its version: {words}", program.display()))
+}
+
+/// The manifest of the Vulkan driver that the loader would take first.
+fn vulkan_driver() -> Option<PathBuf> {
+    for name in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        if let Some(list) = env::var_os(name).filter(|v| !v.is_empty()) {
+            return env::split_paths(&list).find(|p| p.is_file());
+        }
+    }
+    let mut found: Vec<PathBuf> = [
+        "/etc/vulkan/icd.d",
+        "/usr/local/share/vulkan/icd.d",
+        "/usr/share/vulkan/icd.d",
+    ]
+    .iter()
+    .filter_map(|folder| fs::read_dir(folder).ok())
+    .flatten()
+    .filter_map(|entry| Some(entry.ok()?.path()))
+    .filter(|p| p.extension().is_some_and(|e| e == "json"))
+    .collect();
+    found.sort();
+    // Which of several answers shows when the device is opened.
+    found
+        .iter()
+        .find(|p| p.to_string_lossy().contains("lvp"))
+        .or(found.first())
+        .cloned()
+}
+
+/// The Vulkan version that a driver's manifest names.
+fn manifest_version(manifest: &Path) -> String {
+    fs::read_to_string(manifest)
+        .ok()
+        .and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok())
+        .and_then(|v| Some(v.get("ICD")?.get("api_version")?.as_str()?.to_owned()))
+        .map_or_else(|| "of unknown version".into(), |v| format!("Vulkan {v}"))
+}
+
+/// A shared library where loaders look.
+fn library(name: &str) -> Option<PathBuf> {
+    let machine = format!("/usr/lib/{}-linux-gnu", env::consts::ARCH);
+    let own = env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
+    env::split_paths(&own)
+        .chain([&machine, "/usr/lib64", "/usr/lib"].map(PathBuf::from))
+        .map(|folder| folder.join(name))
+        .find(|path| path.exists())
+}
+
+/// A library's name with its full version.
+fn real_name(path: &Path) -> String {
+    let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    real.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}

@@ -1,0 +1,160 @@
+//! The runner for Vulkan, and for OpenGL ES as wgpu itself writes it: a process of its own around
+//! `hankel_host`'s device.
+
+use std::fs;
+use std::io::{self, BufRead, Write};
+
+use hankel_dsl::native::describe::{Kernel, TexelFormat};
+use hankel_dsl::native::{Address, Filter, Sampler};
+use hankel_host::device::{Format, Program, Shader, TextureShape, VulkanDevice};
+use hankel_host::inputs::{Case, Class, Input};
+use hankel_host::parity::execute::{self, Arithmetic};
+use serde::{Deserialize, Serialize};
+
+use crate::job::{Arg, Job, Reply};
+
+/// A job with what the host's device needs beyond it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct VulkanJob {
+    /// The job.
+    #[serde(flatten)]
+    pub job: Job,
+    /// The kernel's description.
+    pub description: Kernel,
+    /// What the code is, and how it reaches the driver.
+    pub way: Way,
+}
+
+/// How code reaches the driver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Way {
+    /// SPIR-V as it is.
+    Spirv,
+    /// SPIR-V, read and written anew by naga.
+    SpirvThroughNaga,
+    /// WGSL, read by naga.
+    Wgsl,
+}
+
+/// Opens the device, and does the jobs of standard input until it ends.
+///
+/// # Errors
+/// In words: why there is no device. What goes wrong with a job is its reply.
+pub fn serve() -> Result<(), String> {
+    let mut device = VulkanDevice::new().map_err(|e| e.to_string())?;
+    let ready = serde_json::json!({ "ready": hankel_host::device::Device::name(&device) });
+    let mut out = io::stdout().lock();
+    let mut say = |line: String| writeln!(out, "{line}").and_then(|()| out.flush());
+    say(ready.to_string()).map_err(|e| e.to_string())?;
+    for line in io::stdin().lock().lines() {
+        let line = line.map_err(|e| e.to_string())?;
+        let reply = match serde_json::from_str::<VulkanJob>(&line) {
+            Ok(job) => Reply {
+                id: job.job.id,
+                error: run(&mut device, &job).err(),
+            },
+            Err(e) => Reply {
+                id: 0,
+                error: Some(format!("this is no job: {e}")),
+            },
+        };
+        let reply = serde_json::to_string(&reply).map_err(|e| e.to_string())?;
+        say(reply).map_err(|e| e.to_string())?;
+    }
+    Ok(())
+}
+
+fn run(device: &mut VulkanDevice, it: &VulkanJob) -> Result<(), String> {
+    let job = &it.job;
+    let read = |path: &std::path::Path| {
+        fs::read(path).map_err(|e| format!("cannot read {}: {e}", path.display()))
+    };
+    let code = read(&job.code)?;
+    let inputs = read(&job.inputs)?;
+    let words: Vec<u32> = code
+        .chunks_exact(4)
+        .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
+        .collect();
+    let text = String::from_utf8_lossy(&code);
+    let shader = match it.way {
+        Way::Spirv => Shader::SpirvPassthrough(&words),
+        Way::SpirvThroughNaga => Shader::SpirvThroughNaga(&words),
+        Way::Wgsl => Shader::Wgsl {
+            text: &text,
+            entry_point: &job.entry_point,
+        },
+    };
+    let program = Program {
+        kernel: &it.description,
+        constants: &[],
+        native: None,
+        shader: Some(shader),
+    };
+    let mut results = Vec::new();
+    for case in cases(job, &inputs)? {
+        let written = execute::on_vulkan(device, &program, &case, Arithmetic::Free)
+            .map_err(|e| e.to_string())?;
+        results.extend(written.into_iter().flatten());
+    }
+    fs::write(&job.results, results)
+        .map_err(|e| format!("cannot write {}: {e}", job.results.display()))
+}
+
+/// The cases as the host has them.
+fn cases(job: &Job, inputs: &[u8]) -> Result<Vec<Case>, String> {
+    let bytes = |offset: u64, length: u64| {
+        usize::try_from(offset)
+            .ok()
+            .zip(usize::try_from(length).ok())
+            .and_then(|(offset, length)| inputs.get(offset..)?.get(..length))
+            .map(<[u8]>::to_vec)
+            .ok_or_else(|| "an argument lies outside of the inputs".to_owned())
+    };
+    let arg = |arg: &Arg| -> Result<Input, String> {
+        Ok(match arg {
+            Arg::Bytes { offset, length } => Input::Bytes(bytes(*offset, *length)?),
+            Arg::Texture {
+                format,
+                size,
+                samples,
+                offset,
+                length,
+            } => {
+                let texel: TexelFormat = serde_json::from_value(format.as_str().into())
+                    .map_err(|_| format!("`{format}` is no format"))?;
+                Input::Texture {
+                    shape: TextureShape {
+                        dimensions: if size[2] > 1 { 3 } else { 2 },
+                        size: *size,
+                        samples: *samples,
+                        format: Format::Texel(texel),
+                    },
+                    bytes: bytes(*offset, *length)?,
+                }
+            }
+            Arg::Sampler { linear, repeat } => Input::Sampler(Sampler {
+                filter: if *linear {
+                    Filter::Linear
+                } else {
+                    Filter::Nearest
+                },
+                address: if *repeat {
+                    Address::Repeat
+                } else {
+                    Address::ClampToEdge
+                },
+            }),
+        })
+    };
+    job.cases
+        .iter()
+        .map(|case| {
+            Ok(Case {
+                class: Class::Ordinary,
+                args: case.args.iter().map(arg).collect::<Result<_, _>>()?,
+                invocations: case.invocations as usize,
+            })
+        })
+        .collect()
+}
