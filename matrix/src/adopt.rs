@@ -3,54 +3,20 @@
 //! kernel's description, and GLSL's combined samplers are a texture and a sampler again, as the
 //! description has them. The code itself stays as the compiler wrote it.
 
-use std::collections::BTreeMap;
-
 use rspirv::binary::Assemble;
 use rspirv::dr::{self, Builder, Instruction, Operand};
 use rspirv::spirv::{Decoration, Op, StorageClass, Word};
 
 use crate::job::{Job, Role};
 
-/// What is added to the registers of each class, so that a number tells both.
-pub const SHIFTS: [(&str, u32); 4] = [("b", 0), ("t", 1000), ("u", 2000), ("s", 3000)];
-
-/// Makes `code`, compiled from the text of `job` in HLSL, fit. Registers were shifted by
-/// [`SHIFTS`].
+/// Makes `code`, compiled from the text of `job` in HLSL, fit: the compiler was told the binding of
+/// every register.
 ///
 /// # Errors
 /// In words: what is not as expected.
-pub fn hlsl(code: &[u8], entry_point: &str, job: &Job) -> Result<Vec<u8>, String> {
-    let mut numbers = BTreeMap::new();
-    for slot in &job.slots {
-        if let (Some(binding), Some(place)) = (slot.binding, &slot.place) {
-            let shift = SHIFTS.iter().find(|(class, _)| *class == place.class);
-            let (Some((_, shift)), Some(index)) = (shift, place.index) else {
-                return Err(format!("`{}` has no register", slot.name));
-            };
-            numbers.insert(shift + index, binding);
-        }
-    }
+pub fn hlsl(code: &[u8], job: &Job) -> Result<Vec<u8>, String> {
     let mut module = load(code)?;
-    rename(&mut module, entry_point, &job.kernel)?;
-    for i in &mut module.annotations {
-        if let [
-            _,
-            Operand::Decoration(Decoration::Binding),
-            Operand::LiteralBit32(number),
-        ] = &mut i.operands[..]
-        {
-            *number = *numbers.get(number).ok_or_else(|| {
-                let class = SHIFTS
-                    .iter()
-                    .rev()
-                    .find(|(_, shift)| *shift <= *number)
-                    .map_or_else(String::new, |(class, shift)| {
-                        format!("{class}{}", *number - shift)
-                    });
-                format!("register {class} is in no entry of the manifest")
-            })?;
-        }
-    }
+    rename(&mut module, &job.entry_point, &job.kernel)?;
     Ok(bytes(&module))
 }
 
@@ -206,11 +172,11 @@ fn split(b: &mut Builder, binding: u32, sampler: Option<u32>) -> Result<(), Stri
         }
         block.instructions = all;
     }
-    if let Some(header) = &mut b.module_mut().header {
+    // The builder has given one number away; it counts on from the header.
+    let mut module = std::mem::replace(b, Builder::new()).module();
+    if let Some(header) = &mut module.header {
         header.bound = next + 1;
     }
-    // The builder counts on from the header of the module that it is made from.
-    let module = std::mem::replace(b, Builder::new()).module();
     *b = Builder::new_from_module(module);
     Ok(())
 }
@@ -222,5 +188,23 @@ fn retype(module: &mut dr::Module, variable: Word, pointer: Word) {
         let mut declaration = all.remove(at);
         declaration.result_type = Some(pointer);
         all.push(declaration);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dump() {
+        let line = std::fs::read_to_string("/tmp/jobs/glsl.jsonl").unwrap();
+        for l in line.lines() {
+            let job: Job = serde_json::from_str(l).unwrap();
+            if !["shade_hamburger","filtered","slice","last_sample"].contains(&job.kernel.as_str()) { continue }
+            let st = if job.kernel == "shade_hamburger" {"frag"} else {"comp"};
+            std::process::Command::new("glslangValidator").args(["-V","--target-env","vulkan1.1","-S",st,"-o","/tmp/d.spv"]).arg(&job.code).status().unwrap();
+            let b = glsl(&std::fs::read("/tmp/d.spv").unwrap(), &job).unwrap();
+            std::fs::write(format!("/tmp/d_{}.spv", job.kernel), b).unwrap();
+        }
     }
 }

@@ -37,23 +37,16 @@ pub fn hlsl_glslang(
     let mut command = Command::new(glslang);
     command.args(["-D", "-V", "--target-env", "vulkan1.1", "-S", stage(job)]);
     command.args(["-e", &job.entry_point, "--no-storage-format"]);
-    for (class, shift) in adopt::SHIFTS {
-        // `u` is the class of unordered access; `b` is a uniform buffer's.
-        let option = match class {
-            "b" => "--shift-cbuffer-binding",
-            "t" => "--shift-texture-binding",
-            "u" => "--shift-UAV-binding",
-            _ => "--shift-sampler-binding",
-        };
-        command.args([option, &shift.to_string()]);
-        if class == "t" {
-            // Read-only buffers have registers of textures.
-            command.args(["--shift-ssbo-binding", &shift.to_string()]);
-        }
+    let registers = registers(job)?;
+    if !registers.is_empty() {
+        command.args(["--resource-set-binding", stage(job)]);
+    }
+    for (register, binding) in registers {
+        command.args([register.as_str(), "0", &binding.to_string()]);
     }
     command.arg("-o").args([out, &job.code]);
     finish(run(&mut command, limit)?, "glslangValidator", &job.code)?;
-    adopt::hlsl(&compiled(out)?, &job.entry_point, job).map_err(Failure::refused)
+    adopt::hlsl(&compiled(out)?, job).map_err(Failure::refused)
 }
 
 /// HLSL through DXC. Constant buffers are laid out as Direct3D does.
@@ -70,17 +63,19 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
     let mut arguments: Vec<String> = ["-spirv", "-fspv-target-env=vulkan1.1", "-fvk-use-dx-layout"]
         .map(String::from)
         .into();
-    for (class, shift) in adopt::SHIFTS {
+    for (register, binding) in registers(job)? {
         arguments.extend([
-            format!("-fvk-{class}-shift"),
-            shift.to_string(),
-            "all".into(),
+            "-fvk-bind-register".into(),
+            register,
+            "0".into(),
+            binding.to_string(),
+            "0".into(),
         ]);
     }
     let mut command = dxc.command(&job.code, &job.entry_point, &profile, out);
     command.args(arguments);
     finish(run(&mut command, limit)?, "dxc", &job.code)?;
-    adopt::hlsl(&compiled(out)?, &job.entry_point, job).map_err(Failure::refused)
+    adopt::hlsl(&compiled(out)?, job).map_err(Failure::refused)
 }
 
 /// The shader model that HLSL is written and compiled for: the first with 64-bit floats in
@@ -88,6 +83,18 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
 pub const SHADER_MODEL: &str = "6.2";
 
 const DXC_MODEL: &str = "6_2";
+
+/// The registers that the manifest names, and the bindings that they stand for. A compiler refuses
+/// a text with others, or they stay unbound.
+fn registers(job: &Job) -> Result<Vec<(String, u32)>, Failure> {
+    let bound = job.slots.iter().filter_map(|s| Some((s, s.binding?, s.place.as_ref()?)));
+    bound
+        .map(|(slot, binding, place)| match place.index {
+            Some(index) => Ok((format!("{}{index}", place.class), binding)),
+            None => Err(Failure::refused(format!("`{}` has no register", slot.name))),
+        })
+        .collect()
+}
 
 const fn stage(job: &Job) -> &'static str {
     match job.stage {

@@ -660,10 +660,15 @@ impl Engine<'_> {
             self.device = Some(runner.ready.clone());
             self.runner = Some(runner);
         }
-        match &mut self.runner {
+        let done = match &mut self.runner {
             Some(runner) => runner.ask(job, id, limit),
             None => Err(Failure::refused("there is no runner")),
+        };
+        if done.is_err() {
+            // What one kernel broke is not the next one's: a driver may have lost its device.
+            self.runner = None;
         }
+        done
     }
 
     /// The command of this column's runner.

@@ -1,5 +1,5 @@
-//! A vertex stage whose every vertex lands in a pixel of its own: its position becomes one more
-//! varying, and a new entry point around the old one places the vertex by its index. So positions
+//! A vertex stage whose every vertex lands in a pixel of its own: a new entry point around the old
+//! one hands its position on as one more varying, and places the vertex by its index. So positions
 //! can be read back that no viewport would show.
 
 use rspirv::binary::Assemble;
@@ -34,9 +34,7 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
         .iter()
         .filter_map(Operand::id_ref_any)
         .collect();
-    let position = decorated(&module, BuiltIn::Position)
-        .filter(|id| interface.contains(id))
-        .ok_or("it writes no position of its own")?;
+    let position = Position::of(&module, &interface).ok_or("it writes no position of its own")?;
     let location = 1 + module
         .annotations
         .iter()
@@ -53,14 +51,6 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
     let existing_index = decorated(&module, BuiltIn::VertexIndex);
 
     let mut b = Builder::new_from_module(module);
-    for i in &mut b.module_mut().annotations {
-        if i.operands.first() == Some(&Operand::IdRef(position))
-            && i.operands.get(2) == Some(&Operand::BuiltIn(BuiltIn::Position))
-        {
-            i.operands[1] = Operand::Decoration(Decoration::Location);
-            i.operands[2] = Operand::LiteralBit32(location);
-        }
-    }
     let error = |e: dr::Error| format!("its SPIR-V cannot be extended: {e}");
     let void = b.type_void();
     let signature = b.type_function(void, []);
@@ -71,18 +61,22 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
         b.type_pointer(None, StorageClass::Output, vec4),
         b.type_pointer(None, StorageClass::Output, float),
     );
-    let new_position = b.variable(out_vec4, None, StorageClass::Output, None);
-    let new_size = b.variable(out_float, None, StorageClass::Output, None);
+    let passed = b.variable(out_vec4, None, StorageClass::Output, None);
     b.decorate(
-        new_position,
-        Decoration::BuiltIn,
-        [Operand::BuiltIn(BuiltIn::Position)],
+        passed,
+        Decoration::Location,
+        [Operand::LiteralBit32(location)],
     );
-    b.decorate(
-        new_size,
-        Decoration::BuiltIn,
-        [Operand::BuiltIn(BuiltIn::PointSize)],
-    );
+    // A block that holds the position holds the size too.
+    let new_size = matches!(position, Position::Variable(_)).then(|| {
+        let size = b.variable(out_float, None, StorageClass::Output, None);
+        b.decorate(
+            size,
+            Decoration::BuiltIn,
+            [Operand::BuiltIn(BuiltIn::PointSize)],
+        );
+        size
+    });
     // A module declares a built-in only once; the old declaration may be signed.
     let (index, index_type) = match existing_index {
         Some(id) => (
@@ -132,8 +126,23 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
     let at = b
         .composite_construct(vec4, None, [x, y, zero, one])
         .map_err(error)?;
-    b.store(new_position, at, None, []).map_err(error)?;
-    b.store(new_size, one, None, []).map_err(error)?;
+    let (position, size) = match (position, new_size) {
+        (Position::Member(block, [position, size]), _) => {
+            let [position, size] = [position, size].map(|n| b.constant_bit32(uint, n));
+            (
+                b.access_chain(out_vec4, None, block, [position])
+                    .map_err(error)?,
+                b.access_chain(out_float, None, block, [size])
+                    .map_err(error)?,
+            )
+        }
+        (Position::Variable(id), Some(size)) => (id, size),
+        (Position::Variable(_), None) => return Err("it has no size".into()),
+    };
+    let own = b.load(vec4, None, position, None, []).map_err(error)?;
+    b.store(passed, own, None, []).map_err(error)?;
+    b.store(position, at, None, []).map_err(error)?;
+    b.store(size, one, None, []).map_err(error)?;
     b.ret().map_err(error)?;
     b.end_function().map_err(error)?;
 
@@ -141,7 +150,7 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
     point.operands[1] = Operand::IdRef(outer);
     point
         .operands
-        .extend([new_position, new_size].map(Operand::IdRef));
+        .extend([Some(passed), new_size].into_iter().flatten().map(Operand::IdRef));
     if !interface.contains(&index) {
         point.operands.push(Operand::IdRef(index));
     }
@@ -149,6 +158,45 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
         words: b.module().assemble(),
         location,
     })
+}
+
+/// Where a vertex stage writes its position.
+enum Position {
+    /// A variable.
+    Variable(Word),
+    /// A variable that is a block, and its members that are the position and the point's size, as
+    /// compilers of GLSL write it.
+    Member(Word, [u32; 2]),
+}
+
+impl Position {
+    fn of(module: &dr::Module, interface: &[Word]) -> Option<Self> {
+        if let Some(id) = decorated(module, BuiltIn::Position) {
+            return interface.contains(&id).then_some(Self::Variable(id));
+        }
+        let member = |built_in: BuiltIn| {
+            module
+                .annotations
+                .iter()
+                .find_map(|i| match &i.operands[..] {
+                    [
+                        Operand::IdRef(structure),
+                        Operand::LiteralBit32(n),
+                        Operand::Decoration(Decoration::BuiltIn),
+                        Operand::BuiltIn(b),
+                    ] if i.class.opcode == Op::MemberDecorate && *b == built_in => {
+                        Some((*structure, *n))
+                    }
+                    _ => None,
+                })
+        };
+        let (structure, position) = member(BuiltIn::Position)?;
+        let (_, size) = member(BuiltIn::PointSize).filter(|(s, _)| *s == structure)?;
+        let block = interface
+            .iter()
+            .find(|&&id| pointee(module, id) == Some(structure))?;
+        Some(Self::Member(*block, [position, size]))
+    }
 }
 
 /// The variable decorated as a built-in.

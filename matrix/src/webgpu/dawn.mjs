@@ -107,7 +107,9 @@ async function start() {
         const turn = (turns += 1);
         const answer = new Promise((resolve, reject) => {
             waiting.set(turn, (error) => (error === undefined ? resolve() : reject(new Error(error))));
-            child.send({ turn, job }, (e) => e && reject(new Error(`Dawn's process takes no jobs: ${e.message}`)));
+            child.send({ turn, job }, (e) => {
+                if (e) reject(new Error(`Dawn's process takes no jobs: ${e.message}`));
+            });
         });
         try {
             await timely(answer, "the job");

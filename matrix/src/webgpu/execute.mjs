@@ -456,7 +456,9 @@ class Maker {
         own.forEach(({ arg, value: { size } }, n) => {
             const from = this.bytes(arg);
             const width = size * 4;
-            if (from.length < width * count) throw new Error(`${count} points need more than ${from.length} bytes`);
+            if (from.length < width * count) {
+                throw new Error(`${count} points need more than ${from.length} bytes`);
+            }
             for (let i = 0; i < count; i += 1) {
                 const at = i * stride + attributes[n].offset;
                 bytes.set(from.subarray(i * width, (i + 1) * width), at);

@@ -152,14 +152,19 @@ ${copies}    return point;
 }
 
 /** A fragment stage that writes the outputs numbered `group` of a captured vertex. */
-export const taken = (group) => `struct Taken {
-${group.map((n, i) => `    @location(${i}) t${i}: vec4<u32>,\n`).join("")}}
+export function taken(group) {
+    const members = group.map((n, i) => `    @location(${i}) t${i}: vec4<u32>,\n`).join("");
+    const inputs = group.map((n) => `    @location(${n}) @interpolate(flat) v${n}: vec4<u32>,\n`);
+    return `struct Taken {
+${members}}
 
 @fragment
-fn hankel_taken(${group.map((n) => `@location(${n}) @interpolate(flat) v${n}: vec4<u32>`).join(", ")}) -> Taken {
+fn hankel_taken(
+${inputs.join("")}) -> Taken {
     return Taken(${group.map((n) => `v${n}`).join(", ")});
 }
 `;
+}
 
 /** How a texel of a format is made from its words, which begin at `at`. */
 const TEXELS = {
