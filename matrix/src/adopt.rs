@@ -20,6 +20,44 @@ pub fn hlsl(code: &[u8], job: &Job) -> Result<Vec<u8>, String> {
     Ok(bytes(&module))
 }
 
+/// Makes `code`, compiled by glslang's front end for HLSL, fit. That counts a byte address buffer in
+/// words where HLSL counts bytes (`tests/upstream/glslang-byte-address-size`); here it is multiplied.
+///
+/// # Errors
+/// In words: what is not as expected.
+pub fn hlsl_glslang(code: &[u8], job: &Job) -> Result<Vec<u8>, String> {
+    let mut module = load(code)?;
+    rename(&mut module, &job.entry_point, &job.kernel)?;
+    let mut b = Builder::new_from_module(module);
+    let uint = b.type_int(32, 0);
+    let four = b.constant_bit32(uint, 4);
+    let mut next = b.id();
+    let blocks = b.module_mut().functions.iter_mut();
+    for block in blocks.flat_map(|f| &mut f.blocks) {
+        let mut all = Vec::with_capacity(block.instructions.len() + 1);
+        for mut i in block.instructions.drain(..) {
+            if i.class.opcode != Op::ArrayLength {
+                all.push(i);
+                continue;
+            }
+            let bytes = Instruction::new(
+                Op::IMul,
+                i.result_type,
+                i.result_id.replace(next),
+                vec![Operand::IdRef(next), Operand::IdRef(four)],
+            );
+            next += 1;
+            all.extend([i, bytes]);
+        }
+        block.instructions = all;
+    }
+    let mut module = b.module();
+    if let Some(header) = &mut module.header {
+        header.bound = next + 1;
+    }
+    Ok(bytes(&module))
+}
+
 /// Makes `code`, compiled from the text of `job` in GLSL, fit.
 ///
 /// # Errors

@@ -120,6 +120,15 @@ impl Column {
         })
     }
 
+    /// Whether its device flushes subnormal numbers, as all of SwiftShader's do.
+    #[must_use]
+    pub const fn flushes(self) -> bool {
+        matches!(
+            self,
+            Self::SpirvSwiftshader | Self::WgslDawn | Self::WgslChromium
+        )
+    }
+
     /// What it takes.
     #[must_use]
     pub const fn tools(self) -> &'static [Tool] {

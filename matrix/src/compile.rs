@@ -46,7 +46,7 @@ pub fn hlsl_glslang(
     }
     command.arg("-o").args([out, &job.code]);
     finish(run(&mut command, limit)?, "glslangValidator", &job.code)?;
-    adopt::hlsl(&compiled(out)?, job).map_err(Failure::refused)
+    adopt::hlsl_glslang(&compiled(out)?, job).map_err(Failure::refused)
 }
 
 /// HLSL through DXC. Constant buffers are laid out as Direct3D does.

@@ -238,4 +238,22 @@ pub struct Reply {
     /// What went wrong; none if the results are there.
     #[serde(default)]
     pub error: Option<String>,
+    /// How it went wrong.
+    #[serde(default)]
+    pub kind: Kind,
+}
+
+/// How a job can go wrong.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Something refused the code or the inputs.
+    #[default]
+    Refused,
+    /// The device lacks a feature that the code needs, and says so.
+    Lacks,
+    /// What the runner had started crashed.
+    Crashed,
+    /// What the runner had started gave no answer in time.
+    TimedOut,
 }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::job::Reply;
+use crate::job::{Kind, Reply};
 
 /// How a program let us down.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
@@ -22,6 +22,12 @@ pub enum Failure {
     Refused {
         /// Its words.
         message: String,
+    },
+    /// The device lacks a feature that the code needs, and says so.
+    #[error("the device lacks {what}")]
+    Lacks {
+        /// What.
+        what: String,
     },
     /// It ended without an answer.
     #[error("{program} crashed: {how}\n{log}")]
@@ -256,7 +262,7 @@ impl Runner {
     /// Has a job done.
     ///
     /// # Errors
-    /// [`Failure::Refused`] with the runner's words; after any other error it has ended.
+    /// [`Failure::Refused`] or [`Failure::Lacks`] with the runner's words, or how it let us down.
     pub fn ask(&mut self, job: &impl Serialize, id: u64, limit: Duration) -> Result<(), Failure> {
         let mut line = serde_json::to_string(job)
             .map_err(|e| Failure::refused(format!("the job is no JSON: {e}")))?;
@@ -272,10 +278,24 @@ impl Runner {
             let reply: Reply = serde_json::from_value(value.clone()).ok()?;
             (reply.id == id).then_some(reply)
         })?;
-        match reply.error {
-            None => Ok(()),
-            Some(message) => Err(Failure::Refused { message }),
-        }
+        let Some(message) = reply.error else {
+            return Ok(());
+        };
+        let program = self.program.clone();
+        Err(match reply.kind {
+            Kind::Refused => Failure::Refused { message },
+            Kind::Lacks => Failure::Lacks { what: message },
+            Kind::Crashed => Failure::Crashed {
+                program,
+                how: message.lines().next().unwrap_or_default().into(),
+                log: message,
+            },
+            Kind::TimedOut => Failure::TimedOut {
+                program,
+                seconds: limit.as_secs(),
+                log: message,
+            },
+        })
     }
 
     /// Whether it still runs.

@@ -112,6 +112,11 @@ pub enum Outcome {
         /// Why.
         reason: String,
     },
+    /// The device that is there lacks a feature that the kernel needs.
+    Lacking {
+        /// Which.
+        what: String,
+    },
     /// Something that it takes is not installed.
     NotInstalled {
         /// What.
@@ -132,7 +137,9 @@ impl Outcome {
                 Failure::Refused { .. } => "REFUSED",
                 Failure::Crashed { .. } => "CRASHED",
                 Failure::TimedOut { .. } => "TIMEOUT",
+                Failure::Lacks { .. } => "lacks",
             },
+            Self::Lacking { .. } => "lacks",
             Self::Known { .. } => "known",
             Self::Inexpressible { .. } => "-",
             Self::NotInstalled { .. } => "missing",

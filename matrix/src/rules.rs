@@ -5,11 +5,12 @@ use hankel_host::parity::numbers::Rules;
 
 use crate::column::Column;
 
-/// What `kernel` may differ by in `column`.
+/// What `kernel` may differ by in `column`. Columns that flush subnormal numbers have a reference
+/// that does, if `flushed_reference`; otherwise their absurd inputs, of which many are subnormal,
+/// need only give finite results.
 #[must_use]
-pub fn of(kernel: &Kernel, column: Column) -> Rules {
-    let native = matches!(column, Column::Native | Column::NativeSimd);
-    if native {
+pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
+    if matches!(column, Column::Native | Column::NativeSimd) {
         let exact = Tolerance {
             ulp: 0,
             absolute: 0.0,
@@ -17,11 +18,10 @@ pub fn of(kernel: &Kernel, column: Column) -> Rules {
         };
         return Rules::of(kernel, exact);
     }
-    Rules::of(kernel, kernel.tolerance.clone())
-}
-
-/// Why a column cannot run a kernel although the language expresses it.
-#[must_use]
-pub fn inapplicable(_kernel: &Kernel, _column: Column) -> Option<String> {
-    None
+    let mut rules = Rules::of(kernel, kernel.tolerance.clone());
+    if column.flushes() {
+        rules.flushes = true;
+        rules.hostile &= flushed_reference;
+    }
+    rules
 }

@@ -26,6 +26,7 @@ use crate::report::{Cell, ColumnReport, Outcome, Report, Row};
 use crate::subject::{Code, Subject};
 use crate::tools::{Dxc, Status, Tool, Tools};
 use crate::vulkan::{VulkanJob, Way};
+use crate::flush::flushed;
 use crate::{compile, locate, msl, rules, webgpu};
 
 /// What is to be run, and with what.
@@ -71,12 +72,22 @@ struct Ready<'a> {
     /// SHA-256 of inputs and reference.
     hash: String,
     reference: Result<Vec<Written>, String>,
+    /// The same as on a device that flushes subnormal numbers; none where that cannot be had.
+    flushed: Option<Result<Vec<Written>, String>>,
     simd: Result<Vec<Written>, String>,
 }
 
 impl Ready<'_> {
     fn kernel(&self) -> &Kernel {
         &self.subject.entry.kernel
+    }
+
+    /// What a column is compared with.
+    fn reference_for(&self, column: Column) -> &Result<Vec<Written>, String> {
+        match &self.flushed {
+            Some(flushed) if column.flushes() => flushed,
+            _ => &self.reference,
+        }
     }
 }
 
@@ -309,7 +320,7 @@ fn references<'a>(
                         *next - 1
                     };
                     let Some(subject) = subjects.get(i) else { break };
-                    let one = reference(subject, request.seed, work);
+                    let one = reference(request, subject, work);
                     locked(&made).push((i, one));
                 }
             });
@@ -320,10 +331,14 @@ fn references<'a>(
     made.into_iter().map(|(_, one)| one).collect()
 }
 
-fn reference<'a>(subject: &'a Subject, seed: u64, work: &Path) -> std::io::Result<Ready<'a>> {
+fn reference<'a>(
+    request: &Request,
+    subject: &'a Subject,
+    work: &Path,
+) -> std::io::Result<Ready<'a>> {
     let kernel = &subject.entry.kernel;
     let inputs = work.join(format!("{}.inputs", kernel.name));
-    let prepared = Prepared::new(kernel, seed, &inputs)?;
+    let prepared = Prepared::new(kernel, request.seed, &inputs)?;
     let program = subject.entry.program(None, &[]);
     let natively = |mode: Mode| -> Result<Vec<Written>, String> {
         let mut device = NativeDevice::with_mode(mode);
@@ -337,9 +352,16 @@ fn reference<'a>(subject: &'a Subject, seed: u64, work: &Path) -> std::io::Resul
             .collect()
     };
     let reference = natively(Mode::REFERENCE);
+    let flushed = request
+        .columns
+        .iter()
+        .any(|c| c.flushes())
+        .then(|| flushed(|| natively(Mode::REFERENCE)))
+        .flatten();
     let simd = natively(Mode::default());
     let mut all = fs::read(&inputs)?;
-    for written in reference.iter().flatten().flatten() {
+    let references = reference.iter().chain(flushed.iter().flatten());
+    for written in references.flatten().flatten() {
         all.extend_from_slice(written);
     }
     Ok(Ready {
@@ -348,6 +370,7 @@ fn reference<'a>(subject: &'a Subject, seed: u64, work: &Path) -> std::io::Resul
         inputs,
         hash: sha256(&all),
         reference,
+        flushed,
         simd,
     })
 }
@@ -380,7 +403,6 @@ struct Shared<'a> {
 
 impl<'a> Shared<'a> {
     fn settle(&self, column: Column, it: &'a Ready<'a>) -> Settled<'a> {
-        let kernel = it.kernel();
         if let Err(problem) = &it.reference {
             let message = format!("the native scalar run fails: {problem}");
             return Settled::Cell(Cell::unrun(Outcome::Foreign {
@@ -423,9 +445,6 @@ impl<'a> Shared<'a> {
                 }));
             }
         };
-        if let Some(reason) = rules::inapplicable(kernel, column) {
-            return Settled::Cell(Cell::unrun(Outcome::Inexpressible { reason }));
-        }
         if let Some(cell) = self.cache.get(&self.key(column, it, code)) {
             return Settled::Cached(cell);
         }
@@ -445,7 +464,7 @@ impl<'a> Shared<'a> {
             &code.entry_point,
             &code.places,
             &it.hash,
-            rules::of(it.kernel(), column),
+            rules::of(it.kernel(), column, it.flushed.is_some()),
             versions,
         ))
     }
@@ -479,15 +498,16 @@ impl<'a> Shared<'a> {
                 let results = engine.run(unit);
                 judge(unit.it, column, Some(unit.code), results, began.elapsed())
             });
-            let passing = matches!(
+            let settled = matches!(
                 cell.outcome,
                 Outcome::Passed
                     | Outcome::Differs
+                    | Outcome::Lacking { .. }
                     | Outcome::Foreign {
                         failure: Failure::Refused { .. }
                     }
             );
-            if passing {
+            if settled {
                 self.cache.put(&self.key(column, unit.it, unit.code), &cell);
             }
             found.push((unit.row, cell));
@@ -514,7 +534,7 @@ fn judge(
     took: Duration,
 ) -> Cell {
     let kernel = it.kernel();
-    let rules: Rules = rules::of(kernel, column);
+    let rules: Rules = rules::of(kernel, column, it.flushed.is_some());
     let mut cell = Cell {
         outcome: Outcome::Passed,
         rules: Some(rules.clone()),
@@ -523,7 +543,8 @@ fn judge(
         seconds: took.as_secs_f64(),
     };
     let text = code.map(|code| String::from_utf8_lossy(&code.bytes));
-    match (results, &it.reference) {
+    match (results, it.reference_for(column)) {
+        (Err(Failure::Lacks { what }), _) => cell.outcome = Outcome::Lacking { what },
         (Err(failure), _) => {
             cell.line = text
                 .as_deref()
@@ -661,10 +682,11 @@ impl Engine<'_> {
             self.runner = Some(runner);
         }
         let done = match &mut self.runner {
-            Some(runner) => runner.ask(job, id, limit),
+            // Runners that start something themselves have the same limit for that.
+            Some(runner) => runner.ask(job, id, limit + Duration::from_secs(10)),
             None => Err(Failure::refused("there is no runner")),
         };
-        if done.is_err() {
+        if !matches!(done, Ok(()) | Err(Failure::Lacks { .. })) {
             // What one kernel broke is not the next one's: a driver may have lost its device.
             self.runner = None;
         }

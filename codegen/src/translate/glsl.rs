@@ -73,13 +73,24 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         }
         Err(error) => return Err(job.failure(&error)),
     };
-    let mut source = job.precise(source, &["float", "double", "vec", "dvec", "mat", "dmat"])?;
+    let types = ["float", "double", "vec", "dvec", "mat", "dmat"];
+    let mut source = if job.language == Language::Essl300 {
+        source
+    } else {
+        job.precise(source, &types)?
+    };
     let mut requires = Vec::new();
-    if job.kernel.exact && job.language == Language::Essl310 {
-        requires.push(ES_PRECISE.to_owned());
+    if job.language == Language::Essl310 && (job.kernel.exact || job.kernel.pinned) {
+        let lines = if job.kernel.exact {
+            requires.push(ES_PRECISE.to_owned());
+            format!("\n#extension {ES_PRECISE} : require\n")
+        } else {
+            format!(
+                "\n#extension {ES_PRECISE} : enable\n#ifndef {ES_PRECISE}\n#define precise\n#endif\n"
+            )
+        };
         // After the first line, the version.
-        let line = format!("\n#extension {ES_PRECISE} : require\n");
-        source = source.replacen('\n', &line, 1);
+        source = source.replacen('\n', &lines, 1);
     }
     // Which samplers each texture is combined with; a map, so that the order is the bindings'.
     let of_handle = |handle| bound.iter().find(|it| it.handle == handle);

@@ -1,17 +1,29 @@
 //! HLSL. naga reads every sampler from a heap; here a sampler is a `SamplerState` in a register
 //! of its own, as hand-written shaders and root signatures have it. naga drops the formats of storage
-//! textures; here they are said in the attribute that DXC reads.
+//! textures; here they are said in the attribute that DXC reads. It calls functions with 64-bit floats
+//! that HLSL has for 32-bit ones only; here they are our own.
 
 use std::collections::BTreeMap;
 
 use naga::back::hlsl::{BindTarget, Options, PipelineOptions, ShaderModel, Writer};
-use naga::{ImageClass, ResourceBinding, StorageFormat, TypeInner};
+use naga::valid::ModuleInfo;
+use naga::{
+    Expression, ImageClass, MathFunction, Module, ResourceBinding, Scalar, StorageFormat, TypeInner,
+};
 
 use super::{BoundsChecks, Job, Kind, Place, Text, Written, text};
 use crate::error::Failure;
 
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let (module, info) = job.frozen()?;
+    let doubles = match Doubles::of(&module, &info) {
+        Ok(doubles) => doubles,
+        Err(function) => {
+            return Ok(Written::Unsupported(format!(
+                "HLSL has no {function} of 64-bit floating-point numbers"
+            )));
+        }
+    };
     let bound = job.bound();
     let mut registers = BTreeMap::new();
     let mut next: BTreeMap<char, u32> = BTreeMap::new();
@@ -62,7 +74,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         message: "its declaration is not of the shape that is expected".into(),
         ..job.failure(&std::fmt::Error)
     })?;
-    let mut source = job.precise(source, &["float", "double"])?;
+    let mut source = doubles.apply(job.precise(source, &["float", "double"])?);
     // fxc, which has models up to 5.1, does not know attributes of Vulkan.
     if job.options.shader_model.0 > ShaderModel::V5_1 {
         for it in bound.iter().filter(|it| it.kind == Kind::Image) {
@@ -100,6 +112,88 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         sized: Vec::new(),
         requires: Vec::new(),
     }))
+}
+
+/// The functions of `double` that HLSL lacks: given one, it silently converts to `float`.
+#[derive(Default)]
+struct Doubles {
+    sqrt: Precisions,
+    floor: Precisions,
+}
+
+/// Which floats a function is called with.
+#[derive(Default)]
+struct Precisions {
+    /// 32 bits.
+    single: bool,
+    /// 64 bits.
+    double: bool,
+}
+
+impl Doubles {
+    /// Those that a module calls; an error names one that is not to be had.
+    fn of(module: &Module, info: &ModuleInfo) -> Result<Self, String> {
+        let mut found = Self::default();
+        let functions = module
+            .functions
+            .iter()
+            .map(|(handle, function)| (function, &info[handle]));
+        let entries = module
+            .entry_points
+            .iter()
+            .enumerate()
+            .map(|(i, entry)| (&entry.function, info.get_entry_point(i)));
+        for (function, types) in functions.chain(entries) {
+            for (_, expression) in function.expressions.iter() {
+                let Expression::Math { fun, arg, .. } = *expression else {
+                    continue;
+                };
+                let ty = types[arg].ty.inner_with(&module.types);
+                let is_double = ty.scalar() == Some(Scalar::F64);
+                let precisions = match fun {
+                    MathFunction::Sqrt => &mut found.sqrt,
+                    MathFunction::Floor => &mut found.floor,
+                    MathFunction::Abs | MathFunction::Min | MathFunction::Max => continue,
+                    _ if is_double => return Err(format!("function `{fun:?}`")),
+                    _ => continue,
+                };
+                match ty {
+                    TypeInner::Scalar(_) if is_double => precisions.double = true,
+                    _ if is_double => return Err(format!("function `{fun:?}` of vectors")),
+                    _ => precisions.single = true,
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// Puts the lacking functions on top and calls them.
+    fn apply(&self, mut source: String) -> String {
+        let own = [
+            (&self.sqrt, "sqrt", "HankelSqrt", include_str!("sqrt64.hlsl")),
+            (
+                &self.floor,
+                "floor",
+                "HankelFloor",
+                include_str!("floor64.hlsl"),
+            ),
+        ];
+        let mut above = String::new();
+        for (precisions, theirs, ours, text) in own {
+            if !precisions.double {
+                continue;
+            }
+            source = text::rename(&source, theirs, ours);
+            above.push_str(text);
+            if precisions.single {
+                for ty in ["float", "float2", "float3", "float4"] {
+                    above.push_str(&format!("{ty} {ours}({ty} x) {{ return {theirs}(x); }}\n"));
+                }
+                above.push('\n');
+            }
+        }
+        above + &source
+    }
 }
 
 /// Replaces the heap and the indices into it by registers.

@@ -12,6 +12,7 @@
 //!   express them and get the default, or the value that the options freeze.
 //! - Arithmetic of an exact kernel is neither contracted nor reordered. naga knows nothing of that:
 //!   in GLSL and HLSL each result gets a `precise` variable, MSL a pragma, and WGSL cannot say it.
+//!   A pinned kernel gets `precise` where that costs no device, and is written all the same elsewhere.
 //! - What a language cannot express is [`Written::Unsupported`], with the reason; what goes wrong is an
 //!   error.
 
@@ -295,6 +296,18 @@ impl Ir {
         crate::lint::of_module(&self.module, None)
     }
 
+    /// The same with a variable for each result of arithmetic, to be `precise`.
+    fn with_roundings(&self) -> Self {
+        let mut module = self.module.clone();
+        cleanup::name_roundings(&mut module, &self.info);
+        Self {
+            module,
+            info: self.info.clone(),
+            kernel: self.kernel.clone(),
+            clean: self.clean,
+        }
+    }
+
     fn cleaned(&self, kernel: &Kernel) -> Option<Self> {
         let name = kernel.name.as_str();
         let step = || -> Result<Self, Failure> {
@@ -342,8 +355,15 @@ impl Ir {
         if let Some(reason) = self.unsupported(language, kernel, options) {
             return Ok(Written::Unsupported(reason));
         }
+        let pinned = kernel.pinned
+            && !kernel.exact
+            && matches!(
+                language,
+                Language::Hlsl | Language::Glsl | Language::Essl310
+            );
+        let named = pinned.then(|| self.with_roundings());
         let job = Job {
-            ir: self,
+            ir: named.as_ref().unwrap_or(self),
             kernel,
             options,
             language,
@@ -685,10 +705,10 @@ impl Job<'_> {
         }
     }
 
-    /// Makes arithmetic exact in GLSL and HLSL, if the kernel is: each of its results has a
+    /// Makes arithmetic exact in GLSL and HLSL, if the kernel asks for it: each of its results has a
     /// variable ([`cleanup::name_roundings`]), which becomes `precise`.
     fn precise(&self, source: String, scalars: &[&str]) -> Result<String, Failure> {
-        if !self.kernel.exact {
+        if !self.kernel.exact && !self.kernel.pinned {
             return Ok(source);
         }
         let functions = self.ir.module.functions.iter().map(|(_, it)| it);

@@ -13,11 +13,7 @@ mod run;
 mod texels;
 mod text;
 
-use std::io::{BufRead as _, Write as _};
-
-use serde::Serialize;
-
-use crate::job::{Job, Reply};
+use crate::job::Job;
 
 use context::Context;
 
@@ -58,35 +54,12 @@ impl Gl {
     }
 }
 
-/// The runner's first line.
-#[derive(Serialize)]
-struct Ready {
-    ready: String,
-}
-
 /// The runner: takes jobs from the standard input until it ends, answers on the standard output.
 ///
 /// # Errors
 /// No device; a line that is no job; an output that cannot be written.
 pub fn serve() -> Result<(), String> {
     let mut gl = Gl::open()?;
-    answer(&Ready { ready: gl.name() })?;
-    for line in std::io::stdin().lock().lines() {
-        let line = line.map_err(|error| format!("standard input: {error}"))?;
-        if line.trim().is_empty() {
-            continue;
-        }
-        let job: Job = serde_json::from_str(&line).map_err(|error| format!("no job: {error}"))?;
-        let error = gl.run(&job).err();
-        answer(&Reply { id: job.id, error })?;
-    }
-    Ok(())
-}
-
-fn answer(what: &impl Serialize) -> Result<(), String> {
-    let line = serde_json::to_string(what).map_err(|error| error.to_string())?;
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{line}")
-        .and_then(|()| out.flush())
-        .map_err(|error| format!("standard output: {error}"))
+    let name = gl.name();
+    crate::serve::serve(&name, |job: &Job| (job.id, gl.run(job).map_err(Into::into)))
 }

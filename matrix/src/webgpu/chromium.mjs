@@ -113,7 +113,7 @@ async function start() {
     const death = new Promise((_, reject) => {
         const die = (how) => {
             isDead = true;
-            reject(new Error(`Chromium ${how}: ${words()}`));
+            reject(Object.assign(new Error(`Chromium ${how}: ${words()}`), { isDeath: true }));
         };
         child.on("error", (e) => die(`failed: ${e.message}`));
         child.on("exit", (code, signal) => die(ending(code, signal)));

@@ -78,7 +78,7 @@ async function start() {
     const death = new Promise((_, reject) => {
         const die = (how) => {
             isDead = true;
-            reject(new Error(`Dawn's process ${how}: ${words()}`));
+            reject(Object.assign(new Error(`Dawn's process ${how}: ${words()}`), { isDeath: true }));
         };
         child.on("error", (e) => die(`failed: ${e.message}`));
         child.on("close", (code, signal) => die(ending(code, signal)));

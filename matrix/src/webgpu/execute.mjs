@@ -12,7 +12,10 @@ const TEXEL_BYTES = {
 const ALIGNMENT = 256;
 
 /** Features that some kernel needs; those that the adapter has are asked for. */
-const FEATURES = ["float32-filterable", "texture-formats-tier1"];
+/** The feature that adds formats of 16-bit normalised numbers, and storage of small ones. */
+const TIER = "texture-formats-tier1";
+
+const FEATURES = ["float32-filterable", TIER];
 
 const FILTERS = ["validation", "out-of-memory", "internal"];
 
@@ -291,6 +294,9 @@ class Maker {
                 case "sampler":
                     return { ...entry, sampler: { type: arg.linear ? "filtering" : "non-filtering" } };
                 case "storage_texture":
+                    if (/^(r|rg|rgba)(8s|16[su])norm$|^(r|rg)(8|16)/.test(role.format) && !this.device.features.has(TIER)) {
+                        throw new Error(`the device lacks ${TIER}`);
+                    }
                     return { ...entry, storageTexture: {
                         access: "write-only",
                         format: role.format,

@@ -33,6 +33,16 @@ export function within(work, death, what) {
     return Promise.race([work, death, late]).finally(() => clearTimeout(timer));
 }
 
+/** How every message begins that says which feature a device lacks. */
+const LACKS = "the device lacks ";
+
+/** The part of a reply that says what went wrong. */
+function failure(e) {
+    const error = e.message || String(e);
+    if (error.startsWith(LACKS)) return { error: error.slice(LACKS.length), kind: "lacks" };
+    return { error, kind: e.isLate ? "timed_out" : e.isDeath ? "crashed" : "refused" };
+}
+
 /**
  * Serves jobs until standard input ends.
  *
@@ -68,7 +78,7 @@ export async function serve(start) {
                 await (await fresh()).run(job);
                 say({ id: job.id });
             } catch (e) {
-                say({ id: job.id, error: e.message || String(e) });
+                say({ id: job.id, ...failure(e) });
             }
         }
         await close();
