@@ -59,9 +59,15 @@ fn every_stage_agrees_on_every_path() {
         assert_eq!(kernel.paths.len(), 4);
         for path in &kernel.paths {
             assert_eq!(path.outcome, Outcome::Passed, "{text}");
-            assert_eq!((path.found.beyond, path.found.largest_ulp), (0, 0), "{text}");
+            assert_eq!(
+                (path.found.beyond, path.found.largest_ulp),
+                (0, 0),
+                "{text}"
+            );
             assert!(
-                path.found.values >= 1000 || kernel.kernel == "histogram" || kernel.kernel == "sums",
+                path.found.values >= 1000
+                    || kernel.kernel == "histogram"
+                    || kernel.kernel == "sums",
                 "{text}"
             );
         }

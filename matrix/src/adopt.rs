@@ -118,14 +118,17 @@ fn global(module: &dr::Module, id: Word) -> Option<&Instruction> {
 /// loaded from, and stays alone.
 fn split(b: &mut Builder, binding: u32, sampler: Option<u32>) -> Result<(), String> {
     let module = b.module_ref();
-    let found = module.annotations.iter().find_map(|i| match i.operands[..] {
-        [
-            Operand::IdRef(id),
-            Operand::Decoration(Decoration::Binding),
-            Operand::LiteralBit32(n),
-        ] if n == binding => Some(id),
-        _ => None,
-    });
+    let found = module
+        .annotations
+        .iter()
+        .find_map(|i| match i.operands[..] {
+            [
+                Operand::IdRef(id),
+                Operand::Decoration(Decoration::Binding),
+                Operand::LiteralBit32(n),
+            ] if n == binding => Some(id),
+            _ => None,
+        });
     // A compiler drops what is not used.
     let Some(variable) = found else { return Ok(()) };
     let pointee = |id: Word| match global(module, id)?.operands.get(1)? {
@@ -238,9 +241,29 @@ mod tests {
         let line = std::fs::read_to_string("/tmp/jobs/glsl.jsonl").unwrap();
         for l in line.lines() {
             let job: Job = serde_json::from_str(l).unwrap();
-            if !["shade_hamburger","filtered","slice","last_sample"].contains(&job.kernel.as_str()) { continue }
-            let st = if job.kernel == "shade_hamburger" {"frag"} else {"comp"};
-            std::process::Command::new("glslangValidator").args(["-V","--target-env","vulkan1.1","-S",st,"-o","/tmp/d.spv"]).arg(&job.code).status().unwrap();
+            if !["shade_hamburger", "filtered", "slice", "last_sample"]
+                .contains(&job.kernel.as_str())
+            {
+                continue;
+            }
+            let st = if job.kernel == "shade_hamburger" {
+                "frag"
+            } else {
+                "comp"
+            };
+            std::process::Command::new("glslangValidator")
+                .args([
+                    "-V",
+                    "--target-env",
+                    "vulkan1.1",
+                    "-S",
+                    st,
+                    "-o",
+                    "/tmp/d.spv",
+                ])
+                .arg(&job.code)
+                .status()
+                .unwrap();
             let b = glsl(&std::fs::read("/tmp/d.spv").unwrap(), &job).unwrap();
             std::fs::write(format!("/tmp/d_{}.spv", job.kernel), b).unwrap();
         }

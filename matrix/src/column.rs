@@ -9,9 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::tools::Tool;
 
 /// A way to run a kernel.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Column {
     /// Natively, one invocation after the other: the reference.
@@ -156,10 +154,13 @@ impl FromStr for Column {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|c| c.id() == name).ok_or_else(|| {
-            let known: Vec<&str> = Self::ALL.iter().map(|c| c.id()).collect();
-            format!("`{name}` is no column; there are {}", known.join(", "))
-        })
+        Self::ALL
+            .into_iter()
+            .find(|c| c.id() == name)
+            .ok_or_else(|| {
+                let known: Vec<&str> = Self::ALL.iter().map(|c| c.id()).collect();
+                format!("`{name}` is no column; there are {}", known.join(", "))
+            })
     }
 }
 

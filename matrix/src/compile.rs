@@ -87,7 +87,10 @@ const DXC_MODEL: &str = "6_2";
 /// The registers that the manifest names, and the bindings that they stand for. A compiler refuses
 /// a text with others, or they stay unbound.
 fn registers(job: &Job) -> Result<Vec<(String, u32)>, Failure> {
-    let bound = job.slots.iter().filter_map(|s| Some((s, s.binding?, s.place.as_ref()?)));
+    let bound = job
+        .slots
+        .iter()
+        .filter_map(|s| Some((s, s.binding?, s.place.as_ref()?)));
     bound
         .map(|(slot, binding, place)| match place.index {
             Some(index) => Ok((format!("{}{index}", place.class), binding)),
@@ -110,9 +113,7 @@ fn finish(done: Finished, program: &str, source: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let folder = source.parent().map(PathBuf::from).unwrap_or_default();
-    let words = done
-        .words()
-        .replace(&format!("{}/", folder.display()), "");
+    let words = done.words().replace(&format!("{}/", folder.display()), "");
     match done.crash() {
         Some(how) => Err(Failure::Crashed {
             program: program.into(),

@@ -2,4 +2,6 @@
 use crate::report::Report;
 /// The page.
 #[must_use]
-pub fn page(_report: &Report) -> String { String::new() }
+pub fn page(_report: &Report) -> String {
+    String::new()
+}

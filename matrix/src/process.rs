@@ -267,10 +267,11 @@ impl Runner {
         let mut line = serde_json::to_string(job)
             .map_err(|e| Failure::refused(format!("the job is no JSON: {e}")))?;
         line.push('\n');
-        let written = self
-            .input
-            .as_mut()
-            .map(|input| input.write_all(line.as_bytes()).and_then(|()| input.flush()));
+        let written = self.input.as_mut().map(|input| {
+            input
+                .write_all(line.as_bytes())
+                .and_then(|()| input.flush())
+        });
         if !matches!(written, Some(Ok(()))) {
             return Err(self.crashed());
         }
@@ -388,10 +389,7 @@ mod tests {
     fn words_and_status_are_kept() {
         let done = run(&mut shell("echo out; echo err >&2; exit 3"), LONG).unwrap();
         assert_eq!(done.status.code(), Some(3));
-        assert_eq!(
-            (done.stdout.as_str(), done.stderr.as_str()),
-            ("out", "err")
-        );
+        assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("out", "err"));
         assert_eq!(done.crash(), None);
         let dead = run(&mut shell("kill -SEGV $$"), LONG).unwrap();
         assert!(dead.crash().unwrap().contains("11"), "{dead:?}");
@@ -424,10 +422,7 @@ mod tests {
         let mut runner = Runner::start(&mut shell(&script), LONG).unwrap();
         assert_eq!(runner.ready, "here");
         runner.ask(&"job", 1, LONG).unwrap();
-        assert_eq!(
-            runner.ask(&"job", 2, LONG),
-            Err(Failure::refused("no"))
-        );
+        assert_eq!(runner.ask(&"job", 2, LONG), Err(Failure::refused("no")));
         assert!(runner.lives());
     }
 

@@ -18,6 +18,7 @@ use hankel_host::parity::numbers::{Found, Numbers, Rules};
 
 use crate::cache::Cache;
 use crate::column::Column;
+use crate::flush::flushed;
 use crate::job::Job;
 use crate::known::Known;
 use crate::prepare::Prepared;
@@ -26,7 +27,6 @@ use crate::report::{Cell, ColumnReport, Outcome, Report, Row};
 use crate::subject::{Code, Subject};
 use crate::tools::{Dxc, Status, Tool, Tools};
 use crate::vulkan::{VulkanJob, Way};
-use crate::flush::flushed;
 use crate::{compile, locate, msl, rules, webgpu};
 
 /// What is to be run, and with what.
@@ -201,7 +201,11 @@ pub fn run(
         let mut all = Vec::new();
         for (column, queue) in &queues {
             // Only where a process is started for each kernel anyway do several go on at a time.
-            let lines = if *column == Column::Msl { request.at_once.max(1) } else { 1 };
+            let lines = if *column == Column::Msl {
+                request.at_once.max(1)
+            } else {
+                1
+            };
             let next = Arc::new(Mutex::new(0));
             for line in 0..lines {
                 let (shared, next) = (&shared, Arc::clone(&next));
@@ -262,16 +266,17 @@ pub fn run(
 /// Required columns that did not run.
 fn complain(request: &Request, report: &mut Report) {
     for column in &request.required {
-        let missing = report
-            .kernels
-            .iter()
-            .find_map(|r| match r.cells.get(column).map(|c| &c.outcome) {
-                Some(Outcome::NotInstalled { what, install }) => {
-                    Some(format!("{what} is not installed; {install}"))
-                }
-                None => Some("it was not asked for".into()),
-                _ => None,
-            });
+        let missing =
+            report
+                .kernels
+                .iter()
+                .find_map(|r| match r.cells.get(column).map(|c| &c.outcome) {
+                    Some(Outcome::NotInstalled { what, install }) => {
+                        Some(format!("{what} is not installed; {install}"))
+                    }
+                    None => Some("it was not asked for".into()),
+                    _ => None,
+                });
         if let Some(why) = missing {
             report
                 .complaints
@@ -319,7 +324,9 @@ fn references<'a>(
                         *next += 1;
                         *next - 1
                     };
-                    let Some(subject) = subjects.get(i) else { break };
+                    let Some(subject) = subjects.get(i) else {
+                        break;
+                    };
                     let one = reference(request, subject, work);
                     locked(&made).push((i, one));
                 }
@@ -559,9 +566,12 @@ fn judge(
             }
             if found.beyond > 0 {
                 cell.outcome = Outcome::Differs;
-                cell.line = text.as_deref().zip(found.first.as_ref()).and_then(
-                    |(text, difference)| locate::of_output(text, kernel, code?, &difference.value),
-                );
+                cell.line =
+                    text.as_deref()
+                        .zip(found.first.as_ref())
+                        .and_then(|(text, difference)| {
+                            locate::of_output(text, kernel, code?, &difference.value)
+                        });
             }
             cell.found = Some(found);
         }
@@ -600,9 +610,8 @@ impl Engine<'_> {
             .map_err(Failure::refused)?;
         job.id = unit.row as u64 + 1;
         let done = self.execute(&job, kernel, &folder);
-        let bytes = done.and_then(|()| {
-            fs::read(&results).map_err(|e| io("the runner left no results", e))
-        });
+        let bytes =
+            done.and_then(|()| fs::read(&results).map_err(|e| io("the runner left no results", e)));
         // The work's folder would otherwise hold the results of all kernels at once.
         let _ = fs::remove_dir_all(&folder);
         unit.it

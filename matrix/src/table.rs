@@ -22,7 +22,12 @@ impl fmt::Display for Report {
             )?;
         }
         for tool in self.tools.iter().filter(|t| t.is_there()) {
-            writeln!(f, "{}: {}", tool.name, tool.version.as_deref().unwrap_or(""))?;
+            writeln!(
+                f,
+                "{}: {}",
+                tool.name,
+                tool.version.as_deref().unwrap_or("")
+            )?;
         }
         let mut table = Table::new();
         table.load_preset(presets::ASCII_MARKDOWN);
@@ -31,7 +36,11 @@ impl fmt::Display for Report {
         table.set_header(head);
         for row in &self.kernels {
             let mut line = vec![row.kernel.clone()];
-            line.extend(self.columns.iter().map(|c| row.cells.get(&c.column).map_or_else(String::new, brief)));
+            line.extend(
+                self.columns
+                    .iter()
+                    .map(|c| row.cells.get(&c.column).map_or_else(String::new, brief)),
+            );
             table.add_row(line);
         }
         writeln!(f, "{table}")?;
@@ -77,17 +86,30 @@ fn details(f: &mut fmt::Formatter<'_>, name: &str, cell: &Cell) -> fmt::Result {
     match &cell.outcome {
         Outcome::Differs => {
             if let Some(found) = &cell.found {
-                writeln!(f, "{name}: {} of {} numbers are beyond what is allowed; at most {} ulp, {:?} absolute", found.beyond, found.values, found.largest_ulp, found.largest_absolute)?;
+                writeln!(
+                    f,
+                    "{name}: {} of {} numbers are beyond what is allowed; at most {} ulp, {:?} absolute",
+                    found.beyond, found.values, found.largest_ulp, found.largest_absolute
+                )?;
                 if let Some(d) = &found.first {
-                    writeln!(f, "    {} inputs, invocation {}: {} is {}, expected {} ({} ulp)", d.class, d.invocation, d.value, d.got, d.expected, d.ulp)?;
-                    let inputs: Vec<String> = d.inputs.iter().map(|(n, v)| format!("{n} = {v}")).collect();
+                    writeln!(
+                        f,
+                        "    {} inputs, invocation {}: {} is {}, expected {} ({} ulp)",
+                        d.class, d.invocation, d.value, d.got, d.expected, d.ulp
+                    )?;
+                    let inputs: Vec<String> =
+                        d.inputs.iter().map(|(n, v)| format!("{n} = {v}")).collect();
                     writeln!(f, "    {}", inputs.join(", "))?;
                 }
             }
         }
         Outcome::Foreign { failure } => {
             let words = failure.to_string();
-            writeln!(f, "{name}: {}", words.lines().take(12).collect::<Vec<_>>().join("\n    "))?;
+            writeln!(
+                f,
+                "{name}: {}",
+                words.lines().take(12).collect::<Vec<_>>().join("\n    ")
+            )?;
             if let Failure::Crashed { .. } | Failure::TimedOut { .. } = failure {
                 writeln!(f, "    its whole output is in the JSON report")?;
             }

@@ -12,9 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::process::run;
 
 /// Something that columns need.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tool {
     /// A Vulkan driver, as the loader finds it.

@@ -74,6 +74,9 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         message: "its declaration is not of the shape that is expected".into(),
         ..job.failure(&std::fmt::Error)
     })?;
+    // Of a selection between two literals without suffix DXC 1.7 rounds both towards zero
+    // (`tests/upstream/dxc-literal-selection`).
+    let source = text::suffixed(&source);
     let mut source = doubles.apply(job.precise(source, &["float", "double"])?);
     // fxc, which has models up to 5.1, does not know attributes of Vulkan.
     if job.options.shader_model.0 > ShaderModel::V5_1 {
@@ -170,7 +173,12 @@ impl Doubles {
     /// Puts the lacking functions on top and calls them.
     fn apply(&self, mut source: String) -> String {
         let own = [
-            (&self.sqrt, "sqrt", "HankelSqrt", include_str!("sqrt64.hlsl")),
+            (
+                &self.sqrt,
+                "sqrt",
+                "HankelSqrt",
+                include_str!("sqrt64.hlsl"),
+            ),
             (
                 &self.floor,
                 "floor",
@@ -295,7 +303,8 @@ mod tests {
 
     #[test]
     fn storage_textures_say_their_format() {
-        let source = "RWTexture2D<float4> a : register(u0);\nRWTexture2D<float4> b : register(u1);\n";
+        let source =
+            "RWTexture2D<float4> a : register(u0);\nRWTexture2D<float4> b : register(u1);\n";
         assert_eq!(
             with_format(source, "u1", "rgba16f"),
             "RWTexture2D<float4> a : register(u0);\n\

@@ -25,6 +25,52 @@ pub fn rename(text: &str, from: &str, to: &str) -> String {
     renamed + rest
 }
 
+/// Puts `f` after decimal fractions that have no suffix.
+pub fn suffixed(text: &str) -> String {
+    let mut all = String::with_capacity(text.len() + text.len() / 32);
+    for line in text.split_inclusive('\n') {
+        let (code, comment) = line.split_at(line.find("//").unwrap_or(line.len()));
+        let mut rest = code;
+        let mut before = ' ';
+        while let Some(letter) = rest.chars().next() {
+            let length = if letter.is_ascii_digit() && !is_name(before) {
+                number(rest)
+            } else {
+                letter.len_utf8()
+            };
+            let (token, after) = rest.split_at(length);
+            all.push_str(token);
+            let is_fraction =
+                token.contains(['.', 'e']) && token.starts_with(|c: char| c.is_ascii_digit());
+            if is_fraction && length > 1 && !after.starts_with(is_name) {
+                all.push('f');
+            }
+            before = token.chars().next_back().unwrap_or(' ');
+            rest = after;
+        }
+        all.push_str(comment);
+    }
+    all
+}
+
+/// Bytes of the decimal number that `text` begins with: digits, a fraction, an exponent.
+fn number(text: &str) -> usize {
+    let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
+    let mut length = digits(0);
+    if text[length..].starts_with('.') {
+        length += 1;
+        length += digits(length);
+    }
+    if text[length..].starts_with('e') {
+        let sign = usize::from(text[length + 1..].starts_with(['+', '-']));
+        let exponent = digits(length + 1 + sign);
+        if exponent > 0 {
+            length += 1 + sign + exponent;
+        }
+    }
+    length
+}
+
 /// Whether a name stands anywhere in the text.
 pub fn has_name(text: &str, name: &str) -> bool {
     rename(text, name, "") != text
@@ -89,6 +135,14 @@ mod tests {
         assert_eq!(rename("a ab a_ (a)a", "a", "x"), "x ab a_ (x)x");
         assert!(has_name("f(b)", "b"));
         assert!(!has_name("f(bc)", "b"));
+    }
+
+    #[test]
+    fn fractions_get_a_suffix_and_nothing_else_does() {
+        assert_eq!(
+            suffixed("a1.x = 1.5 * 2 - 1e25 + 3u; // 1.5\nb = x2e3(0.5L, 1.0f, 7, 2.5e-7, 1e-3)\n"),
+            "a1.x = 1.5f * 2 - 1e25f + 3u; // 1.5\nb = x2e3(0.5L, 1.0f, 7, 2.5e-7f, 1e-3f)\n"
+        );
     }
 
     #[test]

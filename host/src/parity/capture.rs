@@ -148,9 +148,12 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
 
     let point = &mut b.module_mut().entry_points[entry];
     point.operands[1] = Operand::IdRef(outer);
-    point
-        .operands
-        .extend([Some(passed), new_size].into_iter().flatten().map(Operand::IdRef));
+    point.operands.extend(
+        [Some(passed), new_size]
+            .into_iter()
+            .flatten()
+            .map(Operand::IdRef),
+    );
     if !interface.contains(&index) {
         point.operands.push(Operand::IdRef(index));
     }

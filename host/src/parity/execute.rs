@@ -156,14 +156,9 @@ pub fn on_vulkan(
         Some(Shader::SpirvThroughNaga(words)) if !as_it_is => {
             Some(super::translate::spirv_to_spirv(words, arithmetic))
         }
-        Some(Shader::Wgsl { text, entry_point }) if !as_it_is => {
-            Some(super::translate::wgsl_to_spirv(
-                text,
-                entry_point,
-                &kernel.name,
-                arithmetic,
-            ))
-        }
+        Some(Shader::Wgsl { text, entry_point }) if !as_it_is => Some(
+            super::translate::wgsl_to_spirv(text, entry_point, &kernel.name, arithmetic),
+        ),
         _ => None,
     };
     let translated = translated.transpose().map_err(|e| bad(kernel, e))?;

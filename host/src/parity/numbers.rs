@@ -138,8 +138,7 @@ impl<'a> Numbers<'a> {
             return;
         }
         let tolerance = &rules.tolerance;
-        let fits =
-            |d: &Distance| d.ulp <= tolerance.ulp.into() || d.absolute <= tolerance.absolute;
+        let fits = |d: &Distance| d.ulp <= tolerance.ulp.into() || d.absolute <= tolerance.absolute;
         self.each(reference, written, rules.flushes, |i, name, d| {
             found.values += 1;
             if d.ulp == 0 {
