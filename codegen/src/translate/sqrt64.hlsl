@@ -1,5 +1,18 @@
-// HLSL takes square roots of 32-bit floats only. This doubles the digits of one twice, and rounds by
-// the exact remainder.
+// HLSL takes square roots of 32-bit floats only. Below, the digits of one are doubled twice, and the
+// last one is settled by exact remainders.
+
+// What the square of `root` leaves of `m` (Dekker's product); exact where `root` is nearly the root.
+double HankelSqrtRest(double m, double root)
+{
+    precise double scaled = root * 134217729.0L;
+    precise double high = scaled - (scaled - root);
+    precise double low = root - high;
+    precise double square = root * root;
+    precise double lost = ((high * high - square) + (high * low) * 2.0L) + low * low;
+    precise double rest = (m - square) - lost;
+    return rest;
+}
+
 double HankelSqrt(double x)
 {
     if (!(x > 0.0L)) {
@@ -24,14 +37,16 @@ double HankelSqrt(double x)
     precise double root = double(sqrt(float(m)));
     root = (root + m / root) * 0.5L;
     root = (root + m / root) * 0.5L;
-    // The square of the root and its error: Dekker's product.
-    precise double scaled = root * 134217729.0L;
-    precise double big = scaled - (scaled - root);
-    precise double small = root - big;
-    precise double square = root * root;
-    precise double lost = ((big * big - square) + (big * small) * 2.0L) + small * small;
-    precise double correction = ((m - square) - lost) / (root + root);
-    root = root + correction;
+    root = root + HankelSqrtRest(m, root) / (root + root);
+    // Whether the neighbour is nearer: half a step away, the rest is the root times a step.
+    const double unit = 2.220446049250313e-16L;
+    precise double rest = HankelSqrtRest(m, root);
+    precise double step = root * unit;
+    if (rest > step) {
+        root = root + unit;
+    } else if (rest <= -step) {
+        root = root - unit;
+    }
     return root * asdouble(0u, uint(k + 1023) << 20);
 }
 
