@@ -5,7 +5,7 @@
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{self, Builder, Instruction, Operand};
-use rspirv::spirv::{Decoration, Op, StorageClass, Word};
+use rspirv::spirv::{Decoration, ImageFormat, Op, StorageClass, Word};
 
 use crate::job::{Job, Role};
 
@@ -118,19 +118,10 @@ fn global(module: &dr::Module, id: Word) -> Option<&Instruction> {
 /// loaded from, and stays alone.
 fn split(b: &mut Builder, binding: u32, sampler: Option<u32>) -> Result<(), String> {
     let module = b.module_ref();
-    let found = module
-        .annotations
-        .iter()
-        .find_map(|i| match i.operands[..] {
-            [
-                Operand::IdRef(id),
-                Operand::Decoration(Decoration::Binding),
-                Operand::LiteralBit32(n),
-            ] if n == binding => Some(id),
-            _ => None,
-        });
     // A compiler drops what is not used.
-    let Some(variable) = found else { return Ok(()) };
+    let Some(variable) = bound(module, binding) else {
+        return Ok(());
+    };
     let pointee = |id: Word| match global(module, id)?.operands.get(1)? {
         Operand::IdRef(inner) => Some(*inner),
         _ => None,
@@ -232,40 +223,71 @@ fn retype(module: &mut dr::Module, variable: Word, pointer: Word) {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dump() {
-        let line = std::fs::read_to_string("/tmp/jobs/glsl.jsonl").unwrap();
-        for l in line.lines() {
-            let job: Job = serde_json::from_str(l).unwrap();
-            if !["shade_hamburger", "filtered", "slice", "last_sample"]
-                .contains(&job.kernel.as_str())
-            {
-                continue;
-            }
-            let st = if job.kernel == "shade_hamburger" {
-                "frag"
-            } else {
-                "comp"
-            };
-            std::process::Command::new("glslangValidator")
-                .args([
-                    "-V",
-                    "--target-env",
-                    "vulkan1.1",
-                    "-S",
-                    st,
-                    "-o",
-                    "/tmp/d.spv",
-                ])
-                .arg(&job.code)
-                .status()
-                .unwrap();
-            let b = glsl(&std::fs::read("/tmp/d.spv").unwrap(), &job).unwrap();
-            std::fs::write(format!("/tmp/d_{}.spv", job.kernel), b).unwrap();
+/// Whether every storage texture has the format that the description says; a shader may leave it to
+/// the texture. Software drivers take the texture's format whatever the shader says, so running it
+/// shows nothing.
+///
+/// # Errors
+/// In words: the texture and its formats.
+pub fn check_formats(code: &[u8], job: &Job) -> Result<(), String> {
+    let module = load(code)?;
+    for slot in &job.slots {
+        let (Some(binding), Role::StorageTexture { format, .. }) = (slot.binding, &slot.role)
+        else {
+            continue;
+        };
+        let Some(found) = image_format(&module, binding) else {
+            continue;
+        };
+        if found != ImageFormat::Unknown && Some(found) != vulkan_format(format) {
+            return Err(format!(
+                "texture `{}` is {format}, but the shader's format is {found:?}",
+                slot.name
+            ));
         }
     }
+    Ok(())
+}
+
+/// The format of the image at a binding; none where nothing uses it.
+fn image_format(module: &dr::Module, binding: u32) -> Option<ImageFormat> {
+    let variable = bound(module, binding)?;
+    let pointer = global(module, variable)?.result_type?;
+    let Operand::IdRef(image) = *global(module, pointer)?.operands.get(1)? else {
+        return None;
+    };
+    let image = global(module, image).filter(|i| i.class.opcode == Op::TypeImage)?;
+    image.operands.iter().find_map(|o| match o {
+        Operand::ImageFormat(format) => Some(*format),
+        _ => None,
+    })
+}
+
+/// SPIR-V's name of a format.
+fn vulkan_format(name: &str) -> Option<ImageFormat> {
+    Some(match name {
+        "r32float" => ImageFormat::R32f,
+        "rgba32float" => ImageFormat::Rgba32f,
+        "rgba16float" => ImageFormat::Rgba16f,
+        "rgba16unorm" => ImageFormat::Rgba16,
+        "rgba8unorm" => ImageFormat::Rgba8,
+        "r32uint" => ImageFormat::R32ui,
+        "rgba32uint" => ImageFormat::Rgba32ui,
+        _ => return None,
+    })
+}
+
+/// The variable at a binding.
+fn bound(module: &dr::Module, binding: u32) -> Option<Word> {
+    module
+        .annotations
+        .iter()
+        .find_map(|i| match i.operands[..] {
+            [
+                Operand::IdRef(id),
+                Operand::Decoration(Decoration::Binding),
+                Operand::LiteralBit32(n),
+            ] if n == binding => Some(id),
+            _ => None,
+        })
 }

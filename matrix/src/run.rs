@@ -643,7 +643,7 @@ impl Engine<'_> {
                 let shared = self.shared.work.join("msl");
                 fs::create_dir_all(&shared)
                     .map_err(|e| Failure::refused(format!("making a folder: {e}")))?;
-                return msl::run(&clang, &shared, job, limit).map_err(|e| failure(e, limit));
+                return msl::run(&clang, &shared, job, limit);
             }
             _ => None,
         };
@@ -737,22 +737,5 @@ impl Engine<'_> {
             command.env("VK_ICD_FILENAMES", &driver);
         }
         Ok(command)
-    }
-}
-
-/// MSL's failures as everybody's.
-fn failure(failure: msl::Failure, limit: Duration) -> Failure {
-    match failure {
-        msl::Failure::Crash { how, log } => Failure::Crashed {
-            program: "the kernel's program".into(),
-            how,
-            log,
-        },
-        msl::Failure::TimedOut { which } => Failure::TimedOut {
-            program: which.into(),
-            seconds: limit.as_secs(),
-            log: String::new(),
-        },
-        other => Failure::refused(other.to_string()),
     }
 }

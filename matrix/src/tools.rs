@@ -201,6 +201,16 @@ impl Tool {
 }
 
 impl Tools {
+    /// Tools in the folder that HANKEL_TOOLS names, or else in `tools` of Hankel's cache; without
+    /// either, of the present folder.
+    #[must_use]
+    pub fn of_cache(cache: Option<&Path>) -> Self {
+        let folder = variable("HANKEL_TOOLS")
+            .or_else(|| Some(cache?.join("tools")))
+            .unwrap_or_else(|| "tools".into());
+        Self { folder }
+    }
+
     /// Looks for one.
     #[must_use]
     pub fn status(&self, tool: Tool) -> Status {

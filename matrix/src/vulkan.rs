@@ -10,6 +10,7 @@ use hankel_host::inputs::{Case, Class, Input};
 use hankel_host::parity::execute::{self, Arithmetic, ExecuteError};
 use serde::{Deserialize, Serialize};
 
+use crate::adopt;
 use crate::job::{Arg, Job, Kind};
 use crate::serve::{self, Problem};
 
@@ -66,6 +67,9 @@ fn run(device: &mut VulkanDevice, it: &VulkanJob) -> Result<(), Problem> {
     };
     let code = read(&job.code)?;
     let inputs = read(&job.inputs)?;
+    if it.way == Way::Spirv {
+        adopt::check_formats(&code, job)?;
+    }
     let words: Vec<u32> = code
         .chunks_exact(4)
         .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))

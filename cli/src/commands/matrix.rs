@@ -1,5 +1,4 @@
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use hankel_codegen::build::generate;
@@ -94,15 +93,8 @@ pub fn serve(which: &str) -> Result<Outcome> {
 
 /// Where foreign programs are looked for.
 pub fn tools() -> Tools {
-    let folder = std::env::var_os("HANKEL_TOOLS")
-        .filter(|v| !v.is_empty())
-        .map(PathBuf::from)
-        .or_else(|| {
-            let cache = hankel_toolchain::Options::from_env().cache_folder().ok()?;
-            Some(cache.join("tools"))
-        })
-        .unwrap_or_else(|| "tools".into());
-    Tools { folder }
+    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
+    Tools::of_cache(cache.as_deref())
 }
 
 fn columns(names: &[String]) -> Result<Vec<Column>> {

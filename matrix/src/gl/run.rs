@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::job::{Arg, Case, Job, Place, Role, Scalar, Slot, Stage, Value};
 
 use super::context::{Attribute, Buffer, Context, Program, Texture};
-use super::texels::Texel;
+use super::texels::{self, Texel};
 use super::text::{self, Variable};
 
 /// Width of what fragments are drawn into, one pixel each. A power of two: a pixel's centre is
@@ -49,6 +49,25 @@ struct Pipeline {
     taken: Vec<usize>,
 }
 
+/// Whether the text gives every image the format that it has. llvmpipe takes the image's format
+/// whatever the text says, so that running it shows nothing.
+fn check_formats(job: &Job, code: &str) -> Result<(), String> {
+    for slot in &job.slots {
+        if let Role::StorageTexture { format, .. } = &slot.role
+            && let Some(name) = slot.place.as_ref().and_then(|p| p.name.as_deref())
+        {
+            let wanted = texels::in_text(format)?;
+            if !text::layout(code, name).iter().any(|word| word == wanted) {
+                return Err(format!(
+                    "{}: it is {format}, but the text does not say {wanted}",
+                    slot.name
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The results of all cases.
 pub(super) fn run(context: &mut Context, job: &Job) -> Result<Vec<u8>, String> {
     context.make_current()?;
@@ -58,7 +77,9 @@ pub(super) fn run(context: &mut Context, job: &Job) -> Result<Vec<u8>, String> {
     let code = String::from_utf8(read(&job.code)?)
         .map_err(|error| format!("{}: {error}", job.code.display()))?;
     let inputs = read(&job.inputs)?;
+    // What the compiler refuses comes first, with its words.
     let pipeline = pipeline(context, job, &code)?;
+    check_formats(job, &code)?;
     let mut results = Vec::new();
     for (i, case) in job.cases.iter().enumerate() {
         let mark = context.mark();

@@ -22,6 +22,19 @@ pub(super) struct Texel {
     pub(super) read_bytes: usize,
 }
 
+/// How a text names the format of an image.
+pub(super) fn in_text(name: &str) -> Result<&'static str, String> {
+    Ok(match name {
+        "r32float" => "r32f",
+        "rgba32float" => "rgba32f",
+        "rgba16float" => "rgba16f",
+        "rgba8unorm" => "rgba8",
+        "r32uint" => "r32ui",
+        "rgba32uint" => "rgba32ui",
+        _ => return Err(format!("GLSL ES has no images of format {name}")),
+    })
+}
+
 impl Texel {
     /// The format of that name. Depth is one float: the kernels read it as a colour.
     pub(super) fn named(name: &str) -> Result<Self, String> {

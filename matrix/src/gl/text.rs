@@ -34,6 +34,22 @@ pub(super) fn variables(text: &str, direction: &str) -> Vec<Variable> {
         .collect()
 }
 
+/// The words of the layout of the variable `name`; none if it has none.
+pub(super) fn layout(text: &str, name: &str) -> Vec<String> {
+    let declares = |statement: &String| {
+        statement.trim_start().starts_with("layout")
+            && statement.split_whitespace().last() == Some(name)
+    };
+    let declaration = statements(text).into_iter().find(declares);
+    declaration
+        .as_deref()
+        .and_then(|it| it.split_once('(')?.1.split_once(')'))
+        .map_or("", |(inside, _)| inside)
+        .split(',')
+        .map(|word| word.trim().to_owned())
+        .collect()
+}
+
 fn variable(statement: &str, direction: &str) -> Option<Variable> {
     let mut rest = statement.trim();
     let mut location = None;

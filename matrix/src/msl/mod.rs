@@ -7,7 +7,6 @@
 //! threads of a workgroup go from barrier to barrier in an order that changes each time, so that a
 //! barrier that is missing shows.
 
-mod process;
 pub mod signature;
 #[cfg(test)]
 mod tests;
@@ -23,47 +22,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::job::{Arg, Job, Role, Scalar, Slot, Stage, Value};
-use process::End;
+use crate::process::{Failure, run as run_program};
 use signature::{Given, Member, Param, Part, Signature, Structure};
-
-/// Why a job has no results.
-#[derive(Debug, thiserror::Error)]
-pub enum Failure {
-    /// The compiler does not take the text, or fails.
-    #[error("the compiler: {log}")]
-    Compile {
-        /// Its words.
-        log: String,
-    },
-    /// What was compiled does not come to its end.
-    #[error("{how}: {log}")]
-    Crash {
-        /// The signal or the exit status.
-        how: String,
-        /// What it printed.
-        log: String,
-    },
-    /// It took too long and was killed.
-    #[error("the {which} takes too long")]
-    TimedOut {
-        /// The compiler or the program.
-        which: &'static str,
-    },
-    /// The text or the job has a shape that this runner does not know.
-    #[error("{problem}")]
-    Refused {
-        /// What it is, quoted.
-        problem: String,
-    },
-    /// This machine fails: a file cannot be written, say.
-    #[error("cannot {doing}: {source}")]
-    Machine {
-        /// What was being done.
-        doing: String,
-        /// Why not.
-        source: io::Error,
-    },
-}
 
 /// The files that every program is made of.
 const PARTS: [(&str, &str); 5] = [
@@ -96,22 +56,6 @@ const KERNEL_FLAGS: [&str; 3] = [
     "-fsanitize-trap=all",
 ];
 
-/// The first line of what `compiler` says of itself; none if it does not run, or not soon.
-#[must_use]
-pub fn version(compiler: &Path) -> Option<String> {
-    const TIMEOUT: Duration = Duration::from_secs(20);
-    let folder = tempfile::tempdir().ok()?;
-    let mut command = Command::new(compiler);
-    command.arg("--version");
-    match process::run(&mut command, &folder.path().join("version"), TIMEOUT).ok()? {
-        End::Ended(status, text) if status.success() => {
-            let line = text.lines().next()?.trim();
-            (!line.is_empty()).then(|| line.into())
-        }
-        _ => None,
-    }
-}
-
 /// Runs `job`, whose text is MSL, with `compiler` (clang 16 or newer). `work` is a folder for files
 /// that outlive a job: what all jobs share is compiled once. Compiler and program may each take
 /// `timeout`.
@@ -120,10 +64,8 @@ pub fn version(compiler: &Path) -> Option<String> {
 /// [`Failure`]; the results are then not written.
 pub fn run(compiler: &Path, work: &Path, job: &Job, timeout: Duration) -> Result<(), Failure> {
     let text = fs::read_to_string(&job.code).doing(|| format!("read {}", job.code.display()))?;
-    let signature =
-        signature::parse(&text, &job.entry_point).map_err(|problem| Failure::Refused {
-            problem: format!("{}: {problem}", job.entry_point),
-        })?;
+    let signature = signature::parse(&text, &job.entry_point)
+        .map_err(|problem| Failure::refused(format!("{}: {problem}", job.entry_point)))?;
     let main = main_text(job, &signature)?;
     let plan = plan(job)?;
     let shared = shared(compiler, work, timeout)?;
@@ -155,25 +97,17 @@ pub fn run(compiler: &Path, work: &Path, job: &Job, timeout: Duration) -> Result
         .arg(folder.join("plan"))
         .arg(&job.inputs)
         .arg(&results);
-    match process::run(&mut command, &folder.join("program.log"), timeout)
-        .doing(|| format!("run {}", program.display()))?
-    {
-        End::TimedOut => return Err(Failure::TimedOut { which: "program" }),
-        End::Ended(status, _) if status.success() => {}
-        End::Ended(status, log) => {
-            return Err(Failure::Crash {
-                how: process::words(status),
-                log,
-            });
-        }
+    let done = run_program(&mut command, timeout)?;
+    if !done.status.success() {
+        return Err(crashed(done.status.to_string(), done.words()));
     }
     let bytes = fs::read(&results).doing(|| format!("read {}", results.display()))?;
     let expected = result_bytes(job);
     if bytes.len() as u64 != expected {
-        return Err(Failure::Crash {
-            how: "it ended well".into(),
-            log: format!("{} bytes of results instead of {expected}", bytes.len()),
-        });
+        return Err(crashed(
+            "it ended well".into(),
+            format!("{} bytes of results instead of {expected}", bytes.len()),
+        ));
     }
     fs::write(&job.results, bytes).doing(|| format!("write {}", job.results.display()))
 }
@@ -185,10 +119,7 @@ trait Doing<T> {
 
 impl<T> Doing<T> for io::Result<T> {
     fn doing(self, what: impl FnOnce() -> String) -> Result<T, Failure> {
-        self.map_err(|source| Failure::Machine {
-            doing: what(),
-            source,
-        })
+        self.map_err(|source| Failure::refused(format!("cannot {}: {source}", what())))
     }
 }
 
@@ -196,25 +127,30 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
     fs::write(path, text).doing(|| format!("write {}", path.display()))
 }
 
-fn refused(problem: impl Into<String>) -> Failure {
-    Failure::Refused {
-        problem: problem.into(),
+/// What was compiled did not come to its end.
+fn crashed(how: String, log: String) -> Failure {
+    Failure::Crashed {
+        program: "the kernel's program".into(),
+        how,
+        log,
     }
 }
 
-/// Runs a compiler.
+/// Runs a compiler. Its words need not say where the files lie.
 fn compiled(command: &mut Command, folder: &Path, timeout: Duration) -> Result<(), Failure> {
-    let compiler = command.get_program().to_os_string();
-    match process::run(command, &folder.join("compiler.log"), timeout)
-        .doing(|| format!("run {}", Path::new(&compiler).display()))?
-    {
-        End::TimedOut => Err(Failure::TimedOut { which: "compiler" }),
-        End::Ended(status, _) if status.success() => Ok(()),
-        End::Ended(status, log) if log.is_empty() => Err(Failure::Compile {
-            log: process::words(status),
-        }),
-        End::Ended(_, log) => Err(Failure::Compile { log }),
+    let done = run_program(command, timeout)?;
+    if done.status.success() {
+        return Ok(());
     }
+    let words = done.words().replace(&format!("{}/", folder.display()), "");
+    Err(match done.crash() {
+        Some(how) => Failure::Crashed {
+            program: "clang++".into(),
+            how,
+            log: words,
+        },
+        None => Failure::refused(format!("clang++: {words}")),
+    })
 }
 
 /// The folder with what all jobs share, made if it is not there: the headers, compiled, and the
@@ -231,7 +167,7 @@ fn shared(compiler: &Path, work: &Path, timeout: Duration) -> Result<PathBuf, Fa
         return Ok(folder.clone());
     }
     let mut hasher = DefaultHasher::new();
-    (PARTS, FLAGS, KERNEL_FLAGS, compiler, version(compiler)).hash(&mut hasher);
+    (PARTS, FLAGS, KERNEL_FLAGS, compiler).hash(&mut hasher);
     let folder = work.join(format!("msl-{:016x}", hasher.finish()));
     let ready = folder.join("ready");
     if !ready.exists() {
@@ -321,7 +257,9 @@ fn plan(job: &Job) -> Result<String, Failure> {
         .and_then(|n| n.checked_mul(z))
         .is_none_or(|n| n == 0 || n > 1024)
     {
-        return Err(refused(format!("a workgroup of {x} × {y} × {z} threads")));
+        return Err(Failure::refused(format!(
+            "a workgroup of {x} × {y} × {z} threads"
+        )));
     }
     let sizes = u32::from(job.sizes_slot.is_some()) as usize;
     let mut plan = format!(
@@ -354,7 +292,7 @@ fn plan(job: &Job) -> Result<String, Failure> {
         let [x, y, z] = case.groups;
         let _ = writeln!(plan, "{} {x} {y} {z}", case.invocations);
         if case.args.len() != job.slots.len() {
-            return Err(refused(format!(
+            return Err(Failure::refused(format!(
                 "{} arguments for {} slots",
                 case.args.len(),
                 job.slots.len()
@@ -375,7 +313,7 @@ fn plan(job: &Job) -> Result<String, Failure> {
                     Some((_, Arg::Bytes { length, .. })) => {
                         let _ = write!(plan, " {length}");
                     }
-                    _ => return Err(refused(format!("the size of binding {binding}"))),
+                    _ => return Err(Failure::refused(format!("the size of binding {binding}"))),
                 }
             }
             plan.push('\n');
@@ -402,7 +340,7 @@ fn plan_arg(plan: &mut String, slot: &Slot, arg: &Arg) -> Result<(), Failure> {
             },
         ) => {
             if !format.chars().all(|c| c.is_ascii_alphanumeric()) || format.is_empty() {
-                return Err(refused(format!("texture format `{format}`")));
+                return Err(Failure::refused(format!("texture format `{format}`")));
             }
             writeln!(plan, "{format} {x} {y} {z} {samples} {offset} {length}")
         }
@@ -417,7 +355,7 @@ fn plan_arg(plan: &mut String, slot: &Slot, arg: &Arg) -> Result<(), Failure> {
             Arg::Bytes { offset, length },
         ) => writeln!(plan, "{offset} {length}"),
         _ => {
-            return Err(refused(format!(
+            return Err(Failure::refused(format!(
                 "{arg:?} for `{}`, {:?}",
                 slot.name, slot.role
             )));
@@ -434,7 +372,7 @@ fn main_text(job: &Job, signature: &Signature) -> Result<String, Failure> {
         Stage::Fragment => "fragment",
     };
     if signature.stage != stage {
-        return Err(refused(format!(
+        return Err(Failure::refused(format!(
             "`{}` is a {}, not a {stage}",
             job.entry_point, signature.stage
         )));
@@ -445,9 +383,17 @@ fn main_text(job: &Job, signature: &Signature) -> Result<String, Failure> {
     }
     match &signature.returns {
         None if stage == "kernel" => {}
-        None => return Err(refused(format!("`{}` returns nothing", job.entry_point))),
+        None => {
+            return Err(Failure::refused(format!(
+                "`{}` returns nothing",
+                job.entry_point
+            )));
+        }
         Some(_) if stage == "kernel" => {
-            return Err(refused(format!("`{}` returns a value", job.entry_point)));
+            return Err(Failure::refused(format!(
+                "`{}` returns a value",
+                job.entry_point
+            )));
         }
         Some(structure) => glue.returned(job, structure)?,
     }
@@ -544,7 +490,7 @@ impl Glue {
                     ("instance_id" | "base_vertex", Stage::Vertex) => "zero",
                     ("vertex_id" | "instance_id" | "base_vertex", _)
                     | (_, Stage::Vertex | Stage::Fragment) => {
-                        return Err(refused(format!("`{name}` in this stage")));
+                        return Err(Failure::refused(format!("`{name}` in this stage")));
                     }
                     (name, Stage::Compute { .. }) => name,
                 };
@@ -582,7 +528,7 @@ impl Glue {
         }
         match left.first() {
             None => Ok(()),
-            Some(&i) => Err(refused(format!(
+            Some(&i) => Err(Failure::refused(format!(
                 "`{}` is nothing that `{}` has",
                 job.slots[i].name, structure.name
             ))),
@@ -605,7 +551,7 @@ fn bound(job: &Job, param: &Param, class: &str, n: u32) -> Result<usize, Failure
     };
     found
         .filter(|&i| fits(&job.slots[i].role))
-        .ok_or_else(|| refused(format!("no slot for `{}` [[{class}({n})]]", param.name)))
+        .ok_or_else(|| Failure::refused(format!("no slot for `{}` [[{class}({n})]]", param.name)))
 }
 
 /// The slot of what a vertex or fragment has of its own.
@@ -619,7 +565,8 @@ fn own(job: &Job, member: &Member) -> Result<usize, Failure> {
         Role::Position => member.part == Part::Position,
         _ => false,
     });
-    let slot = found.ok_or_else(|| refused(format!("no slot for member `{}`", member.name)))?;
+    let slot =
+        found.ok_or_else(|| Failure::refused(format!("no slot for member `{}`", member.name)))?;
     let scalar = |scalar| match scalar {
         Scalar::F32 => "float",
         Scalar::U32 => "uint",
@@ -629,7 +576,7 @@ fn own(job: &Job, member: &Member) -> Result<usize, Failure> {
         Some(value) if scalar(value.scalar) == member.scalar && value.size == member.size => {
             Ok(slot)
         }
-        _ => Err(refused(format!(
+        _ => Err(Failure::refused(format!(
             "member `{}` is `{}{}`, its slot {:?}",
             member.name, member.scalar, member.size, job.slots[slot].role
         ))),
