@@ -49,7 +49,8 @@ pub fn hlsl_glslang(
     adopt::hlsl_glslang(&compiled(out)?, job).map_err(Failure::refused)
 }
 
-/// HLSL through DXC. Constant buffers are laid out as Direct3D does.
+/// HLSL through DXC: for Direct3D, to see that it compiles, and to SPIR-V, which is given back.
+/// Constant buffers are laid out as Direct3D does.
 ///
 /// # Errors
 /// As for [`glsl`].
@@ -60,6 +61,8 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
         Stage::Fragment => "ps",
     };
     let profile = format!("{model}_{DXC_MODEL}");
+    let mut direct3d = dxc.command(&job.code, &job.entry_point, &profile, out);
+    finish(run(&mut direct3d, limit)?, "dxc", &job.code)?;
     let mut arguments: Vec<String> = ["-spirv", "-fspv-target-env=vulkan1.1", "-fvk-use-dx-layout"]
         .map(String::from)
         .into();

@@ -1,0 +1,9 @@
+#version 450
+layout(local_size_x = 1) in;
+layout(set = 0, binding = 0) readonly buffer Values { float values[]; };
+layout(set = 0, binding = 1) buffer Result { float result[]; };
+
+void main() {
+    precise float sum = (values[0] + values[1]) - values[0];
+    result[0] = sum;
+}
