@@ -1,8 +1,13 @@
 # Sourced by ./demo and ./check: installs what is missing, and says so. `for_tests=yes` asks for what
-# only the tests need.
+# only the tests need: the compilers, drivers and browsers of other people that the matrix runs on.
+# `hankel doctor` lists them with their licences.
 
 need() { # need COMMAND-OR-FILE PACKAGE
     command -v "$1" >/dev/null 2>&1 || [ -e "$1" ] || missing="$missing $2"
+}
+
+need_library() { # need_library FILE PACKAGE
+    ldconfig -p 2>/dev/null | grep -q "$1" || missing="$missing $2"
 }
 
 # The first of the files that exists.
@@ -14,11 +19,21 @@ first() {
 
 missing=
 need c++ g++
-if ! ldconfig -p 2>/dev/null | grep -q libvulkan.so.1; then missing="$missing libvulkan1"; fi
+need_library libvulkan.so.1 libvulkan1
 if [ -z "$(first /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json)" ]; then
     missing="$missing mesa-vulkan-drivers"
 fi
-if [ "${for_tests:-no}" = yes ]; then need glslangValidator glslang-tools; fi
+if [ "${for_tests:-no}" = yes ]; then
+    need glslangValidator glslang-tools
+    need clang++-19 clang-19
+    need chromium chromium
+    need_library libEGL.so.1 libegl1
+    need_library libGLESv2.so.2 libgles2
+    need_library libEGL_mesa.so.0 libegl-mesa0
+    need node nodejs
+    need npm npm
+    need pip3 python3-pip
+fi
 
 if [ -n "$missing" ]; then
     if command -v apt-get >/dev/null 2>&1; then
@@ -37,6 +52,23 @@ fi
 if ! command -v cargo >/dev/null 2>&1; then
     echo "Rust is missing: install a stable toolchain of 1.89 or later, with rustup or from your distribution" >&2
     exit 3
+fi
+
+# What no distribution has, in a folder of Hankel's own. The versions are those of `hankel doctor`.
+if [ "${for_tests:-no}" = yes ]; then
+    HANKEL_TOOLS=${HANKEL_TOOLS:-${XDG_CACHE_HOME:-$HOME/.cache}/hankel/tools}
+    export HANKEL_TOOLS
+    mkdir -p "$HANKEL_TOOLS"
+    if [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ]; then
+        echo "Installing Dawn for Node.js (npm: webgpu, MIT and BSD-3-Clause)"
+        npm install --silent --no-save --prefix "$HANKEL_TOOLS" webgpu@0.6.2
+    fi
+    if ! command -v dxc >/dev/null 2>&1 && [ ! -e "$HANKEL_TOOLS/libdxcompiler_x86_64.so.3.7" ]; then
+        echo "Installing DXC's library (PyPI: compushady, MIT; DXC: NCSA)"
+        pip3 download --quiet --no-deps --no-binary :all: --dest "$HANKEL_TOOLS" compushady==0.17.5
+        tar -xzf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" -C "$HANKEL_TOOLS" --strip-components=3 \
+            compushady-0.17.5/compushady/backends/libdxcompiler_x86_64.so.3.7
+    fi
 fi
 
 # Mesa's layer for choosing among several GPUs complains on a machine without a desktop.

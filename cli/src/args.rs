@@ -235,6 +235,9 @@ pub struct OfMatrix {
     /// Writes the report as JSON.
     #[arg(long, value_name = "FILE", requires = "matrix")]
     pub json: Option<PathBuf>,
+    /// Writes the table in Markdown.
+    #[arg(long, value_name = "FILE", requires = "matrix")]
+    pub markdown: Option<PathBuf>,
     /// List of known differences; without it, the built-in kernels have their own.
     #[arg(long, value_name = "FILE", requires = "matrix")]
     pub known: Option<PathBuf>,

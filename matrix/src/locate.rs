@@ -51,9 +51,8 @@ pub fn of_output(text: &str, kernel: &Kernel, code: &Code, value: &str) -> Optio
                 let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
                 !line[..at].ends_with(is_name) && !line[at + name.len()..].starts_with(is_name)
             });
-            stands && (line.contains('=') || line.contains("tore") || line.contains("write"))
-                || stands && line.contains("atomic")
-                || stands && line.contains("Interlocked")
+            let writes = ["=", "tore", "write", "atomic", "Interlocked"];
+            stands && writes.iter().any(|word| line.contains(word))
         }
         // A stage returns it.
         None => line.trim_start().starts_with("return ") || line.contains("gl_Position ="),

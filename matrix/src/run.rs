@@ -197,7 +197,7 @@ pub fn run(
     }
     *locked(&shared.left) = queues.iter().map(|(_, q)| q.len()).sum();
 
-    let done: Vec<(Column, Option<String>, Vec<(usize, Cell)>)> = thread::scope(|s| {
+    let done: Vec<Ran> = thread::scope(|s| {
         let mut all = Vec::new();
         for (column, queue) in &queues {
             // Only where a process is started for each kernel anyway do several go on at a time.
@@ -214,12 +214,12 @@ pub fn run(
         }
         all.into_iter().filter_map(|t| t.join().ok()).collect()
     });
-    for (column, device, found) in done {
-        if let Some(device) = device {
-            devices.insert(column, device);
+    for ran in done {
+        if let Some(device) = ran.device {
+            devices.insert(ran.column, device);
         }
-        for (row, cell) in found {
-            cells[row].insert(column, cell);
+        for (row, cell) in ran.cells {
+            cells[row].insert(ran.column, cell);
         }
     }
 
@@ -390,6 +390,15 @@ struct Unit<'a> {
     code: &'a Code,
 }
 
+/// What came of a column's queue, or of a part of it.
+struct Ran {
+    column: Column,
+    /// The device, if a runner was started.
+    device: Option<String>,
+    /// Cells with the numbers of their rows.
+    cells: Vec<(usize, Cell)>,
+}
+
 /// What is known of a cell before anything is run.
 enum Settled<'a> {
     Cell(Cell),
@@ -477,13 +486,7 @@ impl<'a> Shared<'a> {
     }
 
     /// Runs what is left of a column's queue.
-    fn column(
-        &self,
-        column: Column,
-        queue: &[Unit<'_>],
-        next: &Mutex<usize>,
-        line: usize,
-    ) -> (Column, Option<String>, Vec<(usize, Cell)>) {
+    fn column(&self, column: Column, queue: &[Unit<'_>], next: &Mutex<usize>, line: usize) -> Ran {
         let folder = self.work.join(format!("{column}-{line}"));
         let mut engine = Engine {
             shared: self,
@@ -528,7 +531,11 @@ impl<'a> Shared<'a> {
                 unit.it.kernel().name
             ));
         }
-        (column, engine.device, found)
+        Ran {
+            column,
+            device: engine.device,
+            cells: found,
+        }
     }
 }
 

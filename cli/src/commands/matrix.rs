@@ -77,6 +77,9 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     if let Some(file) = &own.html {
         write(file, hankel_matrix::html::page(&report).as_bytes())?;
     }
+    if let Some(file) = &own.markdown {
+        write(file, report.markdown().as_bytes())?;
+    }
     match args.format {
         Format::Json => print_json(&report),
         Format::Text => println!("{report}"),

@@ -130,6 +130,8 @@ impl<'a> Numbers<'a> {
                 found.values += 1;
                 if d.a.is_finite() && !d.b.is_finite() {
                     found.beyond += 1;
+                    found.largest_ulp = found.largest_ulp.max(d.ulp);
+                    found.largest_absolute = None;
                     if found.beyond == 1 {
                         found.first = Some(self.difference(case, i, name, &d));
                     }

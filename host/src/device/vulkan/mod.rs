@@ -98,7 +98,11 @@ impl VulkanDevice {
 
     fn from_adapter(adapter: wgpu::Adapter) -> Result<Self> {
         let info = adapter.get_info();
-        let name = format!("{}, {}", info.name, info.driver_info);
+        let name = [info.name.as_str(), &info.driver_info]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join(", ");
         let limits = adapter.limits();
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("hankel"),
