@@ -512,6 +512,7 @@ pub(crate) mod tests {
             licence: say("BSD"),
             path: there.then(|| say("/usr/bin/chromium").into()),
             version: there.then(|| say("1.2")),
+            files: Vec::new(),
             problem: (!there).then(|| say("too old")),
             install: say("apt-get install chromium"),
         };

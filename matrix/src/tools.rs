@@ -64,6 +64,8 @@ pub struct Status {
     pub path: Option<PathBuf>,
     /// Its version, as it says itself.
     pub version: Option<String>,
+    /// Sizes and times of its files: results are kept only as long as these are the same.
+    pub files: Vec<String>,
     /// Why it cannot be used, if it is not simply missing.
     pub problem: Option<String>,
     /// The command that installs it.
@@ -221,11 +223,13 @@ impl Tools {
             licence: tool.licence().into(),
             path: None,
             version: None,
+            files: Vec::new(),
             problem: None,
             install: tool.install(self),
         };
         match self.find(tool) {
             Ok(Some((path, version))) => {
+                status.files = files_of(tool, &path).iter().map(|f| stamp(f)).collect();
                 status.path = Some(path);
                 status.version = Some(version);
             }
@@ -475,6 +479,51 @@ fn vulkan_driver() -> Option<PathBuf> {
         .find(|p| p.to_string_lossy().contains("lvp"))
         .or(found.first())
         .cloned()
+}
+
+/// The files that a tool at `path` is, as far as they are known.
+fn files_of(tool: Tool, path: &Path) -> Vec<PathBuf> {
+    let mut all = vec![path.to_owned()];
+    match tool {
+        Tool::Vulkan | Tool::SwiftShader => all.extend(driver_library(path)),
+        Tool::Egl => {
+            all.extend(library("libEGL_mesa.so.0"));
+            all.extend(
+                ["swrast_dri.so", "libgallium_dri.so"]
+                    .iter()
+                    .filter_map(|name| library(&format!("dri/{name}"))),
+            );
+        }
+        Tool::Dawn => all.push(path.join("dist")),
+        _ => {}
+    }
+    all
+}
+
+/// The library that a driver's manifest names.
+fn driver_library(manifest: &Path) -> Option<PathBuf> {
+    let text = fs::read_to_string(manifest).ok()?;
+    let value: serde_json::Value = serde_json::from_str(&text).ok()?;
+    let named = value.get("ICD")?.get("library_path")?.as_str()?;
+    if named.contains('/') {
+        // From the manifest's folder, unless it is absolute.
+        Some(manifest.parent()?.join(named))
+    } else {
+        library(named)
+    }
+}
+
+/// A file's size and time.
+fn stamp(file: &Path) -> String {
+    let about = fs::metadata(file).ok().map(|m| {
+        let time = m.modified().ok();
+        let since = time.and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
+        (m.len(), since.map_or(0, |d| d.as_nanos()))
+    });
+    match about {
+        Some((bytes, time)) => format!("{} {bytes} {time}", file.display()),
+        None => file.display().to_string(),
+    }
 }
 
 /// The Vulkan version that a driver's manifest names.
