@@ -1,7 +1,7 @@
 //! Every generated language, executed: each kernel goes through the compilers and drivers that will
 //! meet it, and what they compute is compared with the native scalar run.
 //!
-//! - [`column`]: the ways to run a kernel; [`tools`]: the foreign programs that they take.
+//! - [`mod@column`]: the ways to run a kernel; [`tools`]: the foreign programs that they take.
 //! - [`run`]: the matrix; [`report`]: what it found; [`known`]: differences that are known.
 //! - [`job`]: what the processes that run kernels are told. Every one is a process of its own
 //!   ([`process`]), so that a crash or a hang is a result like others: [`vulkan`] and [`gl`] are this

@@ -1,0 +1,233 @@
+//! The cells: what is settled beforehand, what the cache has, and what has to be run.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use hankel_codegen::files::sha256;
+use hankel_host::parity::execute::Written;
+use hankel_host::parity::numbers::{Found, Numbers};
+
+use super::Request;
+use super::engine::Engine;
+use super::permits::{Permits, locked};
+use super::reference::Ready;
+use crate::cache::Cache;
+use crate::column::Column;
+use crate::process::Failure;
+use crate::report::{Cell, Outcome};
+use crate::subject::Code;
+use crate::tools::Status;
+use crate::{locate, rules};
+
+/// A kernel to be run in a column.
+#[derive(Clone, Copy)]
+pub(super) struct Unit<'a> {
+    /// The kernel's number.
+    pub(super) row: usize,
+    pub(super) it: &'a Ready<'a>,
+    pub(super) code: &'a Code,
+}
+
+/// What came of a column's queue, or of a part of it.
+pub(super) struct Ran {
+    pub(super) column: Column,
+    /// The device, if a runner was started.
+    pub(super) device: Option<String>,
+    /// Cells with the numbers of their rows.
+    pub(super) cells: Vec<(usize, Cell)>,
+}
+
+/// What is known of a cell before anything is run.
+pub(super) enum Settled<'a> {
+    Cell(Box<Cell>),
+    Cached(Box<Cell>),
+    Run(Unit<'a>),
+}
+
+/// What all columns share.
+pub(super) struct Shared<'a> {
+    pub(super) request: &'a Request,
+    /// The folder of the whole run.
+    pub(super) work: &'a Path,
+    pub(super) tools: &'a [Status],
+    pub(super) cache: &'a Cache,
+    pub(super) permits: Permits,
+    pub(super) progress: &'a (dyn Fn(&str) + Sync),
+    /// Cells that are still to be run.
+    pub(super) left: Mutex<usize>,
+}
+
+impl<'a> Shared<'a> {
+    /// What is known of the cell of kernel `row` before anything is run.
+    pub(super) fn settle(&self, column: Column, row: usize, it: &'a Ready<'a>) -> Settled<'a> {
+        let unrun = |outcome| Settled::Cell(Box::new(Cell::unrun(outcome)));
+        if let Err(problem) = &it.reference {
+            let message = format!("the native scalar run fails: {problem}");
+            return unrun(Outcome::Foreign {
+                failure: Failure::refused(message),
+            });
+        }
+        let Some(language) = column.language() else {
+            let results = if column == Column::Native {
+                &it.reference
+            } else {
+                &it.simd
+            };
+            let results = results.clone().map_err(Failure::refused);
+            let cell = judge(it, column, None, results, Duration::ZERO);
+            return Settled::Cell(Box::new(cell));
+        };
+        if let Some(status) = self.own_tools(column).find(|s| !s.is_there()) {
+            let what = match &status.problem {
+                None => status.name.clone(),
+                Some(problem) => format!("{} ({problem})", status.name),
+            };
+            return unrun(Outcome::NotInstalled {
+                what,
+                install: status.install.clone(),
+            });
+        }
+        let code = match it.subject.codes.get(&language) {
+            Some(Ok(code)) => code,
+            Some(Err(reason)) => {
+                return unrun(Outcome::Inexpressible {
+                    reason: reason.clone(),
+                });
+            }
+            None => {
+                return unrun(Outcome::Inexpressible {
+                    reason: format!("{language} was not written"),
+                });
+            }
+        };
+        match self.cache.get(&self.key(column, it, code)) {
+            Some(cell) => Settled::Cached(Box::new(cell)),
+            None => Settled::Run(Unit { row, it, code }),
+        }
+    }
+
+    /// The tools that a column takes.
+    fn own_tools(&self, column: Column) -> impl Iterator<Item = &Status> {
+        let own = column.tools();
+        self.tools.iter().filter(|s| own.contains(&s.tool))
+    }
+
+    fn key(&self, column: Column, it: &Ready<'_>, code: &Code) -> String {
+        let versions: Vec<&Status> = self.own_tools(column).collect();
+        self.cache.key(&(
+            column,
+            it.kernel(),
+            sha256(&code.bytes),
+            &code.entry_point,
+            &code.places,
+            &it.hash,
+            rules::of(it.kernel(), column, it.flushed.is_some()),
+            versions,
+        ))
+    }
+
+    /// Runs what is left of a column's queue.
+    pub(super) fn column(
+        &self,
+        column: Column,
+        queue: &[Unit<'_>],
+        next: &Mutex<usize>,
+        line: usize,
+    ) -> Ran {
+        let mut engine = Engine::new(self.request, self.work, column, line);
+        let mut found = Vec::new();
+        loop {
+            let i = {
+                let mut next = locked(next);
+                *next += 1;
+                *next - 1
+            };
+            let Some(unit) = queue.get(i) else { break };
+            let cell = self.permits.hold(|| {
+                let began = Instant::now();
+                let results = engine.run(unit);
+                judge(unit.it, column, Some(unit.code), results, began.elapsed())
+            });
+            let settled = matches!(
+                cell.outcome,
+                Outcome::Passed
+                    | Outcome::Differs
+                    | Outcome::Lacking { .. }
+                    | Outcome::Foreign {
+                        failure: Failure::Refused { .. }
+                    }
+            );
+            if settled {
+                self.cache.put(&self.key(column, unit.it, unit.code), &cell);
+            }
+            found.push((unit.row, cell));
+            let left = {
+                let mut left = locked(&self.left);
+                *left -= 1;
+                *left
+            };
+            (self.progress)(&format!(
+                "{left} cells left; {column}: {}",
+                unit.it.kernel().name
+            ));
+        }
+        Ran {
+            column,
+            device: engine.device,
+            cells: found,
+        }
+    }
+}
+
+/// Compares results with the reference.
+fn judge(
+    it: &Ready<'_>,
+    column: Column,
+    code: Option<&Code>,
+    results: Result<Vec<Written>, Failure>,
+    took: Duration,
+) -> Cell {
+    let kernel = it.kernel();
+    let rules = rules::of(kernel, column, it.flushed.is_some());
+    let mut cell = Cell {
+        outcome: Outcome::Passed,
+        rules: Some(rules.clone()),
+        found: None,
+        line: None,
+        seconds: took.as_secs_f64(),
+    };
+    let text = code.map(|code| String::from_utf8_lossy(&code.bytes));
+    match (results, it.reference_for(column)) {
+        (Err(Failure::Lacks { what }), _) => cell.outcome = Outcome::Lacking { what },
+        (Err(failure), _) => {
+            cell.line = text
+                .as_deref()
+                .and_then(|text| locate::of_message(text, &failure.to_string()));
+            cell.outcome = Outcome::Foreign { failure };
+        }
+        (Ok(results), Ok(reference)) => {
+            let numbers = Numbers::of(kernel);
+            let mut found = Found::default();
+            for ((case, a), b) in it.prepared.cases.iter().zip(reference).zip(&results) {
+                numbers.compare(case, &rules, a, b, &mut found);
+            }
+            if found.beyond > 0 {
+                cell.outcome = Outcome::Differs;
+                cell.line =
+                    text.as_deref()
+                        .zip(found.first.as_ref())
+                        .and_then(|(text, difference)| {
+                            locate::of_output(text, kernel, code?, &difference.value)
+                        });
+            }
+            cell.found = Some(found);
+        }
+        (Ok(_), Err(problem)) => {
+            cell.outcome = Outcome::Foreign {
+                failure: Failure::refused(problem.clone()),
+            };
+        }
+    }
+    cell
+}

@@ -1,0 +1,97 @@
+//! The native runs that everything is compared with.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use hankel_codegen::files::sha256;
+use hankel_dsl::native::Mode;
+use hankel_dsl::native::describe::Kernel;
+use hankel_host::device::NativeDevice;
+use hankel_host::parity::execute::{self, Written};
+use rayon::prelude::*;
+
+use super::Request;
+use crate::column::Column;
+use crate::flush::flushed;
+use crate::prepare::Prepared;
+use crate::subject::Subject;
+
+/// A kernel with its inputs and the reference's results.
+pub(super) struct Ready<'a> {
+    pub(super) subject: &'a Subject,
+    pub(super) prepared: Prepared,
+    pub(super) inputs: PathBuf,
+    /// SHA-256 of inputs and reference.
+    pub(super) hash: String,
+    pub(super) reference: Result<Vec<Written>, String>,
+    /// The same as on a device that flushes subnormal numbers; none where that cannot be had.
+    pub(super) flushed: Option<Result<Vec<Written>, String>>,
+    pub(super) simd: Result<Vec<Written>, String>,
+}
+
+impl Ready<'_> {
+    pub(super) fn kernel(&self) -> &Kernel {
+        &self.subject.entry.kernel
+    }
+
+    /// What a column is compared with.
+    pub(super) fn reference_for(&self, column: Column) -> &Result<Vec<Written>, String> {
+        match &self.flushed {
+            Some(flushed) if column.flushes() => flushed,
+            _ => &self.reference,
+        }
+    }
+}
+
+/// Makes the inputs of all kernels, and runs them natively.
+pub(super) fn references<'a>(
+    request: &Request,
+    subjects: &'a [Subject],
+    work: &Path,
+) -> io::Result<Vec<Ready<'a>>> {
+    subjects
+        .par_iter()
+        .map(|subject| reference(request, subject, work))
+        .collect()
+}
+
+fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Result<Ready<'a>> {
+    let kernel = &subject.entry.kernel;
+    let inputs = work.join(format!("{}.inputs", kernel.name));
+    let prepared = Prepared::new(kernel, request.seed, &inputs)?;
+    let program = subject.entry.program(None, &[]);
+    let natively = |mode: Mode| -> Result<Vec<Written>, String> {
+        let mut device = NativeDevice::with_mode(mode);
+        prepared
+            .cases
+            .iter()
+            .map(|case| {
+                execute::dispatch(&mut device, &program, case)
+                    .map_err(|e| format!("{} inputs: {e}", case.class))
+            })
+            .collect()
+    };
+    let reference = natively(Mode::REFERENCE);
+    let flushed = request
+        .columns
+        .iter()
+        .any(|c| c.flushes())
+        .then(|| flushed(|| natively(Mode::REFERENCE)))
+        .flatten();
+    let simd = natively(Mode::default());
+    let mut all = fs::read(&inputs)?;
+    let references = reference.iter().chain(flushed.iter().flatten());
+    for written in references.flatten().flatten() {
+        all.extend_from_slice(written);
+    }
+    Ok(Ready {
+        subject,
+        prepared,
+        inputs,
+        hash: sha256(&all),
+        reference,
+        flushed,
+        simd,
+    })
+}
