@@ -1,5 +1,5 @@
-//! The list of known differences: which cells are known to fail, and why. An entry that fits a cell
-//! that does not fail any more fails the run, so that the list never rots.
+//! The list of known differences: which cells are known to fail, and why. An entry of whose cells
+//! none fails any more fails the run, so that the list never rots.
 
 use std::fs;
 use std::path::Path;
@@ -68,8 +68,9 @@ impl Known {
         Ok(known)
     }
 
-    /// Marks the cells that the list explains. Complains of entries that fit a cell that ran and
-    /// passed with [`SEED`], and, if `whole`, of those that fit none at all: then all kernels were run.
+    /// Marks the cells that the list explains. Complains, if the inputs are those of [`SEED`], of
+    /// entries of whose cells that ran none differs any more, and, if `whole`, of those that fit none
+    /// at all: then all kernels were run.
     pub fn apply(&self, report: &mut Report, whole: bool) {
         for entry in &self.difference {
             let fits = |kernel: &str| {
@@ -78,16 +79,18 @@ impl Known {
                     .iter()
                     .any(|pattern| hankel_codegen::build::matches(pattern, kernel))
             };
-            let mut fitted = 0;
+            let (mut fitted, mut differing) = (0, 0);
             let mut passed = Vec::new();
             for row in report.kernels.iter_mut().filter(|r| fits(&r.kernel)) {
                 for column in &entry.columns {
                     let Some(cell) = row.cells.get_mut(column) else {
                         continue;
                     };
+                    fitted += 1;
                     match &cell.outcome {
                         Outcome::Passed => passed.push(format!("{} in {column}", row.kernel)),
                         outcome if outcome.fails() => {
+                            differing += 1;
                             cell.outcome = Outcome::Known {
                                 what: entry.what.clone(),
                                 why: entry.why.clone(),
@@ -97,21 +100,19 @@ impl Known {
                         }
                         _ => {}
                     }
-                    fitted += 1;
                 }
             }
-            if !passed.is_empty() && report.seed == SEED {
-                report.complaints.push(format!(
-                    "the known difference \"{}\" is none any more for {}: take it off the list",
-                    entry.what,
-                    passed.join(", ")
-                ));
-            } else if passed.is_empty() && whole && fitted == 0 {
-                report.complaints.push(format!(
-                    "the known difference \"{}\" fits no kernel: take it off the list",
-                    entry.what
-                ));
-            }
+            let problem = match (differing, passed.is_empty()) {
+                (0, false) if report.seed == SEED => {
+                    format!("is none any more: {} passed", passed.join(", "))
+                }
+                (0, true) if whole && fitted == 0 => "fits no kernel".into(),
+                _ => continue,
+            };
+            report.complaints.push(format!(
+                "the known difference \"{}\" {problem}; take it off the list",
+                entry.what
+            ));
         }
     }
 }

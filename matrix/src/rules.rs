@@ -1,6 +1,8 @@
-//! What each column may differ by.
+//! What each column may differ by, and what it cannot take.
 
-use hankel_dsl::native::describe::{Kernel, Tolerance};
+use hankel_dsl::native::describe::{Kernel, Scalar, Tolerance};
+use hankel_host::device::slots::{self, Use};
+use hankel_host::flat;
 use hankel_host::parity::numbers::Rules;
 
 use crate::column::Column;
@@ -24,4 +26,20 @@ pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
         rules.hostile &= flushed_reference;
     }
     rules
+}
+
+/// What a column's compiler is known to lack that `kernel` needs.
+#[must_use]
+pub fn lacking(kernel: &Kernel, column: Column) -> Option<String> {
+    let wide = slots::slots(kernel).iter().any(|slot| match slot.role {
+        Use::Uniform(l) | Use::Element(l) | Use::Storage(l) | Use::Output { layout: l, .. } => {
+            flat::leaves(l)
+                .iter()
+                .any(|leaf| leaf.scalar == Scalar::F64)
+        }
+        _ => false,
+    });
+    // `tests/upstream/glslang-templated-load`.
+    (column == Column::HlslGlslang && wide)
+        .then(|| "64-bit floats in buffers (glslang's HLSL has no `Load<double>`)".into())
 }

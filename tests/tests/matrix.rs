@@ -22,7 +22,7 @@ use rspirv::spirv::{Decoration, Op};
 /// One matrix at a time: each has as many processes as there are columns.
 static ONE: Mutex<()> = Mutex::new(());
 
-fn matrix(subjects: &[Subject], known: Known, whole: bool) -> Report {
+fn matrix(subjects: &[Subject]) -> Report {
     let _one = ONE.lock().unwrap_or_else(|e| e.into_inner());
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
     let request = Request {
@@ -33,8 +33,8 @@ fn matrix(subjects: &[Subject], known: Known, whole: bool) -> Report {
         runner: vec![PathBuf::from(env!("CARGO_BIN_EXE_hankel-tests-runner")).into()],
         cache: None,
         at_once: std::thread::available_parallelism().map_or(1, usize::from),
-        known,
-        whole,
+        known: Known::default(),
+        whole: true,
         required: Column::ALL.into(),
     };
     run::run(&request, subjects, &|_| ()).unwrap_or_else(|e| panic!("{e}"))
@@ -46,12 +46,9 @@ fn subjects() -> Vec<Subject> {
     Subject::all(&krate.generate(), &entries)
 }
 
-/// A kernel of each kind in each column, with the list of what is known to differ.
 #[test]
 fn every_kind_of_kernel_passes_in_every_column() {
-    let list = hankel_tests::root().join("tests/conformance/known-differences.toml");
-    let known = Known::read(&list).unwrap_or_else(|e| panic!("{e}"));
-    let report = matrix(&subjects(), known, true);
+    let report = matrix(&subjects());
     assert!(report.passed, "{report}");
     let passing = report
         .kernels
@@ -245,7 +242,7 @@ fn planted_faults_are_caught_where_they_are() {
             .and_then(|c| c.as_mut().ok())
             .unwrap_or_else(|| panic!("`{}` has no {}", fault.kernel, fault.language));
         code.bytes = (fault.plant)(std::mem::take(&mut code.bytes));
-        let report = matrix(&[subject], Known::default(), false);
+        let report = matrix(&[subject]);
         let caught: BTreeSet<Column> = report.kernels[0]
             .cells
             .iter()

@@ -419,7 +419,7 @@ fn glslang_refuses_templated_loads() {
     let (spirv, words) = glslang(&file, &["-D", "-e", "main"]);
     assert!(
         spirv.is_none(),
-        "mended: drop the difference from tests/conformance/known-differences.toml"
+        "mended: drop `lacking` of matrix/src/rules.rs"
     );
     assert!(words.contains("'Load' : no such field"), "{words}");
     // DXC takes it.

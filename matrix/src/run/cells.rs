@@ -101,6 +101,9 @@ impl<'a> Shared<'a> {
                 });
             }
         };
+        if let Some(what) = rules::lacking(it.kernel(), column) {
+            return unrun(Outcome::Lacking { what });
+        }
         match self.cache.get(&self.key(column, it, code)) {
             Some(cell) => Settled::Cached(Box::new(cell)),
             None => Settled::Run(Unit { row, it, code }),
