@@ -21,7 +21,7 @@ use std::collections::{HashMap, HashSet};
 
 use naga::{
     AddressSpace, Arena, Block, Expression, FunctionResult, GlobalVariable, Handle, ImageQuery,
-    LocalVariable, Module, Range, Span, Statement, Type, TypeInner,
+    LocalVariable, MathFunction, Module, Range, Span, Statement, Type, TypeInner,
 };
 
 /// Puts the inner function of the only entry point into it. Says whether it did.
@@ -966,7 +966,83 @@ pub fn name_roundings(module: &mut Module, info: &naga::valid::ModuleInfo) {
     }
 }
 
-/// What [`name_roundings`] calls them; the writers number them.
+/// Names every floating-point value that leaves arithmetic: is stored, compared, put into a vector
+/// or a structure. In GLSL and HLSL a `precise` variable makes all precise that its value is computed
+/// from; so these, and the variables that the writers make anyway, are enough.
+pub fn name_results(module: &mut Module, info: &naga::valid::ModuleInfo) {
+    let types = &module.types;
+    let called = module
+        .functions
+        .iter_mut()
+        .map(|(handle, function)| (&info[handle], function));
+    let entries = module
+        .entry_points
+        .iter_mut()
+        .enumerate()
+        .map(|(index, entry)| (info.get_entry_point(index), &mut entry.function));
+    for (info, function) in called.chain(entries) {
+        let is_arithmetic = |handle: Handle<Expression>| {
+            let computes = matches!(
+                function.expressions[handle],
+                Expression::Binary { .. }
+                    | Expression::Unary { .. }
+                    | Expression::Math { .. }
+                    | Expression::Select { .. }
+            );
+            let scalar = info[handle].ty.inner_with(types).scalar();
+            computes && scalar.is_some_and(|scalar| scalar.kind == naga::ScalarKind::Float)
+        };
+        // How often each is used by arithmetic; every other use is one that it leaves by.
+        let mut within = vec![0; function.expressions.len()];
+        for (handle, expression) in function.expressions.iter() {
+            if is_arithmetic(handle) {
+                let mut count = |used: Handle<Expression>| within[used.index()] += 1;
+                match *expression {
+                    Expression::Binary { left, right, .. } => {
+                        count(left);
+                        count(right);
+                    }
+                    Expression::Unary { expr, .. } => count(expr),
+                    // A call of our own in HLSL, into which `precise` does not reach.
+                    Expression::Math {
+                        fun: MathFunction::Sqrt | MathFunction::Floor,
+                        arg,
+                        ..
+                    } if info[arg].ty.inner_with(types).scalar() == Some(naga::Scalar::F64) => {}
+                    Expression::Math {
+                        arg,
+                        arg1,
+                        arg2,
+                        arg3,
+                        ..
+                    } => [Some(arg), arg1, arg2, arg3]
+                        .into_iter()
+                        .flatten()
+                        .for_each(count),
+                    Expression::Select { accept, reject, .. } => {
+                        count(accept);
+                        count(reject);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let leaving: Vec<_> = function
+            .expressions
+            .iter()
+            .map(|(handle, _)| handle)
+            .filter(|&handle| {
+                is_arithmetic(handle) && info[handle].ref_count > within[handle.index()]
+            })
+            .collect();
+        for handle in leaving {
+            let name = function.named_expressions.entry(handle);
+            name.or_insert_with(|| ROUNDED.into());
+        }
+    }
+}
+
+/// What [`name_roundings`] and [`name_results`] call them; the writers number them.
 pub const ROUNDED: &str = "rounded";
 
 fn texture_name(

@@ -12,7 +12,8 @@
 //!   express them and get the default, or the value that the options freeze.
 //! - Arithmetic of an exact kernel is neither contracted nor reordered. naga knows nothing of that:
 //!   in GLSL and HLSL each result gets a `precise` variable, MSL a pragma, and WGSL cannot say it.
-//!   A pinned kernel gets `precise` where that costs no device, and is written all the same elsewhere.
+//!   A pinned kernel gets `precise` on fewer (it reaches what a value is computed from) where that costs no
+//!   device, and is written all the same elsewhere.
 //! - What a language cannot express is [`Written::Unsupported`], with the reason; what goes wrong is an
 //!   error.
 
@@ -296,10 +297,10 @@ impl Ir {
         crate::lint::of_module(&self.module, None)
     }
 
-    /// The same with a variable for each result of arithmetic, to be `precise`.
-    fn with_roundings(&self) -> Self {
+    /// The same with a variable for each value that leaves arithmetic, to be `precise`.
+    fn with_results(&self) -> Self {
         let mut module = self.module.clone();
-        cleanup::name_roundings(&mut module, &self.info);
+        cleanup::name_results(&mut module, &self.info);
         Self {
             module,
             info: self.info.clone(),
@@ -361,7 +362,7 @@ impl Ir {
                 language,
                 Language::Hlsl | Language::Glsl | Language::Essl310
             );
-        let named = pinned.then(|| self.with_roundings());
+        let named = pinned.then(|| self.with_results());
         let job = Job {
             ir: named.as_ref().unwrap_or(self),
             kernel,
@@ -705,8 +706,8 @@ impl Job<'_> {
         }
     }
 
-    /// Makes arithmetic exact in GLSL and HLSL, if the kernel asks for it: each of its results has a
-    /// variable ([`cleanup::name_roundings`]), which becomes `precise`.
+    /// Makes arithmetic exact in GLSL and HLSL, if the kernel asks for it: its results have variables
+    /// ([`cleanup::name_roundings`], [`cleanup::name_results`]), which become `precise`.
     fn precise(&self, source: String, scalars: &[&str]) -> Result<String, Failure> {
         if !self.kernel.exact && !self.kernel.pinned {
             return Ok(source);
