@@ -223,7 +223,9 @@ pub struct Parity {
 /// Choices for the matrix.
 #[derive(Debug, Args)]
 pub struct OfMatrix {
-    /// Only this column; may be repeated.
+    /// Only this column; may be repeated [native, native-simd, spirv, spirv-naga, wgsl,
+    /// spirv-swiftshader, glsl, essl310, essl300, hlsl-dxc, hlsl-glslang, msl, wgsl-dawn,
+    /// wgsl-chromium].
     #[arg(long = "column", value_name = "NAME", requires = "matrix")]
     pub columns: Vec<String>,
     /// A column that must run, or `all`: what is not installed fails; may be repeated.

@@ -299,7 +299,24 @@ const fn vulkan_format(format: StorageFormat) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{plain_samplers, with_format};
+    use super::{Doubles, plain_samplers, with_format};
+
+    #[test]
+    fn functions_of_doubles_are_our_own() {
+        let mut doubles = Doubles::default();
+        assert_eq!(doubles.apply("sqrt(x)".into()), "sqrt(x)");
+        doubles.sqrt.double = true;
+        let text = doubles.apply("y = sqrt(x);".into());
+        assert!(text.ends_with("y = HankelSqrt(x);"), "{text}");
+        assert!(text.contains("double HankelSqrt(double x)"), "{text}");
+        assert!(!text.contains("float2 HankelSqrt"), "{text}");
+        doubles.sqrt.single = true;
+        let text = doubles.apply("y = sqrt(x);".into());
+        assert!(
+            text.contains("float2 HankelSqrt(float2 x) { return sqrt(x); }"),
+            "{text}"
+        );
+    }
 
     #[test]
     fn storage_textures_say_their_format() {

@@ -294,7 +294,8 @@ class Maker {
                 case "sampler":
                     return { ...entry, sampler: { type: arg.linear ? "filtering" : "non-filtering" } };
                 case "storage_texture":
-                    if (/^(r|rg|rgba)(8s|16[su])norm$|^(r|rg)(8|16)/.test(role.format) && !this.device.features.has(TIER)) {
+                    // Core WebGPU stores neither 16-bit normalised numbers nor small texels.
+                    if (/16[su]norm$|^rg?(8|16)/.test(role.format) && !this.device.features.has(TIER)) {
                         throw new Error(`the device lacks ${TIER}`);
                     }
                     return { ...entry, storageTexture: {
