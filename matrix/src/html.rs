@@ -599,7 +599,7 @@ mod tests {
         let page = page(&everything(""));
         for words in [
             "<title>Parity matrix of Hankel 0.1.0</title>",
-            "<p class=\"verdict bad\">4 kernels in 11 columns: 4 cells fail, 1 complaint.</p>",
+            "<p class=\"verdict bad\">4 kernels in 11 columns: 4 cells fail, 1 cell not installed, 1 complaint.</p>",
             "<dd>1.2 s</dd>",
             "<dd>3 cells</dd>",
             "<li>take it off the list</li>",

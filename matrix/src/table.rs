@@ -185,26 +185,24 @@ pub(crate) fn sentence(found: &Found) -> String {
 
 /// How many cells fail, and how many complaints there are.
 pub(crate) fn verdict(report: &Report) -> String {
-    let failing = report
-        .kernels
-        .iter()
-        .flat_map(|r| r.cells.values())
-        .filter(|c| c.outcome.fails())
+    let cells = || report.kernels.iter().flat_map(|r| r.cells.values());
+    let failing = cells().filter(|c| c.outcome.fails()).count();
+    let missing = cells()
+        .filter(|c| matches!(c.outcome, Outcome::NotInstalled { .. }))
         .count();
-    let complaints = count(report.complaints.len(), "complaint");
-    match (failing, report.complaints.is_empty()) {
-        (0, true) => "all pass".into(),
-        (0, false) => format!("no cell fails, {complaints}"),
-        (n, none) => {
-            let verb = if n == 1 { "fails" } else { "fail" };
-            let complaints = if none {
-                String::new()
-            } else {
-                format!(", {complaints}")
-            };
-            format!("{} {verb}{complaints}", count(n, "cell"))
-        }
+    let verb = if failing == 1 { "fails" } else { "fail" };
+    let mut parts = match failing {
+        0 if missing == 0 && report.complaints.is_empty() => return "all pass".into(),
+        0 => vec!["no cell fails".to_owned()],
+        n => vec![format!("{} {verb}", count(n, "cell"))],
+    };
+    if missing > 0 {
+        parts.push(format!("{} not installed", count(missing, "cell")));
     }
+    if !report.complaints.is_empty() {
+        parts.push(count(report.complaints.len(), "complaint"));
+    }
+    parts.join(", ")
 }
 
 /// How the cells ended: "all pass" says nothing of those that did not run.
@@ -578,7 +576,7 @@ pub(crate) mod tests {
             "Chromium (1 cell: hlsl-glslang)\n    apt-get install chromium\n",
             "Complaints:\n  take it off the list\n",
             "\n44 cells: 34 the same, 2 within what is allowed, 1 known to fail, 3 not run, 4 failing\n",
-            "\n4 kernels in 11 columns: 4 cells fail, 1 complaint; 3 from the cache; 1.2 s\n",
+            "\n4 kernels in 11 columns: 4 cells fail, 1 cell not installed, 1 complaint; 3 from the cache; 1.2 s\n",
         ] {
             assert!(text.contains(words), "{words:?} is not in\n{text}");
         }
