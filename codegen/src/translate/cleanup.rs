@@ -931,20 +931,27 @@ pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
         .extend(names);
 }
 
+/// Every function with the types of its expressions.
+fn with_types<'a>(
+    called: &'a mut Arena<naga::Function>,
+    entries: &'a mut [naga::EntryPoint],
+    info: &'a naga::valid::ModuleInfo,
+) -> impl Iterator<Item = (&'a naga::valid::FunctionInfo, &'a mut naga::Function)> {
+    let called = called
+        .iter_mut()
+        .map(|(handle, function)| (&info[handle], function));
+    let entries = entries
+        .iter_mut()
+        .enumerate()
+        .map(|(index, entry)| (info.get_entry_point(index), &mut entry.function));
+    called.chain(entries)
+}
+
 /// Names every floating-point result that is rounded: the writers then give it a variable of its
 /// own, which a language can say things about. Other functions than the entry point too.
 pub fn name_roundings(module: &mut Module, info: &naga::valid::ModuleInfo) {
     let types = &module.types;
-    let called = module
-        .functions
-        .iter_mut()
-        .map(|(handle, function)| (&info[handle], function));
-    let entries = module
-        .entry_points
-        .iter_mut()
-        .enumerate()
-        .map(|(index, entry)| (info.get_entry_point(index), &mut entry.function));
-    for (info, function) in called.chain(entries) {
+    for (info, function) in with_types(&mut module.functions, &mut module.entry_points, info) {
         let mut rounded = Vec::new();
         each_statement(&function.body, &mut |statement| {
             let Statement::Emit(range) = statement else {
@@ -971,16 +978,7 @@ pub fn name_roundings(module: &mut Module, info: &naga::valid::ModuleInfo) {
 /// from; so these, and the variables that the writers make anyway, are enough.
 pub fn name_results(module: &mut Module, info: &naga::valid::ModuleInfo) {
     let types = &module.types;
-    let called = module
-        .functions
-        .iter_mut()
-        .map(|(handle, function)| (&info[handle], function));
-    let entries = module
-        .entry_points
-        .iter_mut()
-        .enumerate()
-        .map(|(index, entry)| (info.get_entry_point(index), &mut entry.function));
-    for (info, function) in called.chain(entries) {
+    for (info, function) in with_types(&mut module.functions, &mut module.entry_points, info) {
         let is_arithmetic = |handle: Handle<Expression>| {
             let computes = matches!(
                 function.expressions[handle],
