@@ -26,7 +26,7 @@ use crate::headers::{self, Layouts};
 use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
 };
-use crate::translate::{Ir, Options, Place, Written};
+use crate::translate::{Ir, Options, Place, WRITERS, Written};
 
 /// The manifest's file.
 pub const MANIFEST_FILE: &str = "manifest.json";
@@ -155,6 +155,7 @@ impl Request {
             self.targets(),
             options,
             versions,
+            WRITERS,
             &self.source_sha256,
         );
         // Nothing in it can fail to become JSON.
