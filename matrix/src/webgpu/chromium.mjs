@@ -2,8 +2,7 @@
 //
 //     node chromium.mjs
 //
-// HANKEL_CHROMIUM is the program, else it is `chromium`. HANKEL_CHROMIUM_ADAPTER is the adapter
-// that Chromium is asked for: `swiftshader` unless given, `default` for none in particular.
+// HANKEL_CHROMIUM is the program.
 
 import { spawn } from "node:child_process";
 import { randomUUID } from "node:crypto";
@@ -14,8 +13,7 @@ import { join } from "node:path";
 
 import { ending, lastWords, serve, within } from "./runner.mjs";
 
-const PROGRAM = process.env.HANKEL_CHROMIUM || "chromium";
-const ADAPTER = process.env.HANKEL_CHROMIUM_ADAPTER || "swiftshader";
+const PROGRAM = process.env.HANKEL_CHROMIUM;
 
 /** It complains about the desktop's message bus where there is none. */
 const NOISE = /:dbus\//;
@@ -96,11 +94,10 @@ async function start() {
         "--headless", "--no-sandbox", "--disable-quic", "--no-first-run",
         "--disable-background-networking", "--disable-component-update", "--disable-sync",
         "--disable-background-timer-throttling", "--disable-renderer-backgrounding",
-        "--enable-unsafe-webgpu", `--user-data-dir=${profile}`,
+        "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", `--user-data-dir=${profile}`,
         // Chromium ends when this pipe does, even if this process is killed.
         "--remote-debugging-pipe",
     ];
-    if (ADAPTER !== "default") flags.push(`--use-webgpu-adapter=${ADAPTER}`);
     const child = spawn(PROGRAM, [...flags, `http://127.0.0.1:${server.address().port}/${name}/page.html`], {
         stdio: ["ignore", "ignore", "pipe", "pipe", "pipe"],
         detached: true,

@@ -1,8 +1,8 @@
 // Runner of WGSL in Dawn, through Node's `webgpu` package:
 //
-//     node dawn.mjs [folder node_modules [option of Dawn]...]
+//     node dawn.mjs
 //
-// The folder may be given by HANKEL_NODE_MODULES too. Vulkan's own variables choose the driver.
+// HANKEL_NODE_MODULES is the folder that the package is in. Vulkan's own variables choose the driver.
 // Dawn runs in a child, so that its death is only an error.
 
 import { fork } from "node:child_process";
@@ -13,13 +13,12 @@ import { fileURLToPath, pathToFileURL } from "node:url";
 import { execute, open } from "./execute.mjs";
 import { ending, lastWords, serve, within } from "./runner.mjs";
 
-const [given, ...options] = process.argv.slice(2);
-const folder = given || process.env.HANKEL_NODE_MODULES;
+const folder = process.env.HANKEL_NODE_MODULES;
 
 if (process.send) {
     await child();
 } else if (!folder) {
-    console.error("where the package `webgpu` is: give a folder node_modules, or HANKEL_NODE_MODULES");
+    console.error("HANKEL_NODE_MODULES does not say where the package `webgpu` is");
     process.exit(1);
 } else {
     await serve(start);
@@ -33,7 +32,7 @@ async function child() {
     const { create, globals } = await import(pathToFileURL(join(at, "index.js")));
     Object.assign(globalThis, globals);
     // Dawn goes away when nothing refers to this any more; the jobs below do.
-    const gpu = create(options);
+    const gpu = create([]);
     let { device, about } = await open(gpu);
     let lost = watch(device);
     process.on("message", async ({ turn, job }) => {
@@ -68,7 +67,7 @@ function watch(device) {
 
 /** A session: a child with a device. */
 async function start() {
-    const child = fork(fileURLToPath(import.meta.url), [folder, ...options], {
+    const child = fork(fileURLToPath(import.meta.url), {
         stdio: ["ignore", "ignore", "pipe", "ipc"],
     });
     const words = lastWords(child.stderr);
