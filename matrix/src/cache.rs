@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use hankel_codegen::files::{sha256, write_whole};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::column::Column;
-use crate::report::Cell;
 use crate::tools::Status;
 
 /// The folder of kept results.
@@ -41,46 +41,27 @@ impl Cache {
         sha256(text.as_bytes())
     }
 
-    /// A kept cell.
+    /// What was kept under a name.
     #[must_use]
-    pub fn get(&self, key: &str) -> Option<Cell> {
+    pub fn get<T: DeserializeOwned>(&self, key: &str) -> Option<T> {
         let bytes = fs::read(self.folder.as_ref()?.join(format!("{key}.json"))).ok()?;
         serde_json::from_slice(&bytes).ok()
     }
 
-    /// Keeps a cell. One that cannot be kept is run again next time.
-    pub fn put(&self, key: &str, cell: &Cell) {
-        self.write(key, cell);
-    }
-
-    /// The device that ran a column the last time.
-    #[must_use]
-    pub fn device(&self, column: Column, tools: &[Status]) -> Option<String> {
-        let key = self.device_key(column, tools);
-        let bytes = fs::read(self.folder.as_ref()?.join(format!("{key}.json"))).ok()?;
-        serde_json::from_slice(&bytes).ok()
-    }
-
-    /// Keeps the name of the device that ran a column.
-    pub fn keep_device(&self, column: Column, tools: &[Status], device: &str) {
-        let key = self.device_key(column, tools);
-        self.write(&key, &device);
-    }
-
-    fn device_key(&self, column: Column, tools: &[Status]) -> String {
-        let own: Vec<&Status> = tools
-            .iter()
-            .filter(|s| column.tools().contains(&s.tool))
-            .collect();
-        self.key(&("device", column, own))
-    }
-
-    fn write(&self, key: &str, what: &impl Serialize) {
+    /// Keeps something. What cannot be kept is made again next time.
+    pub fn put(&self, key: &str, what: &impl Serialize) {
         let Some(folder) = &self.folder else { return };
         if let Ok(text) = serde_json::to_vec(what)
             && fs::create_dir_all(folder).is_ok()
         {
             let _ = write_whole(&folder.join(format!("{key}.json")), &text);
         }
+    }
+
+    /// The name under which the device is kept that ran a column.
+    #[must_use]
+    pub fn device_key(&self, column: Column, tools: &[Status]) -> String {
+        let own: Vec<&Status> = column.statuses(tools).collect();
+        self.key(&("device", column, own))
     }
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use hankel_codegen::Language;
 use serde::{Deserialize, Serialize};
 
-use crate::tools::Tool;
+use crate::tools::{Status, Tool};
 
 /// A way to run a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -141,6 +141,12 @@ impl Column {
             Self::WgslDawn => &[Tool::Node, Tool::Dawn, Tool::SwiftShader],
             Self::WgslChromium => &[Tool::Node, Tool::Chromium, Tool::SwiftShader],
         }
+    }
+
+    /// Those of `all` that it takes.
+    pub(crate) fn statuses(self, all: &[Status]) -> impl Iterator<Item = &Status> {
+        all.iter()
+            .filter(move |status| self.tools().contains(&status.tool))
     }
 }
 

@@ -1,13 +1,13 @@
 //! From generated text to SPIR-V, through the compilers that other people have.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
 use crate::adopt;
 use crate::job::{Job, Stage};
-use crate::process::{Failure, Finished, run};
+use crate::process::{Failure, run};
 use crate::tools::Dxc;
 
 /// GLSL 4.50 through glslang.
@@ -19,7 +19,7 @@ pub fn glsl(glslang: &Path, job: &Job, out: &Path, limit: Duration) -> Result<Ve
     command
         .args(["-V", "--target-env", "vulkan1.1", "-S", stage(job), "-o"])
         .args([out, &job.code]);
-    finish(run(&mut command, limit)?, "glslangValidator", &job.code)?;
+    compile(&mut command, "glslangValidator", folder(job), limit)?;
     adopt::glsl(&compiled(out)?, job).map_err(Failure::refused)
 }
 
@@ -45,7 +45,7 @@ pub fn hlsl_glslang(
         command.args([register.as_str(), "0", &binding.to_string()]);
     }
     command.arg("-o").args([out, &job.code]);
-    finish(run(&mut command, limit)?, "glslangValidator", &job.code)?;
+    compile(&mut command, "glslangValidator", folder(job), limit)?;
     adopt::hlsl_glslang(&compiled(out)?, job).map_err(Failure::refused)
 }
 
@@ -60,9 +60,9 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
         Stage::Vertex => "vs",
         Stage::Fragment => "ps",
     };
-    let profile = format!("{model}_{DXC_MODEL}");
+    let profile = format!("{model}_{}", SHADER_MODEL.replace('.', "_"));
     let mut direct3d = dxc.command(&job.code, &job.entry_point, &profile, out);
-    finish(run(&mut direct3d, limit)?, "dxc", &job.code)?;
+    compile(&mut direct3d, "dxc", folder(job), limit)?;
     let mut arguments: Vec<String> = ["-spirv", "-fspv-target-env=vulkan1.1", "-fvk-use-dx-layout"]
         .map(String::from)
         .into();
@@ -77,15 +77,13 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
     }
     let mut command = dxc.command(&job.code, &job.entry_point, &profile, out);
     command.args(arguments);
-    finish(run(&mut command, limit)?, "dxc", &job.code)?;
+    compile(&mut command, "dxc", folder(job), limit)?;
     adopt::hlsl(&compiled(out)?, job).map_err(Failure::refused)
 }
 
 /// The shader model that HLSL is written and compiled for: the first with 64-bit floats in
 /// buffers.
 pub const SHADER_MODEL: &str = "6.2";
-
-const DXC_MODEL: &str = "6_2";
 
 /// The registers that the manifest names, and the bindings that they stand for. A compiler refuses
 /// a text with others, or they stay unbound.
@@ -110,23 +108,34 @@ const fn stage(job: &Job) -> &'static str {
     }
 }
 
-/// Judges how a compiler ended. Its words name the file; here they need not say where it lies.
-fn finish(done: Finished, program: &str, source: &Path) -> Result<(), Failure> {
+/// Runs a compiler on a file in `folder`. Its words name the file; here they need not say where it
+/// lies.
+///
+/// # Errors
+/// [`Failure::Refused`] with its words; a crash or time-out.
+pub(crate) fn compile(
+    command: &mut Command,
+    program: &str,
+    folder: &Path,
+    limit: Duration,
+) -> Result<(), Failure> {
+    let done = run(command, limit)?;
     if done.status.success() {
         return Ok(());
     }
-    let folder = source.parent().map(PathBuf::from).unwrap_or_default();
     let words = done.words().replace(&format!("{}/", folder.display()), "");
-    match done.crash() {
-        Some(how) => Err(Failure::Crashed {
+    Err(match done.crash() {
+        Some(how) => Failure::Crashed {
             program: program.into(),
             how,
             log: words,
-        }),
-        None => Err(Failure::Refused {
-            message: format!("{program}: {words}"),
-        }),
-    }
+        },
+        None => Failure::refused(format!("{program}: {words}")),
+    })
+}
+
+fn folder(job: &Job) -> &Path {
+    job.code.parent().unwrap_or(Path::new(""))
 }
 
 fn compiled(out: &Path) -> Result<Vec<u8>, Failure> {

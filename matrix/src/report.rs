@@ -166,27 +166,3 @@ impl Cell {
         }
     }
 }
-
-impl Report {
-    /// The cell of a kernel in a column.
-    #[must_use]
-    pub fn cell(&self, kernel: &str, column: Column) -> Option<&Cell> {
-        self.kernels
-            .iter()
-            .find(|row| row.kernel == kernel)?
-            .cells
-            .get(&column)
-    }
-
-    /// How many cells of a column ended in each way.
-    #[must_use]
-    pub fn counts(&self, column: Column) -> BTreeMap<&'static str, usize> {
-        let mut counts = BTreeMap::new();
-        for row in &self.kernels {
-            if let Some(cell) = row.cells.get(&column) {
-                *counts.entry(cell.outcome.word()).or_default() += 1;
-            }
-        }
-        counts
-    }
-}

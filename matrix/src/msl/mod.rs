@@ -21,6 +21,7 @@ use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+use crate::compile::compile;
 use crate::job::{Arg, Job, Role, Scalar, Slot, Stage, Value};
 use crate::process::{Failure, run as run_program};
 use signature::{Given, Member, Param, Part, Signature, Structure};
@@ -78,8 +79,8 @@ pub fn run(compiler: &Path, work: &Path, job: &Job, timeout: Duration) -> Result
     write(&folder.join("main.cpp"), &main)?;
     write(&folder.join("plan"), &plan)?;
     let program = folder.join("program");
-    let mut compile = Command::new(compiler);
-    compile
+    let mut command = Command::new(compiler);
+    command
         .args(FLAGS)
         .args(KERNEL_FLAGS)
         .arg("-include-pch")
@@ -90,7 +91,7 @@ pub fn run(compiler: &Path, work: &Path, job: &Job, timeout: Duration) -> Result
         .arg(shared.join("runner.o"))
         .args(["-nostdlib++", "-lm", "-o"])
         .arg(&program);
-    compiled(&mut compile, folder, timeout)?;
+    compile(&mut command, "clang++", folder, timeout)?;
     let results = folder.join("results");
     let mut command = Command::new(&program);
     command
@@ -136,23 +137,6 @@ fn crashed(how: String, log: String) -> Failure {
     }
 }
 
-/// Runs a compiler. Its words need not say where the files lie.
-fn compiled(command: &mut Command, folder: &Path, timeout: Duration) -> Result<(), Failure> {
-    let done = run_program(command, timeout)?;
-    if done.status.success() {
-        return Ok(());
-    }
-    let words = done.words().replace(&format!("{}/", folder.display()), "");
-    Err(match done.crash() {
-        Some(how) => Failure::Crashed {
-            program: "clang++".into(),
-            how,
-            log: words,
-        },
-        None => Failure::refused(format!("clang++: {words}")),
-    })
-}
-
 /// The folder with what all jobs share, made if it is not there: the headers, compiled, and the
 /// runner. Its name tells apart versions of the parts and of the compiler.
 fn shared(compiler: &Path, work: &Path, timeout: Duration) -> Result<PathBuf, Failure> {
@@ -193,7 +177,7 @@ fn make_shared(compiler: &Path, folder: &Path, timeout: Duration) -> Result<(), 
         .arg(folder.join("glue.h"))
         .arg("-o")
         .arg(folder.join("glue.pch"));
-    compiled(&mut header, folder, timeout)?;
+    compile(&mut header, "clang++", folder, timeout)?;
     let mut runner = Command::new(compiler);
     runner
         .args([
@@ -207,7 +191,7 @@ fn make_shared(compiler: &Path, folder: &Path, timeout: Duration) -> Result<(), 
         .arg(folder.join("runner.cpp"))
         .arg("-o")
         .arg(folder.join("runner.o"));
-    compiled(&mut runner, folder, timeout)
+    compile(&mut runner, "clang++", folder, timeout)
 }
 
 /// Bytes of all results.

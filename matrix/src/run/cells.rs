@@ -78,7 +78,7 @@ impl<'a> Shared<'a> {
             let cell = judge(it, column, None, results, Duration::ZERO);
             return Settled::Cell(Box::new(cell));
         };
-        if let Some(status) = self.own_tools(column).find(|s| !s.is_there()) {
+        if let Some(status) = column.statuses(self.tools).find(|s| !s.is_there()) {
             let what = match &status.problem {
                 None => status.name.clone(),
                 Some(problem) => format!("{} ({problem})", status.name),
@@ -110,14 +110,8 @@ impl<'a> Shared<'a> {
         }
     }
 
-    /// The tools that a column takes.
-    fn own_tools(&self, column: Column) -> impl Iterator<Item = &Status> {
-        let own = column.tools();
-        self.tools.iter().filter(|s| own.contains(&s.tool))
-    }
-
     fn key(&self, column: Column, it: &Ready<'_>, code: &Code) -> String {
-        let versions: Vec<&Status> = self.own_tools(column).collect();
+        let versions: Vec<&Status> = column.statuses(self.tools).collect();
         self.cache.key(&(
             column,
             it.kernel(),
@@ -152,16 +146,12 @@ impl<'a> Shared<'a> {
                 let results = engine.run(unit);
                 judge(unit.it, column, Some(unit.code), results, began.elapsed())
             });
-            let settled = matches!(
+            // A refusal may be this machine's (no space, a lost device), and costs little to repeat.
+            let ran = matches!(
                 cell.outcome,
-                Outcome::Passed
-                    | Outcome::Differs
-                    | Outcome::Lacking { .. }
-                    | Outcome::Foreign {
-                        failure: Failure::Refused { .. }
-                    }
+                Outcome::Passed | Outcome::Differs | Outcome::Lacking { .. }
             );
-            if settled {
+            if ran {
                 self.cache.put(&self.key(column, unit.it, unit.code), &cell);
             }
             found.push((unit.row, cell));

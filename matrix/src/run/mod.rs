@@ -177,7 +177,7 @@ pub fn run(
                 device: devices
                     .get(&column)
                     .cloned()
-                    .or_else(|| cache.device(column, &tools)),
+                    .or_else(|| cache.get(&cache.device_key(column, &tools))),
             })
             .collect(),
         kernels: ready
@@ -192,7 +192,7 @@ pub fn run(
         passed: false,
     };
     for (column, device) in &devices {
-        cache.keep_device(*column, &tools, device);
+        cache.put(&cache.device_key(*column, &tools), device);
     }
     complain(request, &mut report);
     request.known.apply(&mut report, request.whole);
