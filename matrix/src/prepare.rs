@@ -78,17 +78,17 @@ impl Prepared {
         let whole = bytes.len();
         let slots = slots::slots(kernel);
         let mut all = Vec::with_capacity(self.cases.len());
-        for (case, run) in self.cases.iter().zip(&self.runs) {
+        for run in &self.runs {
             let mut written = Vec::new();
-            for (slot, (input, arg)) in slots.iter().zip(case.args.iter().zip(&run.args)) {
+            for (slot, arg) in slots.iter().zip(&run.args) {
                 if !slot.role.is_written() {
                     continue;
                 }
-                let length = match (arg, input) {
-                    (Arg::Bytes { length, .. } | Arg::Texture { length, .. }, _) => {
+                let length = match arg {
+                    Arg::Bytes { length, .. } | Arg::Texture { length, .. } => {
                         usize::try_from(*length).unwrap_or(usize::MAX)
                     }
-                    (Arg::Sampler { .. }, _) => 0,
+                    Arg::Sampler { .. } => 0,
                 };
                 let (own, rest) = bytes.split_at_checked(length).ok_or_else(|| {
                     format!("the results have {whole} bytes, which is fewer than the cases write")

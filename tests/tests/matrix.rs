@@ -32,7 +32,6 @@ fn matrix(subjects: &[Subject]) -> Report {
         tools: Tools::of_cache(cache.as_deref()),
         runner: vec![PathBuf::from(env!("CARGO_BIN_EXE_hankel-tests-runner")).into()],
         cache: None,
-        at_once: std::thread::available_parallelism().map_or(1, usize::from),
         known: Known::default(),
         whole: true,
         required: Column::ALL.into(),

@@ -45,7 +45,6 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let subjects = Subject::all(&generated, &session.krate.entries);
 
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
-    let at_once = std::thread::available_parallelism().map_or(1, usize::from);
     let this = std::env::current_exe()
         .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))?;
     let request = Request {
@@ -55,7 +54,6 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
         tools: tools(),
         runner: vec![this.into_os_string(), OsString::from("matrix-runner")],
         cache: cache.filter(|_| !own.no_cache),
-        at_once,
         known,
         whole: args.kernels.is_empty() && own.columns.is_empty(),
         required,

@@ -42,11 +42,9 @@ pub struct Request {
     pub runner: Vec<OsString>,
     /// Where results are kept; none to keep none and use none.
     pub cache: Option<PathBuf>,
-    /// How many kernels are compiled or run at a time.
-    pub at_once: usize,
     /// Known differences.
     pub known: Known,
-    /// All kernels of the crate are there.
+    /// All kernels of the crate are there, and all columns.
     pub whole: bool,
     /// Columns that must run: one that is not installed is a complaint.
     pub required: Vec<Column>,
@@ -93,13 +91,15 @@ pub fn run(
     progress("running the reference");
     let ready = references(request, subjects, work.path()).map_err(io("writing inputs"))?;
 
+    // How many kernels are compiled or run at a time.
+    let at_once = thread::available_parallelism().map_or(1, usize::from);
     let cache = Cache::new(request.cache.as_deref(), &request.runner);
     let shared = Shared {
         request,
         work: work.path(),
         tools: &tools,
         cache: &cache,
-        permits: Permits::new(request.at_once),
+        permits: Permits::new(at_once),
         progress,
         left: Mutex::new(0),
     };
@@ -133,11 +133,7 @@ pub fn run(
         let mut all = Vec::new();
         for (column, queue, next) in &queues {
             // Only where a process is started for each kernel anyway do several go on at a time.
-            let lines = if *column == Column::Msl {
-                request.at_once.max(1)
-            } else {
-                1
-            };
+            let lines = if *column == Column::Msl { at_once } else { 1 };
             for line in 0..lines {
                 let shared = &shared;
                 all.push(s.spawn(move || shared.column(*column, queue, next, line)));
