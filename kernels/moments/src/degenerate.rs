@@ -96,7 +96,7 @@ pub fn degenerate_6<R: Real>(m: Moments6<R>) -> Degenerate6<R> {
         c1,
         c2,
         c3,
-    } = Recurrence::new(m);
+    } = Recurrence::new(m).within_range();
     // Roots of the quadratic, and the cubic about the upper one and about the lower one.
     let middle = (a0 + a1) * lit!(0.5);
     let half = (a0 - a1) * lit!(0.5);

@@ -58,6 +58,46 @@ impl<R: Real> Recurrence<R> {
             c3,
         }
     }
+
+    /// The coefficients taken back, one after another, to where all roots of p1, p2 and p3 are in
+    /// [-1, 1]. The moments up to the fifth change by no more than rounding has changed them.
+    ///
+    /// In canonical moments (Dette and Studden, The Theory of Canonical Moments, 1997), with
+    /// q = 1 - p, the coefficients are a0 = 2 p1 - 1, c1 = 4 p1 q1 p2, a1 = 2 (q1 p2 + q2 p3) - 1,
+    /// c2 = 4 q2 p3 q3 p4 and a2 = 2 (q3 p4 + q4 p5) - 1, and they belong to a distribution on
+    /// [-1, 1] if and only if all p are in [0, 1]. Of each coefficient the p before it are known.
+    #[inline(always)]
+    pub fn within_range(self) -> Self {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let two: R = lit!(2.0);
+        let half: R = lit!(0.5);
+        let least = R::epsilon() * R::epsilon();
+        let Self { a0, .. } = self;
+        // 4 p1 q1
+        let most = ((one + a0) * (one - a0)).max(least);
+        let c1 = self.c1.min(most);
+        let p2 = c1 / most;
+        let q2 = one - p2;
+        let start = (one - a0) * half * p2;
+        let a1 = self.a1.clamp(start * two - one, (start + q2) * two - one);
+
+        let q2_p3 = ((one + a1) * half - start).max(zero).min(q2);
+        let q3 = (q2 - q2_p3) / q2.max(least);
+        let most = (q2_p3 * q3 * lit!(4.0)).max(least);
+        let c2 = self.c2.min(most);
+        let p4 = c2 / most;
+        let q4 = one - p4;
+        let start = q3 * p4;
+        let a2 = self.a2.clamp(start * two - one, (start + q4) * two - one);
+        Self {
+            a1,
+            a2,
+            c1,
+            c2,
+            ..self
+        }
+    }
 }
 
 /// The positive root of s³ + a s² + b s - c with c >= 0, whose other roots are real and not

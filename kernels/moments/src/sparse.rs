@@ -46,7 +46,10 @@ impl<R: Real> TwoPoints<R> {
 /// Theorem 1 takes roots of the quadratic σ² z² + (b1 b2 - b3) z + c0; c0 follows from the other
 /// two by the Hankel matrix' Cholesky factors, that is, from the quadratic about the mean being
 /// x² - κ x - σ², κ the third central moment over the variance. Here these roots are taken: of
-/// opposite signs, their product -σ², so neither they nor the weights σ² / (x² + σ²) cancel.
+/// opposite signs, their product -σ², so neither they nor the weights σ² / (x² + σ²) cancel. Any
+/// pair with that product has the mean and the variance. So where rounding of κ has pushed a root
+/// out of [-1, 1], the pair is moved back together, which changes the third moment alone, by no
+/// more than that rounding did.
 #[inline(always)]
 pub fn sparse_2<R: Real>(b1: R, b2: R, b3: R) -> TwoPoints<R> {
     let one: R = lit!(1.0);
@@ -58,11 +61,17 @@ pub fn sparse_2<R: Real>(b1: R, b2: R, b3: R) -> TwoPoints<R> {
     let skew = ((b3 - b1 * b2) / variance - b1 * two).clamp(-two, two);
     let half = skew * lit!(0.5);
     // The farther root from the mean, the nearer one and their weights, as magnitudes.
+    let far_is_above = half.ge(lit!(0.0));
+    let room_below = (one + b1).max(R::epsilon());
+    let room_above = (one - b1).max(R::epsilon());
+    let least_far = variance / R::select(far_is_above, room_below, room_above);
     let far = half.abs() + (half * half + variance).sqrt();
+    let far = far
+        .max(least_far)
+        .min(R::select(far_is_above, room_above, room_below));
     let near = variance / far;
     let far_weight = variance / (far * far + variance);
     let near_weight = one - far_weight;
-    let far_is_above = half.ge(lit!(0.0));
     let below = R::select(far_is_above, near, far);
     let above = R::select(far_is_above, far, near);
     TwoPoints {

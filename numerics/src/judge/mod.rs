@@ -242,7 +242,9 @@ impl Judge {
     }
 
     /// Solves each programme no more than `rounds` times, where the paper's evaluation does so
-    /// three times. The [`margin`](Judged::margin) tells what is lost.
+    /// three times. The [`margin`](Judged::margin) tells what is lost. With fewer than ten, moments
+    /// that no distribution has are not refused, since the samples may be what is missing: their
+    /// margin is m0, and the [`residual`](Judged::residual) tells.
     #[must_use]
     pub fn rounds(self, rounds: usize) -> Self {
         Self { rounds, ..self }
@@ -305,9 +307,11 @@ impl Judge {
 
     fn least(&self, instance: &Instance<'_>, query: f64, side: Side) -> Result<Least, JudgeError> {
         let least = least(instance, query, side, self.rounds)?;
-        // Prices below their limit are those at which all moments are met.
+        // Prices below their limit are those at which all moments are met. With samples that are
+        // still coarse, the limit is met by moments of a distribution between them, too.
+        let is_refined = self.rounds >= ROUNDS;
         let is_bounded = least.sensitivity > 0.5 * SENSITIVITY_LIMIT;
-        if is_bounded && least.residual > INFEASIBLE {
+        if is_refined && is_bounded && least.residual > INFEASIBLE {
             return Err(JudgeError::Infeasible {
                 distance: least.residual,
             });

@@ -17,6 +17,26 @@ impl Distribution {
             .sum()
     }
 
+    /// From `z` to the nearest depth.
+    pub fn distance(&self, z: f64) -> f64 {
+        self.0
+            .iter()
+            .map(|(depth, _)| (depth - z).abs())
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// By how much rounding of 2n moments may move a bound at `z`: what was rounded off over the
+    /// square of the polynomial with the n nearest depths as roots (`degenerate.rs`).
+    pub fn rounding(&self, z: f64, n: usize) -> f64 {
+        let mut squares: Vec<f64> = self
+            .0
+            .iter()
+            .map(|(depth, _)| (depth - z).powi(2))
+            .collect();
+        squares.sort_by(f64::total_cmp);
+        1e-15 / squares.iter().take(n).product::<f64>()
+    }
+
     /// The mean of the `n`-th power.
     pub fn moment(&self, n: i32) -> f64 {
         self.0.iter().map(|(z, w)| w * z.powi(n)).sum()
