@@ -17,7 +17,10 @@ const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
 
 /// Number of what this module does to SPIR-V. To be raised with every change that gives other
 /// bytes: committed SPIR-V of another number counts as stale.
-pub const PIPELINE: u32 = 2;
+pub const PIPELINE: u32 = 3;
+
+/// Rounds of optimisation at most. A kernel of the built-in ones takes two, a chain of loops more.
+const MOST_ROUNDS: u32 = 8;
 
 /// A finished module.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,35 +90,35 @@ pub fn cost_after_optimisation(raw: &[u8], name: &str) -> Result<Cost, Failure> 
 }
 
 /// Validates, and runs spirv-opt with floating-point arithmetic held as it is written.
-///
-/// # Errors
-///
-/// The module is invalid, or the optimiser fails.
-pub fn optimise(words: &[u32], name: &str) -> Result<Vec<u32>, Failure> {
+fn optimise(words: &[u32], name: &str) -> Result<Vec<u32>, Failure> {
     validate(words, name)?;
     let mut module = spirv::load(words, name)?;
-    exact::fold(&mut module);
     exact::pin(&mut module);
-    let words = run_passes(&spirv::store(&module), name, |passes| {
-        passes
-            .register_pass(Passes::StripDebugInfo)
-            .register_performance_passes()
-            .register_pass(Passes::LoopInvariantCodeMotion)
-            .register_pass(Passes::IfConversion)
-            .register_pass(Passes::LocalRedundancyElimination)
-            .register_pass(Passes::RedundancyElimination)
-            .register_pass(Passes::CombineAccessChains)
-            .register_pass(Passes::Simplification)
-            .register_pass(Passes::VectorDCE)
-            .register_pass(Passes::AggressiveDCE)
-            .register_pass(Passes::DeadBranchElim)
-            .register_pass(Passes::BlockMerge)
-            .register_pass(Passes::CFGCleanup)
-            .register_pass(Passes::AggressiveDCE);
-    })?;
-    // Inlining and unrolling may have brought constants together.
-    let mut module = spirv::load(&words, name)?;
     exact::fold(&mut module);
+    // Inlining and unrolling bring constants together, and what they decide may bring more.
+    for _ in 0..MOST_ROUNDS {
+        let words = run_passes(&spirv::store(&module), name, |passes| {
+            passes
+                .register_pass(Passes::StripDebugInfo)
+                .register_performance_passes()
+                .register_pass(Passes::LoopInvariantCodeMotion)
+                .register_pass(Passes::IfConversion)
+                .register_pass(Passes::LocalRedundancyElimination)
+                .register_pass(Passes::RedundancyElimination)
+                .register_pass(Passes::CombineAccessChains)
+                .register_pass(Passes::Simplification)
+                .register_pass(Passes::VectorDCE)
+                .register_pass(Passes::AggressiveDCE)
+                .register_pass(Passes::DeadBranchElim)
+                .register_pass(Passes::BlockMerge)
+                .register_pass(Passes::CFGCleanup)
+                .register_pass(Passes::AggressiveDCE);
+        })?;
+        module = spirv::load(&words, name)?;
+        if !exact::fold(&mut module) {
+            break;
+        }
+    }
     let words = run_passes(&spirv::store(&module), name, |passes| {
         passes
             .register_pass(Passes::LocalRedundancyElimination)

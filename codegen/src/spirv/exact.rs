@@ -2,12 +2,16 @@
 //!
 //! spirv-opt rewrites `a * b + c` as `fma`, merges `(x / 2) * 3` into one operation, and turns
 //! `x - x` into zero: each rounds otherwise than the source. It leaves operations alone that are
-//! decorated `NoContraction`. So all are decorated while it runs, and the decoration is taken
+//! decorated `NoContraction`. So arithmetic is decorated while it runs, and the decoration is taken
 //! away afterwards: the driver is as free as it would be with text written by hand. A kernel whose
 //! result depends on it (`exact`) keeps it, on arithmetic: [`keep`].
 //!
 //! That also keeps it from what *is* exact. [`fold`] does it instead: arithmetic on constants
-//! (correctly rounded here as on the native side) and operations that return their operand.
+//! (correctly rounded here as on the native side) and operations that return an operand.
+//!
+//! Functions are not held: spirv-opt evaluates them where all arguments are constants and leaves
+//! them alone elsewhere. Held, they make its constant propagation abort (it waits for the value of
+//! their instruction set).
 
 use std::collections::HashMap;
 
@@ -15,11 +19,6 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, Op, Word};
 
 use super::{id, op};
-
-/// Operations that spirv-opt must leave alone.
-fn contracts(op: Op) -> bool {
-    arithmetic(op) || op == Op::ExtInst
-}
 
 /// Arithmetic, to which alone `NoContraction` means something.
 fn arithmetic(op: Op) -> bool {
@@ -42,18 +41,14 @@ fn arithmetic(op: Op) -> bool {
     )
 }
 
-/// Decorates every floating-point operation.
-pub fn pin(module: &mut Module) {
-    decorate(module, contracts);
-}
-
 /// Decorates what a driver may not contract or reorder, and nothing else.
 pub fn keep(module: &mut Module) {
     unpin(module);
-    decorate(module, arithmetic);
+    pin(module);
 }
 
-fn decorate(module: &mut Module, which: fn(Op) -> bool) {
+/// Decorates arithmetic.
+pub fn pin(module: &mut Module) {
     let decorated: std::collections::HashSet<Word> = module
         .annotations
         .iter()
@@ -64,7 +59,7 @@ fn decorate(module: &mut Module, which: fn(Op) -> bool) {
         .functions
         .iter()
         .flat_map(|function| function.all_inst_iter())
-        .filter(|instruction| which(op(instruction)))
+        .filter(|instruction| arithmetic(op(instruction)))
         .filter_map(|instruction| instruction.result_id)
         .filter(|result| !decorated.contains(result))
         .collect();
@@ -125,12 +120,10 @@ impl Float {
     }
 
     fn is(self, wanted: f64) -> bool {
-        let value = match self {
-            Self::Single(value) => f64::from(value),
-            Self::Double(value) => value,
-        };
-        // Not `==`: minus zero is not zero here.
-        value.to_bits() == wanted.to_bits()
+        match self {
+            Self::Single(value) => f64::from(value) == wanted,
+            Self::Double(value) => value == wanted,
+        }
     }
 
     fn binary(op: Op, a: Self, b: Self) -> Option<Self> {
@@ -164,25 +157,21 @@ enum Type {
     Other,
 }
 
-/// Evaluates scalar arithmetic on constants, and removes `x * 1`, `x / 1`, `x - 0`.
+/// Evaluates scalar arithmetic on constants, removes `x * 1`, `x / 1`, `x + 0`, `x - 0`, `x * 0` and
+/// `--x`, and makes differences of `x + -y` and sums of `x - -y`. Tells whether it has removed
+/// anything.
 ///
-/// Exact: a result that is not finite is left for the device to compute.
-pub fn fold(module: &mut Module) {
+/// The same number for every finite x; a constant that is not finite is left for the device to
+/// compute. Infinities and the sign of a zero may get lost, which Vulkan does not promise to keep
+/// either.
+pub fn fold(module: &mut Module) -> bool {
     let mut folder = Folder::new(module);
-    for f in 0..module.functions.len() {
-        for b in 0..module.functions[f].blocks.len() {
-            let block = &mut module.functions[f].blocks[b];
-            for instruction in &mut block.instructions {
-                for operand in &mut instruction.operands {
-                    if let Operand::IdRef(id) = operand {
-                        *id = folder.resolve(*id);
-                    }
-                }
-            }
-            block
-                .instructions
-                .retain(|instruction| !folder.replace(instruction));
-        }
+    for block in module.functions.iter_mut().flat_map(|f| &mut f.blocks) {
+        block.instructions.retain_mut(|instruction| {
+            folder.resolve_operands(instruction);
+            folder.absorb_negation(instruction);
+            !folder.replace(instruction)
+        });
     }
     // Loops: a phi may name a result that was replaced further down.
     for instruction in module
@@ -190,13 +179,10 @@ pub fn fold(module: &mut Module) {
         .iter_mut()
         .flat_map(|function| function.all_inst_iter_mut())
     {
-        for operand in &mut instruction.operands {
-            if let Operand::IdRef(id) = operand {
-                *id = folder.resolve(*id);
-            }
-        }
+        folder.resolve_operands(instruction);
     }
     let gone = folder.replaced;
+    let has_folded = !gone.is_empty();
     module
         .annotations
         .retain(|note| id(note, 0).is_none_or(|target| !gone.contains_key(&target)));
@@ -207,6 +193,7 @@ pub fn fold(module: &mut Module) {
     if let Some(header) = &mut module.header {
         header.bound = folder.next;
     }
+    has_folded
 }
 
 struct Folder {
@@ -215,6 +202,8 @@ struct Folder {
     /// (type, bits) to the constant's id.
     known: HashMap<(Word, u64), Word>,
     replaced: HashMap<Word, Word>,
+    /// Negated numbers, and of what.
+    negated: HashMap<Word, Word>,
     made: Vec<Instruction>,
     next: Word,
 }
@@ -226,6 +215,7 @@ impl Folder {
             values: HashMap::new(),
             known: HashMap::new(),
             replaced: HashMap::new(),
+            negated: HashMap::new(),
             made: Vec::new(),
             next: module.header.as_ref().map_or(0, |header| header.bound),
         };
@@ -268,6 +258,45 @@ impl Folder {
         id
     }
 
+    fn resolve_operands(&self, instruction: &mut Instruction) {
+        for operand in &mut instruction.operands {
+            if let Operand::IdRef(id) = operand {
+                *id = self.resolve(*id);
+            }
+        }
+    }
+
+    /// Takes a negated summand's sign into the operation.
+    fn absorb_negation(&mut self, instruction: &mut Instruction) {
+        let (Some(a), Some(result)) = (id(instruction, 0), instruction.result_id) else {
+            return;
+        };
+        let negated = |id: Option<Word>| self.negated.get(&id?).copied();
+        let b = id(instruction, 1);
+        let (operation, left, right) = match op(instruction) {
+            Op::FNegate => {
+                self.negated.insert(result, a);
+                return;
+            }
+            Op::FAdd => match (negated(Some(a)), negated(b), b) {
+                (_, Some(y), _) => (Op::FSub, a, y),
+                (Some(x), None, Some(b)) => (Op::FSub, b, x),
+                _ => return,
+            },
+            Op::FSub => match negated(b) {
+                Some(y) => (Op::FAdd, a, y),
+                None => return,
+            },
+            _ => return,
+        };
+        *instruction = Instruction::new(
+            operation,
+            instruction.result_type,
+            Some(result),
+            vec![Operand::IdRef(left), Operand::IdRef(right)],
+        );
+    }
+
     /// Replaces the instruction's result, if it can be; it is then not needed.
     fn replace(&mut self, instruction: &Instruction) -> bool {
         let (Some(ty), Some(result)) = (instruction.result_type, instruction.result_id) else {
@@ -290,20 +319,23 @@ impl Folder {
                 (Type::Double, Float::Single(value)) => Float::Double(value.into()),
                 _ => return None,
             },
-            Op::FNegate => match constant(a)? {
-                Float::Single(value) => Float::Single(-value),
-                Float::Double(value) => Float::Double(-value),
+            Op::FNegate => match constant(a) {
+                Some(Float::Single(value)) => Float::Single(-value),
+                Some(Float::Double(value)) => Float::Double(-value),
+                None => return self.negated.get(&a?).copied(),
             },
-            which @ (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv) => match (constant(a), constant(b))
-            {
-                (Some(a), Some(b)) => Float::binary(which, a, b)?,
-                (Some(one), None) if which == Op::FMul && one.is(1.0) => return b,
-                (None, Some(one)) if matches!(which, Op::FMul | Op::FDiv) && one.is(1.0) => {
-                    return a;
+            which @ (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv) => {
+                match (which, constant(a), constant(b)) {
+                    (_, Some(x), Some(y)) => Float::binary(which, x, y)?,
+                    (Op::FMul, Some(x), _) if x.is(1.0) => return b,
+                    (Op::FMul | Op::FDiv, _, Some(y)) if y.is(1.0) => return a,
+                    (Op::FAdd, Some(x), _) if x.is(0.0) => return b,
+                    (Op::FAdd | Op::FSub, _, Some(y)) if y.is(0.0) => return a,
+                    (Op::FMul, Some(x), _) if x.is(0.0) => return a,
+                    (Op::FMul, _, Some(y)) if y.is(0.0) => return b,
+                    _ => return None,
                 }
-                (None, Some(zero)) if which == Op::FSub && zero.is(0.0) => return a,
-                _ => return None,
-            },
+            }
             _ => return None,
         };
         value.finite().then(|| self.constant(ty, value))
@@ -322,5 +354,171 @@ impl Folder {
             ));
             id
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rspirv::dr::Builder;
+
+    use super::*;
+
+    /// What is left of a function of x that `body` writes, operation by operation, with the
+    /// constants that it uses.
+    fn left(body: impl FnOnce(&mut Builder, Word, Word) -> Word) -> Vec<String> {
+        let mut b = Builder::new();
+        let float = b.type_float(32, None);
+        let ty = b.type_function(float, [float]);
+        b.begin_function(float, None, rspirv::spirv::FunctionControl::NONE, ty)
+            .unwrap();
+        let x = b.function_parameter(float).unwrap();
+        b.begin_block(None).unwrap();
+        let result = body(&mut b, float, x);
+        b.ret_value(result).unwrap();
+        b.end_function().unwrap();
+        let mut module = b.module();
+        pin(&mut module);
+        let count = |module: &Module| module.functions[0].blocks[0].instructions.len();
+        let before = count(&module);
+        assert_eq!(fold(&mut module), count(&module) < before);
+        let value = |id: Word| {
+            let constant = module
+                .types_global_values
+                .iter()
+                .find(|c| c.result_id == Some(id));
+            match constant.map(|c| &c.operands[0]) {
+                Some(Operand::LiteralBit32(bits)) => format!("{:?}", f32::from_bits(*bits)),
+                _ if id == x => "x".into(),
+                _ => "r".into(),
+            }
+        };
+        module.functions[0].blocks[0]
+            .instructions
+            .iter()
+            .map(|i| {
+                let operands: Vec<String> = i
+                    .operands
+                    .iter()
+                    .filter_map(Operand::id_ref_any)
+                    .map(value)
+                    .collect();
+                format!("{:?} {}", i.class.opcode, operands.join(" "))
+            })
+            .collect()
+    }
+
+    fn number(b: &mut Builder, float: Word, value: f32) -> Word {
+        b.constant_bit32(float, value.to_bits())
+    }
+
+    #[test]
+    fn a_chain_of_constants_is_one() {
+        let found = left(|b, float, x| {
+            let mut c = number(b, float, 1.0);
+            for _ in 0..10 {
+                c = b.f_add(float, None, c, c).unwrap();
+            }
+            b.f_mul(float, None, x, c).unwrap()
+        });
+        assert_eq!(found, ["FMul x 1024.0", "ReturnValue r"]);
+    }
+
+    /// `x * 0.1 * 0.7` and `x + 0.1 - 0.7` round twice.
+    #[test]
+    fn constants_in_a_row_stay_two() {
+        let found = left(|b, float, x| {
+            let (c, d) = (number(b, float, 0.1), number(b, float, 0.7));
+            let y = b.f_mul(float, None, x, c).unwrap();
+            let y = b.f_mul(float, None, y, d).unwrap();
+            let y = b.f_add(float, None, y, c).unwrap();
+            b.f_sub(float, None, y, d).unwrap()
+        });
+        assert_eq!(
+            found,
+            [
+                "FMul x 0.1",
+                "FMul r 0.7",
+                "FAdd r 0.1",
+                "FSub r 0.7",
+                "ReturnValue r"
+            ]
+        );
+    }
+
+    #[test]
+    fn neutral_operands_go() {
+        for (which, value, is_left) in [
+            (Op::FMul, 1.0, true),
+            (Op::FMul, 1.0, false),
+            (Op::FDiv, 1.0, false),
+            (Op::FAdd, 0.0, true),
+            (Op::FAdd, -0.0, false),
+            (Op::FSub, 0.0, false),
+        ] {
+            let found = left(|b, float, x| {
+                let c = number(b, float, value);
+                let (l, r) = if is_left { (c, x) } else { (x, c) };
+                match which {
+                    Op::FMul => b.f_mul(float, None, l, r),
+                    Op::FDiv => b.f_div(float, None, l, r),
+                    Op::FAdd => b.f_add(float, None, l, r),
+                    _ => b.f_sub(float, None, l, r),
+                }
+                .unwrap()
+            });
+            assert_eq!(found, ["ReturnValue x"], "{which:?} {value} {is_left}");
+        }
+        let zero = left(|b, float, x| {
+            let c = number(b, float, 0.0);
+            b.f_mul(float, None, x, c).unwrap()
+        });
+        assert_eq!(zero, ["ReturnValue 0.0"]);
+        // 0 / x is not a number for x = 0, and 0 - x and 1 / x are operations.
+        for which in [Op::FDiv, Op::FSub] {
+            let found = left(|b, float, x| {
+                let c = number(b, float, 0.0);
+                match which {
+                    Op::FDiv => b.f_div(float, None, c, x),
+                    _ => b.f_sub(float, None, c, x),
+                }
+                .unwrap()
+            });
+            assert_eq!(found, [&format!("{which:?} 0.0 x"), "ReturnValue r"]);
+        }
+    }
+
+    /// A result that is not finite is the device's to compute.
+    #[test]
+    fn overflow_stays() {
+        let found = left(|b, float, _| {
+            let c = number(b, float, 1e38);
+            b.f_mul(float, None, c, c).unwrap()
+        });
+        assert_eq!(found, ["FMul 1e38 1e38", "ReturnValue r"]);
+    }
+
+    #[test]
+    fn signs_are_absorbed() {
+        let found = left(|b, float, x| {
+            let y = b.f_mul(float, None, x, x).unwrap();
+            let minus = b.f_negate(float, None, x).unwrap();
+            let first = b.f_add(float, None, y, minus).unwrap();
+            let second = b.f_add(float, None, minus, first).unwrap();
+            let third = b.f_sub(float, None, second, minus).unwrap();
+            let plus = b.f_negate(float, None, minus).unwrap();
+            b.f_mul(float, None, third, plus).unwrap()
+        });
+        assert_eq!(
+            found,
+            [
+                "FMul x x",
+                "FNegate x",
+                "FSub r x",
+                "FSub r x",
+                "FAdd r x",
+                "FMul r x",
+                "ReturnValue r"
+            ]
+        );
     }
 }

@@ -13,6 +13,7 @@ use hankel_dsl::{
 hankel_dsl::kernels![
     affine,
     rounding,
+    constants,
     gather,
     histogram,
     scan,
@@ -68,6 +69,15 @@ pub fn rounding<R: Real>(#[element] pair: Pair<R>) -> Pair<R> {
     Pair {
         x: sum,
         w: (pair.x - (sum - weight)) + (pair.w - weight),
+    }
+}
+
+/// Constants in a row, each of which rounds. A compiler that makes one constant of two rounds once.
+#[kernel(compute, threads(64), precision(f32, f64), exact)]
+pub fn constants<R: Real>(#[element] pair: Pair<R>) -> Pair<R> {
+    Pair {
+        x: pair.x * lit!(0.1) * lit!(0.7) / lit!(3.3) / lit!(1.7),
+        w: -(pair.w - lit!(5.3)) + lit!(0.9) - lit!(0.1),
     }
 }
 
