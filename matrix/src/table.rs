@@ -74,7 +74,9 @@ impl Report {
         let head = head(self);
         let mut text = line(&head) + &format!("|{}\n", " --- |".repeat(head.len()));
         for row in merged(self) {
-            let mut cells = vec![row.kernels.join(", ")];
+            let code = |name: &String| format!("`{}`", name.replace('`', "'"));
+            let names: Vec<String> = row.kernels.iter().map(code).collect();
+            let mut cells = vec![names.join(", ")];
             cells.extend(row.cells);
             text += &line(&cells);
         }
@@ -547,15 +549,15 @@ pub(crate) mod tests {
         assert!(lines[1].starts_with("| --- | --- |"), "{text}");
         assert_eq!(
             lines[2].split(" | ").next().unwrap(),
-            "| vsm, moment_bound_compensated_n2, moment_bound_compensated_n3"
+            "| `vsm`, `moment_bound_compensated_n2`, `moment_bound_compensated_n3`"
         );
         assert_eq!(
             lines[3],
-            "| blur | same | 1.2e-7 | inf | FAIL | REFUSED | CRASHED | TIMEOUT | known | - | lacks | missing |"
+            "| `blur` | same | 1.2e-7 | inf | FAIL | REFUSED | CRASHED | TIMEOUT | known | - | lacks | missing |"
         );
         let foreign = everything(" |\n").markdown();
         assert_eq!(foreign.lines().count(), 4, "{foreign}");
-        assert!(foreign.contains("| blur \\| |"), "{foreign}");
+        assert!(foreign.contains("| `blur \\|` |"), "{foreign}");
     }
 
     #[test]

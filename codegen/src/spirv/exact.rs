@@ -119,6 +119,13 @@ impl Float {
         }
     }
 
+    fn negated(self) -> Self {
+        match self {
+            Self::Single(value) => Self::Single(-value),
+            Self::Double(value) => Self::Double(-value),
+        }
+    }
+
     fn is(self, wanted: f64) -> bool {
         match self {
             Self::Single(value) => f64::from(value) == wanted,
@@ -158,8 +165,8 @@ enum Type {
 }
 
 /// Evaluates scalar arithmetic on constants, removes `x * 1`, `x / 1`, `x + 0`, `x - 0`, `x * 0` and
-/// `--x`, and makes differences of `x + -y` and sums of `x - -y`. Tells whether it has removed
-/// anything.
+/// `--x`, and takes the sign of a negated operand into a sum, a difference or a factor that is
+/// constant. Tells whether it has removed anything.
 ///
 /// The same number for every finite x; a constant that is not finite is left for the device to
 /// compute. Infinities and the sign of a zero may get lost, which Vulkan does not promise to keep
@@ -266,32 +273,37 @@ impl Folder {
         }
     }
 
-    /// Takes a negated summand's sign into the operation.
+    /// Takes the sign of a negated operand into the operation or into its other operand.
     fn absorb_negation(&mut self, instruction: &mut Instruction) {
-        let (Some(a), Some(result)) = (id(instruction, 0), instruction.result_id) else {
+        let (Some(ty), Some(result)) = (instruction.result_type, instruction.result_id) else {
+            return;
+        };
+        let (Some(a), b) = (id(instruction, 0), id(instruction, 1)) else {
             return;
         };
         let negated = |id: Option<Word>| self.negated.get(&id?).copied();
-        let b = id(instruction, 1);
-        let (operation, left, right) = match op(instruction) {
-            Op::FNegate => {
+        let constant = |id: Option<Word>| self.values.get(&id?).copied();
+        let (operation, left, right) = match (op(instruction), negated(Some(a)), negated(b), b) {
+            (Op::FNegate, ..) => {
                 self.negated.insert(result, a);
                 return;
             }
-            Op::FAdd => match (negated(Some(a)), negated(b), b) {
-                (_, Some(y), _) => (Op::FSub, a, y),
-                (Some(x), None, Some(b)) => (Op::FSub, b, x),
-                _ => return,
+            (Op::FAdd, _, Some(y), _) => (Op::FSub, a, y),
+            (Op::FAdd, Some(x), _, Some(b)) => (Op::FSub, b, x),
+            (Op::FSub, _, Some(y), _) => (Op::FAdd, a, y),
+            (Op::FMul, Some(x), _, _) => match constant(b) {
+                Some(c) => (Op::FMul, x, self.constant(ty, c.negated())),
+                None => return,
             },
-            Op::FSub => match negated(b) {
-                Some(y) => (Op::FAdd, a, y),
+            (Op::FMul, _, Some(y), _) => match constant(Some(a)) {
+                Some(c) => (Op::FMul, y, self.constant(ty, c.negated())),
                 None => return,
             },
             _ => return,
         };
         *instruction = Instruction::new(
             operation,
-            instruction.result_type,
+            Some(ty),
             Some(result),
             vec![Operand::IdRef(left), Operand::IdRef(right)],
         );
@@ -320,8 +332,7 @@ impl Folder {
                 _ => return None,
             },
             Op::FNegate => match constant(a) {
-                Some(Float::Single(value)) => Float::Single(-value),
-                Some(Float::Double(value)) => Float::Double(-value),
+                Some(value) => value.negated(),
                 None => return self.negated.get(&a?).copied(),
             },
             which @ (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv) => {
@@ -505,8 +516,11 @@ mod tests {
             let first = b.f_add(float, None, y, minus).unwrap();
             let second = b.f_add(float, None, minus, first).unwrap();
             let third = b.f_sub(float, None, second, minus).unwrap();
+            let half = number(b, float, 0.5);
+            let fourth = b.f_mul(float, None, minus, half).unwrap();
+            let fifth = b.f_mul(float, None, third, fourth).unwrap();
             let plus = b.f_negate(float, None, minus).unwrap();
-            b.f_mul(float, None, third, plus).unwrap()
+            b.f_mul(float, None, fifth, plus).unwrap()
         });
         assert_eq!(
             found,
@@ -516,6 +530,8 @@ mod tests {
                 "FSub r x",
                 "FSub r x",
                 "FAdd r x",
+                "FMul x -0.5",
+                "FMul r r",
                 "FMul r x",
                 "ReturnValue r"
             ]
