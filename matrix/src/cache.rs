@@ -4,6 +4,7 @@
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use hankel_codegen::files::{sha256, write_whole};
 use serde::Serialize;
@@ -12,9 +13,13 @@ use serde::de::DeserializeOwned;
 use crate::column::Column;
 use crate::tools::Status;
 
+/// Another program's results are removed when none was added for so long: 30 days.
+const KEPT: Duration = Duration::from_secs(30 * 24 * 60 * 60);
+
 /// The folder of kept results.
 #[derive(Debug)]
 pub struct Cache {
+    /// This program's.
     folder: Option<PathBuf>,
     /// SHA-256 of the program that runs things.
     program: String,
@@ -25,13 +30,17 @@ impl Cache {
     #[must_use]
     pub fn new(folder: Option<&Path>, runner: &[OsString]) -> Self {
         let program = runner.first().and_then(|p| fs::read(p).ok());
-        Self {
-            // Without the program's hash, what it does could change unseen.
-            folder: folder
-                .filter(|_| program.is_some())
-                .map(|f| f.join("matrix")),
-            program: sha256(&program.unwrap_or_default()),
-        }
+        // Without the program's hash, what it does could change unseen.
+        let all = folder
+            .filter(|_| program.is_some())
+            .map(|f| f.join("matrix"));
+        let program = sha256(&program.unwrap_or_default());
+        let folder = all.map(|all| {
+            let own = all.join(&program[..16]);
+            prune(&all, &own);
+            own
+        });
+        Self { folder, program }
     }
 
     /// The name of what follows from `what`.
@@ -63,5 +72,50 @@ impl Cache {
     pub fn device_key(&self, column: Column, tools: &[Status]) -> String {
         let own: Vec<&Status> = column.statuses(tools).collect();
         self.key(&("device", column, own))
+    }
+}
+
+/// Removes what programs have left that are no longer used. What cannot be removed stays.
+fn prune(all: &Path, own: &Path) {
+    let now = SystemTime::now();
+    for entry in fs::read_dir(all).into_iter().flatten().flatten() {
+        let age = entry
+            .metadata()
+            .and_then(|about| about.modified())
+            .map(|then| now.duration_since(then).unwrap_or_default());
+        if age.is_ok_and(|age| age > KEPT) && entry.path() != own {
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_another_program_left_goes_after_a_month() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = |name: &str| {
+            let path = folder.path().join(name);
+            fs::write(&path, name).unwrap();
+            vec![path.into_os_string()]
+        };
+        let (old, new) = (program("old"), program("new"));
+        let open = |program: &[OsString]| Cache::new(Some(folder.path()), program);
+        let key = open(&old).key(&"a question");
+        open(&old).put(&key, &"an answer");
+        assert_eq!(open(&old).get(&key), Some("an answer".to_owned()));
+        // Another program asks otherwise, and finds nothing under the same name.
+        assert_ne!(open(&new).key(&"a question"), key);
+        assert_eq!(open(&new).get::<String>(&key), None);
+        assert!(open(&old).get::<String>(&key).is_some());
+
+        let left = open(&old).folder.unwrap();
+        let then = SystemTime::now() - KEPT - Duration::from_secs(60);
+        fs::File::open(&left).unwrap().set_modified(then).unwrap();
+        assert!(open(&old).get::<String>(&key).is_some(), "one's own stay");
+        open(&new);
+        assert!(!left.exists());
     }
 }
