@@ -243,7 +243,8 @@ fn cargo(
         "-Zinline-mir=off".into(),
         "-Zmir-enable-passes=-GVN".into(),
         "-Zshare-generics=off".into(),
-        // Its optimiser makes one constant of two in a row, which rounds otherwise than the source.
+        // Its optimiser makes one constant of two in a row, which rounds otherwise than the source
+        // (tests/upstream/rust-gpu-merged-constants).
         // `finish` runs it, with arithmetic held.
         "-Cllvm-args=--module-output=multiple --spirv-metadata=name-variables --no-spirv-opt"
             .into(),

@@ -19,6 +19,10 @@ use naga::proc::BoundsCheckPolicies;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use rspirv::dr::{self, Instruction, Operand};
 use rspirv::spirv::{Decoration, ImageFormat, Op};
+use spirv_tools::TargetEnv;
+use spirv_tools::assembler::{Assembler, AssemblerOptions};
+use spirv_tools::opt::compiled::CompiledOptimizer;
+use spirv_tools::opt::{Optimizer, Passes};
 use tempfile::TempDir;
 
 const LIMIT: Duration = Duration::from_secs(120);
@@ -424,6 +428,77 @@ fn glslang_refuses_templated_loads() {
     assert!(words.contains("'Load' : no such field"), "{words}");
     // DXC takes it.
     dxc(&text("glslang-templated-load", "case.hlsl"));
+}
+
+/// What spirv-opt makes of a module.
+fn optimised(spirv: &[u8], passes: impl FnOnce(&mut CompiledOptimizer)) -> Vec<u8> {
+    let words: Vec<u32> = spirv
+        .as_chunks()
+        .0
+        .iter()
+        .map(|&word| u32::from_le_bytes(word))
+        .collect();
+    let mut optimiser = CompiledOptimizer::with_env(TargetEnv::Vulkan_1_1);
+    passes(&mut optimiser);
+    let done = optimiser
+        .optimize(&words, &mut |_| {}, None)
+        .unwrap_or_else(|e| panic!("{e}"));
+    done.as_bytes().to_vec()
+}
+
+#[test]
+fn rust_gpus_optimiser_merges_constants() {
+    let spirv = compiled(&case("rust-gpu-merged-constants", "case.comp"), &[]);
+    assert_eq!(all(&module(&spirv), Op::FMul).len(), 2);
+    let done = optimised(&spirv, |optimiser| {
+        optimiser.register_performance_passes();
+    });
+    assert_eq!(
+        all(&module(&done), Op::FMul).len(),
+        1,
+        "mended: drop `--no-spirv-opt` in codegen/src/compile.rs and the decorating in finish.rs"
+    );
+}
+
+/// Set in the process that is to be aborted.
+const TO_BE_ABORTED: &str = "HANKEL_TEST_TO_BE_ABORTED";
+
+#[test]
+fn spirv_opt_aborts_on_a_pinned_function_of_constants() {
+    let assembler = spirv_tools::assembler::create(Some(TargetEnv::Vulkan_1_1));
+    let spirv = |text: &str| {
+        let binary = assembler.assemble(text, AssemblerOptions::default());
+        binary.unwrap_or_else(|e| panic!("{e}")).as_bytes().to_vec()
+    };
+    let propagated = |spirv: &[u8]| {
+        optimised(spirv, |optimiser| {
+            optimiser.register_pass(Passes::ConditionalConstantPropagation);
+        })
+    };
+    let pinned = text("spirv-opt-pinned-function", "case.spvasm");
+    if env::var_os(TO_BE_ABORTED).is_some() {
+        propagated(&spirv(&pinned));
+        return;
+    }
+    let decoration = "OpDecorate %greater NoContraction";
+    assert!(pinned.contains(decoration));
+    let free = propagated(&spirv(&pinned.replace(decoration, "")));
+    assert_eq!(constants(&module(&free)), [1.0, 2.0]);
+    let this = env::current_exe().expect("the test's own program");
+    let mut command = Command::new(this);
+    command
+        .args([
+            "--exact",
+            "spirv_opt_aborts_on_a_pinned_function_of_constants",
+        ])
+        .args(["--nocapture", "--test-threads=1"])
+        .env(TO_BE_ABORTED, "yes");
+    let done = finish(&mut command);
+    assert!(
+        done.words().contains("Unsettled value"),
+        "mended: functions can be decorated, too, in codegen/src/spirv/exact.rs, `pin`; {}",
+        done.words()
+    );
 }
 
 #[test]

@@ -10,8 +10,8 @@
 //! (correctly rounded here as on the native side) and operations that return an operand.
 //!
 //! Functions are not held: spirv-opt evaluates them where all arguments are constants and leaves
-//! them alone elsewhere. Held, they make its constant propagation abort (it waits for the value of
-//! their instruction set).
+//! them alone elsewhere. Held, they make its constant propagation abort
+//! (`tests/upstream/spirv-opt-pinned-function`).
 
 use std::collections::HashMap;
 
