@@ -62,10 +62,10 @@ impl<R: Real> Recurrence<R> {
     /// The coefficients taken back, one after another, to where all roots of p1, p2 and p3 are in
     /// [-1, 1]. The moments up to the fifth change by no more than rounding has changed them.
     ///
-    /// In canonical moments (Dette and Studden, The Theory of Canonical Moments, 1997), with
-    /// q = 1 - p, the coefficients are a0 = 2 p1 - 1, c1 = 4 p1 q1 p2, a1 = 2 (q1 p2 + q2 p3) - 1,
-    /// c2 = 4 q2 p3 q3 p4 and a2 = 2 (q3 p4 + q4 p5) - 1, and they belong to a distribution on
-    /// [-1, 1] if and only if all p are in [0, 1]. Of each coefficient the p before it are known.
+    /// In canonical moments u1, u2, ... (Dette and Studden, The Theory of Canonical Moments, 1997),
+    /// with v = 1 - u, the coefficients are a0 = 2 u1 - 1, c1 = 4 u1 v1 u2, a1 = 2 (v1 u2 + v2 u3) - 1,
+    /// c2 = 4 v2 u3 v3 u4 and a2 = 2 (v3 u4 + v4 u5) - 1, and they belong to a distribution on
+    /// [-1, 1] if and only if all u are in [0, 1]. For each coefficient the u before its own are known.
     #[inline(always)]
     pub fn within_range(self) -> Self {
         let zero: R = lit!(0.0);
@@ -74,22 +74,22 @@ impl<R: Real> Recurrence<R> {
         let half: R = lit!(0.5);
         let least = R::epsilon() * R::epsilon();
         let Self { a0, .. } = self;
-        // 4 p1 q1
+        // 4 u1 v1
         let most = ((one + a0) * (one - a0)).max(least);
         let c1 = self.c1.min(most);
-        let p2 = c1 / most;
-        let q2 = one - p2;
-        let start = (one - a0) * half * p2;
-        let a1 = self.a1.clamp(start * two - one, (start + q2) * two - one);
+        let u2 = c1 / most;
+        let v2 = one - u2;
+        let start = (one - a0) * half * u2;
+        let a1 = self.a1.clamp(start * two - one, (start + v2) * two - one);
 
-        let q2_p3 = ((one + a1) * half - start).max(zero).min(q2);
-        let q3 = (q2 - q2_p3) / q2.max(least);
-        let most = (q2_p3 * q3 * lit!(4.0)).max(least);
+        let v2_u3 = ((one + a1) * half - start).max(zero).min(v2);
+        let v3 = (v2 - v2_u3) / v2.max(least);
+        let most = (v2_u3 * v3 * lit!(4.0)).max(least);
         let c2 = self.c2.min(most);
-        let p4 = c2 / most;
-        let q4 = one - p4;
-        let start = q3 * p4;
-        let a2 = self.a2.clamp(start * two - one, (start + q4) * two - one);
+        let u4 = c2 / most;
+        let v4 = one - u4;
+        let start = v3 * u4;
+        let a2 = self.a2.clamp(start * two - one, (start + v4) * two - one);
         Self {
             a1,
             a2,
