@@ -19,7 +19,7 @@ const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
 /// bytes: committed SPIR-V of another number counts as stale.
 pub const PIPELINE: u32 = 3;
 
-/// Rounds of optimisation at most. A kernel of the built-in ones takes two, a chain of loops more.
+/// Rounds of optimisation at most; the built-in kernels take one or two.
 const MOST_ROUNDS: u32 = 8;
 
 /// A finished module.

@@ -101,17 +101,17 @@ proptest! {
         prop_assert!(near.upper <= far.upper + TOLERANCE, "{near:?} {far:?}");
     }
 
-    /// Depths counted from the other end: what was below is above. Where the bounds meet, rounding
-    /// may have had them the wrong way round, and only one of the two has been moved.
+    /// Depths counted from the other end: what was below is above, to the bit. Where the bounds
+    /// meet, rounding may have them the wrong way round; the upper one then follows the lower.
     #[test]
     fn mirrored_depths_mirror_the_bounds(d in distribution(8), z in 0.0..=1.0_f64) {
         let m = moments(&d);
         let before = bounds(m, z);
         let after = trigonometric_4(m.mirrored(), HalfAngle::of_depth(z).mirrored());
-        let have_met = before.lower == before.upper || after.lower == after.upper;
-        let allowed = if have_met { 1e-9 } else { 1e-15 };
-        prop_assert!((before.lower - (1.0 - after.upper)).abs() < allowed, "{before:?} {after:?}");
-        prop_assert!((before.upper - (1.0 - after.lower)).abs() < allowed, "{before:?} {after:?}");
+        prop_assert_eq!(before.upper, (1.0 - after.lower).max(before.lower));
+        prop_assert_eq!(after.upper, (1.0 - before.lower).max(after.lower));
+        let crossed = before.lower + after.lower - 1.0;
+        prop_assert!(crossed < 1e-9, "{before:?} {after:?}");
     }
 
     /// Below 0 lies nothing for sure; below 1, all but what one direction may weigh.
