@@ -2,8 +2,9 @@
 //!
 //! The built-in kernels are linked into this program, and their SPIR-V is embedded in it. Inside
 //! a checkout whose kernels were edited since, or for anybody's crate, the crate is built as a
-//! plug-in, and its SPIR-V is made with rust-gpu's compiler and kept under cargo's target folder
-//! for as long as the sources' hash holds. SPIR-V of other sources is never used.
+//! plug-in that describes its kernels, and its SPIR-V is made with rust-gpu's compiler and kept
+//! under cargo's target folder for as long as the sources' hash holds. SPIR-V of other sources is
+//! never used. Native code is compiled only for the kernels that a command runs.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
 use hankel_dsl::native::describe::Kernel;
-use hankel_host::crates::KernelCrate;
+use hankel_host::crates::{KernelCrate, Native};
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
 use crate::args::Generate;
@@ -31,9 +32,13 @@ const BUILT_IN: &str = "kernels/shadows/Cargo.toml";
 /// The committed SPIR-V within a checkout.
 const COMMITTED: &str = "snapshots/spirv";
 
-/// A kernel crate, with its native code.
+/// A kernel crate.
 pub struct Session {
+    /// What its kernels are. Only a crate that is linked into this program has native code here;
+    /// see [`Session::native`].
     pub krate: KernelCrate,
+    /// Whether it is.
+    linked: bool,
     /// Hash of the sources.
     source_sha256: String,
     /// The sources on disk; `None` for the built-in kernels outside of a checkout.
@@ -46,6 +51,7 @@ impl Session {
     pub fn linked(quiet: bool) -> Self {
         Self {
             krate: built_in(),
+            linked: true,
             source_sha256: hankel_embedded::SOURCE_SHA256.into(),
             sources: None,
             quiet,
@@ -75,18 +81,43 @@ impl Session {
             built_in()
         } else {
             let progress = Progress::new(quiet);
-            progress.begin(&format!("Building {} for this machine", sources.name));
-            let krate = KernelCrate::load(&manifest, &mut |line| progress.detail(line))?;
+            progress.begin(&format!("Reading the kernels of {}", sources.name));
+            let krate = KernelCrate::load(&manifest, Native::Descriptions, &mut |line| {
+                progress.detail(line);
+            })?;
             // cargo may have written the lock file just now, which is part of the sources.
             sources = hash(&manifest).map_err(Error::from)?;
             krate
         };
         Ok(Self {
             krate,
+            linked: same,
             source_sha256: sources.sha256.clone(),
             sources: Some((manifest, sources)),
             quiet,
         })
+    }
+
+    /// The crate with the native code of the entry points called `names`.
+    pub fn native<'a>(&self, names: impl IntoIterator<Item = &'a String>) -> Result<KernelCrate> {
+        let Some((manifest, _)) = self.sources.as_ref().filter(|_| !self.linked) else {
+            return Ok(self.krate.clone());
+        };
+        let names: Vec<String> = names.into_iter().cloned().collect();
+        let native = if names.len() == self.krate.entries.len() {
+            Native::All
+        } else {
+            Native::Of(&names)
+        };
+        let progress = Progress::new(self.quiet);
+        progress.begin(&format!(
+            "Building {} kernels of {} for this machine",
+            names.len(),
+            self.krate.name
+        ));
+        Ok(KernelCrate::load(manifest, native, &mut |line| {
+            progress.detail(line);
+        })?)
     }
 
     /// Descriptions of all entry points.

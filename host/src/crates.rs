@@ -1,4 +1,5 @@
-//! Kernel crates: the built-in ones, and anybody's, whose native code is built as a plug-in.
+//! Kernel crates: the built-in ones, and anybody's, which is built as a plug-in: with the native
+//! code of those entry points that will run, or without any, to learn what its kernels are.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -21,6 +22,38 @@ pub struct KernelCrate {
     pub name: String,
     /// Its entry points, in the order of its `kernels![…]`.
     pub entries: Vec<KernelEntry>,
+}
+
+/// The entry points whose native code a plug-in is built with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Native<'a> {
+    /// None: the plug-in only describes. No kernel's body is compiled, so this takes about a second.
+    Descriptions,
+    /// Those with these names.
+    Of(&'a [String]),
+    /// All.
+    All,
+}
+
+impl Native<'_> {
+    /// rustc's flags for the crate itself.
+    fn flags(self) -> Vec<OsString> {
+        let mut flags = vec![OsString::from("--cfg"), "hankel_plugin".into()];
+        let names = match self {
+            Native::All => return flags,
+            // Descriptions are made once: there is nothing to optimise.
+            Native::Descriptions => {
+                flags.push("-Copt-level=0".into());
+                &[]
+            }
+            Native::Of(names) => names,
+        };
+        flags.extend(["--cfg".into(), "hankel_select".into()]);
+        for name in names {
+            flags.extend(["--cfg".into(), format!("hankel_native={name:?}").into()]);
+        }
+        flags
+    }
 }
 
 type Run = dyn Fn(&mut Call<'_>) -> Result<(), CallError> + Send + Sync;
@@ -138,15 +171,20 @@ impl KernelCrate {
     }
 
     /// Builds the crate at `manifest` (its `Cargo.toml`) for this machine with cargo, into
-    /// `hankel/native` under cargo's own target folder, and loads it. The crate is trusted: its
-    /// code runs in this process. `progress` gets cargo's lines as they come.
+    /// `hankel/native` under cargo's own target folder, and loads it; entry points that `native`
+    /// leaves out cannot be run ([`CallError::NotBuilt`]). The crate is trusted: its code runs in
+    /// this process. `progress` gets cargo's lines as they come.
     ///
     /// # Errors
     /// See [`CrateError`].
-    pub fn load(manifest: &Path, progress: &mut dyn FnMut(&str)) -> Result<Self, CrateError> {
+    pub fn load(
+        manifest: &Path,
+        native: Native<'_>,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Self, CrateError> {
         let package = Package::find(manifest)?;
-        let library = package.build(progress)?;
-        let plugin = Arc::new(Plugin::load(&library)?);
+        let library = package.build(native, progress)?;
+        let plugin = Arc::new(load_copy(&library)?);
         let entries = plugin
             .kernels()
             .iter()
@@ -181,6 +219,25 @@ impl KernelCrate {
                     .join(", "),
             })
     }
+}
+
+/// Loads a copy of the library under a name of its own: the loader hands out the library that it
+/// already has when it sees a path again, but cargo puts every build of a crate at the same path.
+fn load_copy(library: &Path) -> Result<Plugin, PluginError> {
+    let fail = |e: std::io::Error| PluginError {
+        path: library.to_owned(),
+        problem: format!("it cannot be copied: {e}"),
+    };
+    let folder = library.parent().unwrap_or(Path::new("."));
+    let copy = tempfile::Builder::new()
+        .prefix(".plugin-")
+        .suffix(std::env::consts::DLL_SUFFIX)
+        .tempfile_in(folder)
+        .map_err(fail)?
+        .into_temp_path();
+    std::fs::copy(library, &copy).map_err(fail)?;
+    // What is loaded stays, though the file goes.
+    Plugin::load(&copy)
 }
 
 /// A package with a library, as cargo describes it.
@@ -352,7 +409,11 @@ impl Package {
     }
 
     /// Builds the plug-in; gives its path.
-    fn build(&self, progress: &mut dyn FnMut(&str)) -> Result<PathBuf, CrateError> {
+    fn build(
+        &self,
+        native: Native<'_>,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<PathBuf, CrateError> {
         let target_dir = self.target_dir.join("hankel").join("native");
         let mut child = cargo()
             .args(["rustc", "--lib", "--release", "--crate-type", "cdylib"])
@@ -360,7 +421,8 @@ impl Package {
             .arg(&self.manifest)
             .arg("--target-dir")
             .arg(&target_dir)
-            .args([OsString::from("--"), "--cfg".into(), "hankel_plugin".into()])
+            .arg("--")
+            .args(native.flags())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hankel_host::crates::{CrateError, KernelCrate};
+use hankel_host::crates::{CrateError, KernelCrate, Native};
 use hankel_host::device::{Bind, Device, NativeDevice};
 
 /// A folder for a crate, emptied but for its build.
@@ -33,7 +33,7 @@ fn manifest(folder: &Path, rest: &str) -> PathBuf {
 }
 
 fn refused(manifest: &Path) -> CrateError {
-    KernelCrate::load(manifest, &mut |_| {}).unwrap_err()
+    KernelCrate::load(manifest, Native::Descriptions, &mut |_| {}).unwrap_err()
 }
 
 #[test]
@@ -63,7 +63,11 @@ fn a_kernel_crate_is_built_loaded_and_run() {
          hankel_dsl::kernels![parabola, beyond];\n",
     );
     let mut lines = Vec::new();
-    let loaded = KernelCrate::load(&manifest, &mut |l| lines.push(l.to_string())).unwrap();
+    let described = KernelCrate::load(&manifest, Native::Descriptions, &mut |_| {}).unwrap();
+    let selected = ["parabola".to_string()];
+    let one = KernelCrate::load(&manifest, Native::Of(&selected), &mut |_| {}).unwrap();
+    let loaded =
+        KernelCrate::load(&manifest, Native::All, &mut |l| lines.push(l.to_string())).unwrap();
     assert!(lines.iter().any(|l| l.contains("Finished")), "{lines:?}");
     assert_eq!(loaded.name, "parabola");
     let text = loaded.entry("parabla").unwrap_err().to_string();
@@ -81,6 +85,31 @@ fn a_kernel_crate_is_built_loaded_and_run() {
         .unwrap();
     let result: Vec<f32> = bytemuck::pod_collect_to_vec(&device.read_buffer(out).unwrap());
     assert_eq!((result[3], result[99]), (4.5, 4900.5));
+
+    // The same description whatever was built; only what was asked for runs.
+    let kernels = |of: &KernelCrate| {
+        of.entries
+            .iter()
+            .map(|e| e.kernel.clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(kernels(&described), kernels(&loaded));
+    assert_eq!(kernels(&one), kernels(&loaded));
+    for (from, runs) in [(&described, false), (&one, true)] {
+        let entry = from.entry("parabola").unwrap();
+        let result = device.dispatch(
+            &entry.program(None, &[]),
+            &[Bind::Bytes(&points), Bind::Buffer(out)],
+        );
+        assert_eq!(result.is_ok(), runs, "{result:?}");
+    }
+    let error = device
+        .dispatch(
+            &one.entry("parabola_f64").unwrap().program(None, &[]),
+            &[Bind::Bytes(&points), Bind::Buffer(out)],
+        )
+        .unwrap_err();
+    assert!(error.to_string().contains("was not built"), "{error}");
 
     let entry = loaded.entry("beyond").unwrap();
     let error = device

@@ -13,7 +13,9 @@ pub fn run(args: &Eval, quiet: bool) -> Result<Outcome> {
         Precision::F32 => describe::Precision::F32,
         Precision::F64 => describe::Precision::F64,
     });
-    let entry = select(&session.krate, &args.kernel, precision)?;
+    let name = &select(&session.krate, &args.kernel, precision)?.kernel.name;
+    let krate = session.native([name])?;
+    let entry = krate.entry(name)?;
     let settings = args
         .set
         .iter()

@@ -42,7 +42,8 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     };
     let request = session.request_for(args.kernels.clone(), Vec::new(), options);
     let generated = generate(&request, &session.modules()?)?;
-    let subjects = Subject::all(&generated, &session.krate.entries);
+    let krate = session.native(generated.manifest.kernels.keys())?;
+    let subjects = Subject::all(&generated, &krate.entries);
 
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
     let this = std::env::current_exe()

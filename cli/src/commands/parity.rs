@@ -41,8 +41,8 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
             .map(|(bytes, entry_point)| (String::from_utf8_lossy(bytes).into_owned(), entry_point));
         codes.insert(name.as_str(), (spirv, wgsl));
     }
-    let subjects: Vec<Subject<'_>> = session
-        .krate
+    let krate = session.native(generated.manifest.kernels.keys())?;
+    let subjects: Vec<Subject<'_>> = krate
         .entries
         .iter()
         .filter_map(|entry| {

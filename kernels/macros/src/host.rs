@@ -12,9 +12,15 @@ impl Kernel {
         let entries = self.variants.iter().map(|v| {
             let description = self.description(v);
             let run = self.run(v);
+            let entry = &v.entry;
+            // `hankel` sets these two: what is only described, or does not run, is not compiled.
+            let wanted = quote!(any(not(hankel_select), hankel_native = #entry));
             quote! {
                 all.push({
+                    #[cfg(#wanted)]
                     #run
+                    #[cfg(not(#wanted))]
+                    use exec::not_built as run;
                     native::Entry { kernel: #description, run }
                 });
             }
@@ -23,7 +29,14 @@ impl Kernel {
         quote! {
             ::hankel_dsl::on_host! {
                 /// The entry points that come from the function.
-                #[allow(clippy::all, unused_mut, unused_variables, reason = "generated")]
+                #[allow(
+                    clippy::all,
+                    unexpected_cfgs,
+                    unused_imports,
+                    unused_mut,
+                    unused_variables,
+                    reason = "generated"
+                )]
                 #[must_use]
                 pub fn entries() -> ::hankel_dsl::native::Entries {
                     use ::hankel_dsl::native::{self, describe, exec, layout};

@@ -130,7 +130,7 @@ fn bandwidth(array_bytes: usize, runs: usize) -> [Bandwidth; 2] {
     let count = array_bytes / size_of::<f64>();
     let (mut a, b, c) = (vec![0.0_f64; count], vec![1.0; count], vec![2.0; count]);
     let scale = black_box(3.0_f64);
-    let best = level();
+    let best = level().unwrap_or_else(Level::baseline);
     let copy = |a: &mut [f64], b: &[f64], _: &[f64]| a.copy_from_slice(b);
     let triad = |a: &mut [f64], b: &[f64], c: &[f64]| {
         dispatch!(best, simd => sums(simd, a, b, c, scale));

@@ -22,7 +22,7 @@ pub use worker::{Program, serve};
 use std::path::PathBuf;
 use std::time::Instant;
 
-use hankel_dsl::native::lanes::{level_name, levels};
+use hankel_dsl::native::lanes::{SCALAR, level_name, levels};
 use hankel_dsl::native::{CallError, Mode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -451,7 +451,11 @@ impl Run<'_> {
     ) -> Result<Vec<(Timing, Contestant)>, SpeedError> {
         let mut contestants = Vec::new();
         for (i, (solver, _)) in own.iter().enumerate() {
-            for (path, lanes) in [("scalar", false), (level_name(), true)] {
+            let ways = [(SCALAR, false), (level_name(), true)];
+            for (path, lanes) in ways
+                .into_iter()
+                .filter(|(name, lanes)| *lanes == (*name != SCALAR))
+            {
                 for (threads, parallel) in [(1, false), (self.threads, true)] {
                     // On one core both are the same; scalar on all is nobody's choice.
                     if !parallel || (lanes && threads > 1) {

@@ -171,6 +171,9 @@ pub enum CallError {
         /// What does not fit.
         problem: String,
     },
+    /// The plug-in was built for other entry points, or for descriptions alone.
+    #[error("its native code was not built: ask for the kernel when its crate is loaded")]
+    NotBuilt,
     /// What a plug-in reported.
     #[error("{message}")]
     Plugin {

@@ -7,18 +7,23 @@ use std::string::{String, ToString};
 use std::{format, vec};
 
 use bytemuck::Pod;
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::Simd;
 use glam::{UVec2, UVec3, UVec4, Vec4};
 use rayon::prelude::*;
 
 use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef};
 use super::describe::TexelFormat;
-use super::lanes::{self, Scalar};
+use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
 use crate::{Group, Real, Texel};
 
 /// Invocations that a thread takes at once.
 const CHUNK: usize = 4096;
+
+/// Stands in for the native code of an entry point in a plug-in that was built without it.
+pub fn not_built(_: &mut Call<'_>) -> Result<(), CallError> {
+    Err(CallError::NotBuilt)
+}
 
 /// The arguments of a call, taken in order.
 pub struct Args<'a> {
@@ -273,33 +278,43 @@ pub trait LaneBody: Sync {
     );
 }
 
-/// A map over one dimension, on SIMD lanes if `mode` says so.
+/// A map over one dimension, on SIMD lanes if `mode` says so and the processor has any.
 pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Result<(), CallError> {
-    if !mode.lanes {
-        return map1(mode, out, |i| body.one(i));
-    }
-    let level = lanes::level();
+    let level = if mode.lanes { lanes::level() } else { None };
     guard(|| {
         chunks(mode, out, CHUNK, |start, chunk| {
-            dispatch!(level, simd => lane_chunk(simd, start, chunk, body));
+            let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), 0);
+            scalar_chunk(start + done, &mut chunk[done..], body);
         });
     })
 }
 
+/// What lanes leave over, or everything. One copy for all instruction sets: compiling a kernel's
+/// body is what a build of kernels spends its time on.
+#[inline(never)]
+fn scalar_chunk<B: LaneBody>(start: usize, chunk: &mut [B::Out], body: &B) {
+    for (i, slot) in chunk.iter_mut().enumerate() {
+        *slot = body.one(start + i);
+    }
+}
+
+/// Fills as much of `chunk` as whole groups of lanes do; gives how much that is.
 #[inline(always)]
-fn lane_chunk<S: Simd, B: LaneBody>(_simd: S, start: usize, chunk: &mut [B::Out], body: &B) {
+fn lane_chunk<S: Simd, B: LaneBody>(
+    _simd: S,
+    start: usize,
+    chunk: &mut [B::Out],
+    body: &B,
+) -> usize {
     let lanes = <B::Scalar as Scalar>::Lanes::<S>::LANES;
     // Once, not for each group: the compiler cannot know that storing a result leaves them alone.
     let uniforms = body.uniforms::<<B::Scalar as Scalar>::Lanes<S>>();
-    let mut start = start;
-    let mut groups = chunk.chunks_exact_mut(lanes);
-    for group in &mut groups {
-        body.many::<<B::Scalar as Scalar>::Lanes<S>>(&uniforms, start, group);
-        start += lanes;
+    let mut done = 0;
+    for group in chunk.chunks_exact_mut(lanes) {
+        body.many::<<B::Scalar as Scalar>::Lanes<S>>(&uniforms, start + done, group);
+        done += lanes;
     }
-    for (i, slot) in groups.into_remainder().iter_mut().enumerate() {
-        *slot = body.one(start + i);
-    }
+    done
 }
 
 /// All channels of a texel, as a texture stores them.

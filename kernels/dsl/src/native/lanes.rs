@@ -14,7 +14,10 @@ use super::layout::Lane;
 use super::transpose;
 use crate::{Mask, Real};
 
-/// The instruction sets that this processor has and lanes can use, widest first, each by its name.
+/// The instruction sets that this processor has and lanes gain from, widest first, each by its
+/// name. Narrower ones are not among them: from SSE2 and SSE4.2 lanes gain nothing over scalar code
+/// (`cargo bench -p hankel-shadows --bench lanes` measured it), and every one that is here costs a
+/// compiled copy of each kernel.
 #[must_use]
 pub fn levels() -> Vec<(&'static str, Level)> {
     let best = Level::new();
@@ -24,51 +27,85 @@ pub fn levels() -> Vec<(&'static str, Level)> {
         [
             ("avx512", best.as_avx512().map(|s| s.level())),
             ("avx2", best.as_avx2().map(|s| s.level())),
-            ("sse4.2", best.as_sse4_2().map(|s| s.level())),
         ]
         .into_iter()
         .filter_map(|(name, level)| Some((name, level?))),
     );
     #[cfg(target_arch = "aarch64")]
     all.extend(best.as_neon().map(|s| ("neon", s.level())));
-    all.push(("baseline", Level::baseline()));
     all
 }
 
-/// The instruction set in use: the best one, or the one that the environment variable
-/// `HANKEL_SIMD` names, if the processor has it.
+/// The name of [`level`] where no lanes are used.
+pub const SCALAR: &str = "scalar";
+
+/// The instruction set in use: the best of [`levels`], or the one that the environment variable
+/// `HANKEL_SIMD` names, if the processor has it. `None`: kernels run as scalar code.
 #[must_use]
-pub fn level() -> Level {
-    static LEVEL: OnceLock<Level> = OnceLock::new();
+pub fn level() -> Option<Level> {
+    static LEVEL: OnceLock<Option<Level>> = OnceLock::new();
     *LEVEL.get_or_init(|| {
         let wanted = std::env::var("HANKEL_SIMD").ok();
+        if wanted.as_deref() == Some(SCALAR) {
+            return None;
+        }
         let levels = levels();
         let named = levels
             .iter()
             .find(|(name, _)| wanted.as_deref() == Some(name));
-        named.map_or_else(Level::new, |(_, level)| *level)
+        named.or(levels.first()).map(|(_, level)| *level)
     })
 }
 
 /// Its name, for reports.
 #[must_use]
 pub fn level_name() -> &'static str {
-    let name = |level: &Level| std::mem::discriminant(level);
+    let Some(level) = level() else { return SCALAR };
     levels()
         .iter()
-        .find(|(_, l)| name(l) == name(&level()))
-        .map_or("baseline", |(n, _)| n)
+        .find(|(_, l)| std::mem::discriminant(l) == std::mem::discriminant(&level))
+        .map_or(SCALAR, |(name, _)| name)
 }
+
+/// `$lanes` compiled for the instruction set of `$level`, an `Option<Level>` out of [`levels`], with
+/// its token as `$simd`; else `$scalar`. Unlike [`fearless_simd::dispatch`] it compiles nothing for
+/// instruction sets that are not among [`levels`].
+macro_rules! on_level {
+    ($level:expr, $simd:ident => $lanes:expr, $scalar:expr) => {
+        match $level {
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Some(fearless_simd::Level::Avx512($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $lanes,
+            ),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Some(fearless_simd::Level::Avx2($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $lanes,
+            ),
+            #[cfg(target_arch = "aarch64")]
+            Some(fearless_simd::Level::Neon($simd)) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $lanes,
+            ),
+            _ => $scalar,
+        }
+    };
+}
+pub(super) use on_level;
 
 /// The token of instruction set `S`, out of nothing.
 ///
 /// Lane types cannot be named outside of this crate, and the executor creates them only inside
-/// [`fearless_simd::dispatch`], where the token exists.
+/// [`on_level`], where the token exists.
 #[inline(always)]
 pub(super) fn token<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0) }
     // SAFETY: `S` has no bytes, so any pointer that is not null and aligned reads a valid value;
-    // and code that gets here runs under `dispatch` with a token of this very type.
+    // and code that gets here runs under `on_level` with a token of this very type.
     unsafe { core::ptr::NonNull::<S>::dangling().read() }
 }
 
