@@ -117,9 +117,11 @@ impl From<codegen::Error> for Failure {
     fn from(error: codegen::Error) -> Self {
         use codegen::Error as E;
         let blame = match &error {
-            E::Compile { .. } | E::NoEntryPoint { .. } | E::Kernel(_) | E::Kernels(_) => {
-                Blame::Kernel
-            }
+            E::Compile { .. }
+            | E::Source(_)
+            | E::NoEntryPoint { .. }
+            | E::Kernel(_)
+            | E::Kernels(_) => Blame::Kernel,
             E::DuplicateKernel { .. } | E::DuplicateLayout { .. } => Blame::Kernel,
             E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } => Blame::Machine,
             _ => Blame::Input,

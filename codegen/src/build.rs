@@ -282,6 +282,34 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
 /// Paths and contents.
 type Files = Vec<(String, Vec<u8>)>;
 
+/// A kernel as naga reads it, as often as it is asked for.
+struct Readings<'a> {
+    kernel: &'a Kernel,
+    spirv: &'a [u8],
+    settable: Option<Ir>,
+    frozen: Option<Ir>,
+}
+
+impl Readings<'_> {
+    /// With constants to be set, or with their values.
+    fn get(&mut self, frozen: bool) -> Result<&Ir, Failure> {
+        let kernel = self.kernel;
+        let place = match frozen {
+            true => &mut self.frozen,
+            false => &mut self.settable,
+        };
+        if place.is_none() {
+            *place = Some(if frozen {
+                let values = finish::freeze(self.spirv, kernel, &defaults(kernel))?;
+                Ir::read(&values.spirv, kernel)?
+            } else {
+                Ir::read(self.spirv, kernel)?
+            });
+        }
+        place.as_ref().ok_or_else(|| missing(kernel))
+    }
+}
+
 /// One kernel in every language.
 fn one(
     kernel: &Kernel,
@@ -293,8 +321,12 @@ fn one(
     let open = open_module(kernel, modules, options)?;
     let mut entry = manifest::entry(kernel, layouts, options, open.cost);
     let mut files = Vec::new();
-    let mut ir = None;
-    let mut baked = None;
+    let mut readings = Readings {
+        kernel,
+        spirv: &open.spirv,
+        settable: None,
+        frozen: None,
+    };
     for &language in targets {
         let path = format!(
             "{}/{}.{}",
@@ -326,27 +358,22 @@ fn one(
             continue;
         }
         // Only WGSL can express a specialisation constant: the others get its value before
-        // optimisation, so that branches on it disappear.
+        // optimisation, so that branches on it disappear. So does WGSL where implementations would
+        // refuse it otherwise.
         let has_open_constants =
             constants(kernel).any(|name| !options.constants.contains_key(name));
-        let ir = if language == Language::Wgsl || !has_open_constants {
-            if ir.is_none() {
-                ir = Some(Ir::read(&open.spirv, kernel)?);
-            }
-            &ir
-        } else {
-            if baked.is_none() {
-                let defaults = defaults(kernel);
-                let frozen = finish::freeze(&open.spirv, kernel, &defaults)?;
-                baked = Some(Ir::read(&frozen.spirv, kernel)?);
-            }
-            &baked
-        };
-        let Some(ir) = ir else { continue };
+        let ir = readings.get(language != Language::Wgsl && has_open_constants)?;
         if entry.findings.is_empty() {
             entry.findings = ir.findings();
         }
-        match ir.write(language, kernel, options)? {
+        let mut written = ir.write(language, kernel, options)?;
+        if written == Written::Unsettable {
+            written = readings.get(true)?.write(language, kernel, options)?;
+            for constant in &mut entry.constants {
+                constant.overridable_in.retain(|it| *it != language);
+            }
+        }
+        match written {
             Written::Text(text) => {
                 for binding in &mut entry.bindings {
                     if let Some(place) = text.places.get(&binding.binding) {
@@ -367,6 +394,10 @@ fn one(
             }
             Written::Unsupported(reason) => {
                 entry.unsupported.insert(language, reason);
+            }
+            Written::Unsettable => {
+                let reason = "implementations refuse it even with the values of its constants";
+                entry.unsupported.insert(language, reason.into());
             }
         }
     }

@@ -15,6 +15,7 @@ use rustc_codegen_spirv_types::{CompileResult, ModuleResult, SpirvTarget, Target
 use semver::Version;
 use serde::Deserialize;
 
+use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
 use crate::spirv::trim;
 use crate::translate::text;
@@ -142,6 +143,10 @@ pub fn compile(
             path: manifest.clone(),
             problem: "there is no such file".into(),
         })?;
+    let found = diagnostics::source::check(folder);
+    if !found.is_empty() {
+        return Err(Error::Source(found));
+    }
     let target_dir = std::path::absolute(target_dir)
         .during("resolve", target_dir)?
         .join(TARGET_SUBFOLDER);
@@ -219,7 +224,7 @@ fn cargo(
         "--lib",
         "--crate-type=dylib",
         "--profile=release",
-        "--message-format=json-render-diagnostics",
+        "--message-format=json",
         "-Zbuild-std=core",
         "-Zbuild-std-features=compiler-builtins-mem",
         "--manifest-path",
@@ -289,11 +294,17 @@ fn failure(manifest: &Path, kernels: &[&str], said: &str, messages: &str) -> Err
         .iter()
         .any(|word| line.starts_with(word))
     };
-    let mut output: String = said
+    let folder = manifest.parent().unwrap_or(manifest);
+    let mut output: String = rust_gpu::read(messages, folder)
+        .iter()
+        .flat_map(|it| [it.to_string(), "\n".into()])
+        .collect();
+    let told: String = said
         .lines()
         .filter(|line| !is_chatter(line))
         .flat_map(|line| [line, "\n"])
         .collect();
+    output.push_str(&told);
     // What is no JSON on the standard output was printed by the compiler itself.
     output.extend(
         messages

@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::diagnostics::Diagnostic;
+
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -15,6 +17,8 @@ pub enum Step {
     Compile,
     /// Reading the binary.
     Read,
+    /// Looking for what rust-gpu makes something else of.
+    Meaning,
     /// spirv-val.
     Validate,
     /// spirv-opt.
@@ -36,6 +40,7 @@ impl fmt::Display for Step {
         match self {
             Self::Compile => f.write_str("rust-gpu"),
             Self::Read => f.write_str("reading SPIR-V"),
+            Self::Meaning => f.write_str("what rust-gpu makes of it"),
             Self::Validate => f.write_str("spirv-val"),
             Self::Optimise => f.write_str("spirv-opt"),
             Self::Describe => f.write_str("comparing SPIR-V with the kernel's description"),
@@ -64,6 +69,12 @@ pub struct Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.step == Step::Meaning {
+            if let Some(place) = &self.construct {
+                write!(f, "{place}: ")?;
+            }
+            return write!(f, "kernel `{}`: {}", self.kernel, self.message);
+        }
         let how = if self.panicked { "panicked" } else { "failed" };
         write!(f, "kernel `{}`: {} {how}", self.kernel, self.step)?;
         if let Some(construct) = &self.construct {
@@ -119,6 +130,9 @@ pub enum Error {
         /// What rustc printed.
         output: String,
     },
+    /// The kernel crate's own source has what no shader can have.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Source(Vec<Diagnostic>),
     /// The compiler made no module for a kernel of the description.
     #[error("{} has no SPIR-V entry point `{kernel}`; it has: {}", manifest.display(), list(found))]
     NoEntryPoint {
@@ -235,6 +249,7 @@ impl Error {
                     .into()
             }
             Self::Compile { .. } => "Correct the kernel where the compiler points.".into(),
+            Self::Source(_) => return None,
             Self::NoEntryPoint { .. } => {
                 "List the function in the crate's `hankel_dsl::kernels!` and give it `#[kernel]`."
                     .into()
@@ -278,6 +293,9 @@ impl Failure {
     pub fn advice(&self) -> String {
         match self.step {
             Step::Compile => "Correct the kernel where the compiler points.",
+            Step::Meaning => {
+                "Write it as the message says: what would be written means something else."
+            }
             Step::Read => "The file is damaged or no SPIR-V: make it again.",
             Step::Validate if self.message.contains("capability") => {
                 "The module uses something whose capability rust-gpu was not told of; keep to what \

@@ -4,13 +4,15 @@
 use std::collections::BTreeMap;
 
 use hankel_dsl::native::describe::{Kernel, Role};
+use rspirv::dr::Module;
 use spirv_tools::TargetEnv;
 use spirv_tools::opt::{Optimizer, Passes};
 use spirv_tools::val::Validator;
 
 use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
-use crate::spirv::{self, exact, names, split, trim};
+use crate::spirv::uniform::Memory;
+use crate::spirv::{self, exact, libm, names, order, refused, split, trim, uniform};
 
 /// What the modules are for.
 const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
@@ -38,8 +40,28 @@ pub struct Finished {
 /// The binary is damaged or invalid, a tool fails, or the module is not what `kernel` describes.
 pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let name = kernel.name.as_str();
-    let words = optimise(&spirv::words(raw, name)?, name)?;
+    let words = spirv::words(raw, name)?;
+    validate(&words, name)?;
     let mut module = spirv::load(&words, name)?;
+    refused::check(&module, name)?;
+    libm::mend(&mut module);
+    let words = optimise(module, name)?;
+    let mut module = spirv::load(&words, name)?;
+    order::mend(&mut module);
+    if uniform::divides_at_barrier(&module, Memory::Trusted) {
+        return Err(Failure {
+            kernel: name.into(),
+            step: Step::Meaning,
+            construct: Some(format!("{}:{}", kernel.file, kernel.line)),
+            message: "not every invocation of a workgroup reaches each barrier. A barrier in a \
+                      branch, or a loop, that some do not take; or a division, an index or an \
+                      `unwrap` before it, which ends an invocation where it fails: write \
+                      `x.checked_div(y)`, an index that is masked (`t[(i & 7) as usize]`), \
+                      `unwrap_or`"
+                .into(),
+            panicked: false,
+        });
+    }
     if kernel.exact || kernel.pinned {
         exact::keep(&mut module);
     }
@@ -85,14 +107,14 @@ pub fn freeze(
 ///
 /// The binary is damaged or invalid; `name` is what the error calls it.
 pub fn cost_after_optimisation(raw: &[u8], name: &str) -> Result<Cost, Failure> {
-    let words = optimise(&spirv::words(raw, name)?, name)?;
+    let words = spirv::words(raw, name)?;
+    validate(&words, name)?;
+    let words = optimise(spirv::load(&words, name)?, name)?;
     Ok(cost::of_module(&spirv::load(&words, name)?))
 }
 
-/// Validates, and runs spirv-opt with floating-point arithmetic held as it is written.
-fn optimise(words: &[u32], name: &str) -> Result<Vec<u32>, Failure> {
-    validate(words, name)?;
-    let mut module = spirv::load(words, name)?;
+/// Runs spirv-opt with floating-point arithmetic held as it is written.
+fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
     exact::pin(&mut module);
     exact::fold(&mut module);
     // Inlining and unrolling bring constants together, and what they decide may bring more.

@@ -19,6 +19,7 @@ pub mod bundle;
 pub mod check;
 pub mod compile;
 pub mod cost;
+pub mod diagnostics;
 mod error;
 pub mod files;
 pub mod finish;

@@ -22,7 +22,7 @@ fn text(kernel: &Kernel, language: Language) -> Text {
         .unwrap()
     {
         Written::Text(text) => text,
-        Written::Unsupported(why) => panic!("{why}"),
+        other => panic!("{other:?}"),
     }
 }
 

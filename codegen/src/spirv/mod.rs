@@ -1,9 +1,15 @@
 //! SPIR-V binaries: reading, writing, and the small edits that spirv-opt has no pass for.
 
+pub(crate) mod edit;
 pub mod exact;
+pub mod libm;
+pub(crate) mod lines;
 pub mod names;
+pub mod order;
+pub mod refused;
 pub mod split;
 pub mod trim;
+pub mod uniform;
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Module, Operand};

@@ -77,6 +77,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     // Of a selection between two literals without suffix DXC 1.7 rounds both towards zero
     // (`tests/upstream/dxc-literal-selection`).
     let source = text::suffixed(&source);
+    let source = without_zero_arrays(&source);
     let mut source = doubles.apply(job.precise(source, &["float", "double"])?);
     // fxc, which has models up to 5.1, does not know attributes of Vulkan.
     if job.options.shader_model.0 > ShaderModel::V5_1 {
@@ -204,6 +205,28 @@ impl Doubles {
     }
 }
 
+/// Arrays of functions without the zeros that naga gives every variable, which glslang's HLSL refuses
+/// for arrays (`tests/upstream/glslang-zero-array`). Nothing reads them: a Rust array has values
+/// before anybody can.
+fn without_zero_arrays(source: &str) -> String {
+    let mut plain = String::with_capacity(source.len());
+    for line in source.split_inclusive('\n') {
+        let declared = line.trim_end().strip_suffix(")0;").and_then(|rest| {
+            let (declared, ty) = rest.split_once(" = (")?;
+            let is_array = declared.ends_with(']') && ty.ends_with(']');
+            (line.starts_with(' ') && is_array).then_some(declared)
+        });
+        match declared {
+            Some(declared) => {
+                plain.push_str(declared);
+                plain.push_str(";\n");
+            }
+            None => plain.push_str(line),
+        }
+    }
+    plain
+}
+
 /// Replaces the heap and the indices into it by registers.
 fn plain_samplers(source: &str) -> Option<String> {
     let mut plain = String::with_capacity(source.len());
@@ -299,7 +322,17 @@ const fn vulkan_format(format: StorageFormat) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Doubles, plain_samplers, with_format};
+    use super::{Doubles, plain_samplers, with_format, without_zero_arrays};
+
+    #[test]
+    fn arrays_begin_without_zeros() {
+        assert_eq!(
+            without_zero_arrays(
+                "static int all[2] = (int[2])0;\n    float4 a[3][2] = (float4[3][2])0;\n    uint n = (uint)0;\n"
+            ),
+            "static int all[2] = (int[2])0;\n    float4 a[3][2];\n    uint n = (uint)0;\n"
+        );
+    }
 
     #[test]
     fn functions_of_doubles_are_our_own() {

@@ -21,11 +21,13 @@ mod cleanup;
 mod glsl;
 mod hlsl;
 mod msl;
+mod reading;
 pub(crate) mod text;
 mod wgsl;
 
 pub(crate) use cleanup::{each_statement, each_within};
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -42,11 +44,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Step, guarded};
 use crate::lint::Finding;
-use crate::{Error, Language, VERSION};
+use crate::spirv::uniform::{self, Memory};
+use crate::{Error, Language, VERSION, spirv};
+use reading::Dropped;
 
 /// Number of how texts are written. To be raised with every change that gives other ones: a build by
 /// another number is stale.
-pub(crate) const WRITERS: u32 = 2;
+pub(crate) const WRITERS: u32 = 3;
 
 /// What to do about an index that is out of range, beyond the kernel's own guard.
 ///
@@ -254,16 +258,23 @@ pub enum Written {
     Text(Text),
     /// The language cannot express the kernel.
     Unsupported(String),
+    /// The text is right, but implementations refuse it while it has constants to be set: it must be
+    /// written with their values.
+    Unsettable,
 }
 
 /// A kernel in naga's representation, cleaned up and validated.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Ir {
     module: Module,
     info: ModuleInfo,
     kernel: String,
     /// The clean-up applied in full.
     clean: bool,
+    /// What it was read from.
+    spirv: rspirv::dr::Module,
+    /// What of that naga's reader does not take over.
+    dropped: Dropped,
 }
 
 impl Ir {
@@ -274,18 +285,64 @@ impl Ir {
     /// naga cannot read it, or its validator rejects it.
     pub fn read(spirv: &[u8], kernel: &Kernel) -> Result<Self, Failure> {
         let name = kernel.name.as_str();
-        let module = guarded(|| parse(spirv, name), name, Step::Parse)?;
+        let mut module = spirv::load(&spirv::words(spirv, name)?, name)?;
+        reading::for_reader(&mut module);
+        Self::of(module, kernel)
+    }
+
+    fn of(spirv: rspirv::dr::Module, kernel: &Kernel) -> Result<Self, Failure> {
+        let name = kernel.name.as_str();
+        let dropped = Dropped::of(&spirv);
+        let bytes = spirv::bytes(&spirv::store(&spirv));
+        let mut module = guarded(|| parse(&bytes, name), name, Step::Parse)?;
+        cleanup::restore_sampling(&mut module, &dropped.sampling);
         let info = guarded(|| validate(&module, name), name, Step::Check)?;
         let raw = Self {
             module,
             info,
             kernel: name.into(),
             clean: false,
+            spirv,
+            dropped,
         };
         // Where the clean-up does not apply, what naga read is still right.
-        let mut ir = raw.cleaned(kernel).unwrap_or(raw);
+        let mut ir = match raw.cleaned(kernel) {
+            Some((module, info, clean)) => Self {
+                module,
+                info,
+                clean,
+                ..raw
+            },
+            None => raw,
+        };
         if kernel.exact {
             cleanup::name_roundings(&mut ir.module, &ir.info);
+        }
+        Ok(ir)
+    }
+
+    /// The same, read from what a language needs, where it needs something.
+    fn in_words_of(&self, language: Language, kernel: &Kernel) -> Result<Cow<'_, Self>, Failure> {
+        let mut spirv = self.spirv.clone();
+        let mut ir = if reading::for_language(&mut spirv, language) {
+            Cow::Owned(Self::of(spirv, kernel)?)
+        } else {
+            Cow::Borrowed(self)
+        };
+        if matches!(language, Language::Essl310 | Language::Essl300)
+            && cleanup::has_bit_counts(&ir.module)
+        {
+            cleanup::name_bit_counts(&mut ir.to_mut().module);
+        }
+        let pinned = kernel.pinned
+            && !kernel.exact
+            && matches!(
+                language,
+                Language::Hlsl | Language::Glsl | Language::Essl310
+            );
+        if pinned {
+            let ir = ir.to_mut();
+            cleanup::name_results(&mut ir.module, &ir.info);
         }
         Ok(ir)
     }
@@ -301,21 +358,10 @@ impl Ir {
         crate::lint::of_module(&self.module, None)
     }
 
-    /// The same with a variable for each value that leaves arithmetic, to be `precise`.
-    fn with_results(&self) -> Self {
-        let mut module = self.module.clone();
-        cleanup::name_results(&mut module, &self.info);
-        Self {
-            module,
-            info: self.info.clone(),
-            kernel: self.kernel.clone(),
-            clean: self.clean,
-        }
-    }
-
-    fn cleaned(&self, kernel: &Kernel) -> Option<Self> {
+    /// The module cleaned up, and whether its entry point is one function.
+    fn cleaned(&self, kernel: &Kernel) -> Option<(Module, ModuleInfo, bool)> {
         let name = kernel.name.as_str();
-        let step = || -> Result<Self, Failure> {
+        let step = || -> Result<_, Failure> {
             let mut module = self.module.clone();
             let folded = cleanup::fold_entry_point(&mut module);
             cleanup::unwrap_blocks(&mut module);
@@ -323,9 +369,9 @@ impl Ir {
             cleanup::constant_indices(&mut module);
             cleanup::drop_last_return(&mut module);
             let members: Vec<String> = (0..kernel.outputs.len())
-                .map(|index| crate::spirv::names::output_name(kernel, index))
+                .map(|index| spirv::names::output_name(kernel, index))
                 .collect();
-            let result = format!("{}Output", crate::spirv::names::camel_case(name));
+            let result = format!("{}Output", spirv::names::camel_case(name));
             cleanup::name_result(&mut module, &result, &members);
             validate(&module, name)?;
             naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
@@ -336,12 +382,7 @@ impl Ir {
             let info = validate(&module, name)?;
             cleanup::name_loads(&mut module, &info);
             let info = validate(&module, name)?;
-            Ok(Self {
-                module,
-                info,
-                kernel: name.into(),
-                clean: folded,
-            })
+            Ok((module, info, folded))
         };
         guarded(step, name, Step::Check).ok()
     }
@@ -360,15 +401,9 @@ impl Ir {
         if let Some(reason) = self.unsupported(language, kernel, options) {
             return Ok(Written::Unsupported(reason));
         }
-        let pinned = kernel.pinned
-            && !kernel.exact
-            && matches!(
-                language,
-                Language::Hlsl | Language::Glsl | Language::Essl310
-            );
-        let named = pinned.then(|| self.with_results());
+        let ir = self.in_words_of(language, kernel)?;
         let job = Job {
-            ir: named.as_ref().unwrap_or(self),
+            ir: &ir,
             kernel,
             options,
             language,
@@ -399,7 +434,13 @@ impl Ir {
         kernel: &Kernel,
         options: &Options,
     ) -> Option<String> {
+        if let Some(reason) = &self.dropped.reason {
+            return Some(reason.clone());
+        }
         if let Some(reason) = inexact(language, options).filter(|_| kernel.exact) {
+            return Some(reason);
+        }
+        if let Some(reason) = self.float_atomics(language, options) {
             return Some(reason);
         }
         let es = matches!(language, Language::Essl310 | Language::Essl300);
@@ -422,9 +463,19 @@ impl Ir {
                  write the loop with one test at its beginning"
             ));
         }
+        if language == Language::Wgsl && uniform::divides_at_barrier(&self.spirv, Memory::Doubted) {
+            return Some(
+                "WGSL lets an implementation refuse a barrier in a branch or a loop that depends on \
+                 memory that others write"
+                    .into(),
+            );
+        }
         let wide_integers = self.has_wide(ScalarKind::Uint) || self.has_wide(ScalarKind::Sint);
         if wide_integers && (es || language == Language::Wgsl) {
             return Some(format!("{language} has no 64-bit integers"));
+        }
+        if wide_integers && language == Language::Glsl {
+            return Some("naga's GLSL writer has no 64-bit integers".into());
         }
         if language == Language::Essl300 {
             if matches!(kernel.stage, Stage::Compute { .. }) {
@@ -476,6 +527,24 @@ impl Ir {
             }
         }
         None
+    }
+
+    /// Why atomics of floats cannot be written, if there are any. naga's HLSL writer adds their bits
+    /// as whole numbers (`tests/upstream/naga-hlsl-float-atomics`), and its GLSL writer leaves out the
+    /// extension that they need.
+    fn float_atomics(&self, language: Language, options: &Options) -> Option<String> {
+        let lacks = match language {
+            Language::Msl if options.msl_version < FLOAT_ATOMICS_MSL => format!(
+                "MSL {} has no atomics of floats: they came with {FLOAT_ATOMICS_MSL}",
+                options.msl_version
+            ),
+            Language::Msl | Language::Spirv => return None,
+            Language::Glsl => "GLSL 4.50 has no atomics of floats".into(),
+            _ => format!("{language} has no atomics of floats"),
+        };
+        let is_float = |ty: naga::Handle<naga::Type>| matches!(self.module.types[ty].inner, TypeInner::Atomic(scalar) if scalar.kind == ScalarKind::Float);
+        let used = self.module.types.iter().any(|(handle, _)| is_float(handle));
+        used.then(|| format!("{lacks}; add by compare and exchange on the bits"))
     }
 
     fn globals(&self) -> impl Iterator<Item = (&naga::GlobalVariable, &TypeInner)> {
@@ -530,6 +599,9 @@ fn inexact(language: Language, options: &Options) -> Option<String> {
 
 /// The first version of MSL that can forbid contraction and reordering.
 const EXACT_MSL: MslVersion = MslVersion { major: 3, minor: 2 };
+
+/// The first version of MSL with atomics of floats.
+const FLOAT_ATOMICS_MSL: MslVersion = MslVersion { major: 3, minor: 0 };
 
 /// Formats of GLSL ES 3.10's images.
 fn in_es(format: StorageFormat) -> bool {
@@ -630,15 +702,7 @@ impl Job<'_> {
     }
 
     /// The module with every specialisation constant replaced by its value.
-    fn frozen(
-        &self,
-    ) -> Result<
-        (
-            std::borrow::Cow<'_, Module>,
-            std::borrow::Cow<'_, ModuleInfo>,
-        ),
-        Failure,
-    > {
+    fn frozen(&self) -> Result<(Cow<'_, Module>, Cow<'_, ModuleInfo>), Failure> {
         naga::back::pipeline_constants::process_overrides(
             &self.ir.module,
             &self.ir.info,

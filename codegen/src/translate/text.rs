@@ -25,7 +25,8 @@ pub fn rename(text: &str, from: &str, to: &str) -> String {
     renamed + rest
 }
 
-/// Puts `f` after decimal fractions that have no suffix.
+/// Puts `f` after decimal fractions that have no suffix, and makes the `L` of whole numbers `LL`: with
+/// one DXC takes 32 of their bits (`tests/upstream/dxc-long-literal`).
 pub fn suffixed(text: &str) -> String {
     let mut all = String::with_capacity(text.len() + text.len() / 32);
     for line in text.split_inclusive('\n') {
@@ -42,11 +43,25 @@ pub fn suffixed(text: &str) -> String {
             all.push_str(token);
             let is_fraction =
                 token.contains(['.', 'e']) && token.starts_with(|c: char| c.is_ascii_digit());
+            let is_number = token.starts_with(|c: char| c.is_ascii_digit());
             if is_fraction && length > 1 && !after.starts_with(is_name) {
                 all.push('f');
             }
             before = token.chars().next_back().unwrap_or(' ');
             rest = after;
+            if is_number && !is_fraction {
+                for suffix in ["uL", "L"] {
+                    if let Some(after) = rest.strip_prefix(suffix)
+                        && !after.starts_with(is_name)
+                    {
+                        all.push_str(suffix);
+                        all.push('L');
+                        before = 'L';
+                        rest = after;
+                        break;
+                    }
+                }
+            }
         }
         all.push_str(comment);
     }
@@ -142,6 +157,16 @@ mod tests {
         assert_eq!(
             suffixed("a1.x = 1.5 * 2 - 1e25 + 3u; // 1.5\nb = x2e3(0.5L, 1.0f, 7, 2.5e-7, 1e-3)\n"),
             "a1.x = 1.5f * 2 - 1e25f + 3u; // 1.5\nb = x2e3(0.5L, 1.0f, 7, 2.5e-7f, 1e-3f)\n"
+        );
+    }
+
+    #[test]
+    fn long_numbers_are_as_long_as_they_say() {
+        assert_eq!(
+            suffixed(
+                "a = (x + 13787848793156543929uL) >> 7u; b = (-9223372036854775807L - 1L) * 2.5L;\n"
+            ),
+            "a = (x + 13787848793156543929uLL) >> 7u; b = (-9223372036854775807LL - 1LL) * 2.5L;\n"
         );
     }
 

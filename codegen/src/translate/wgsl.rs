@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use naga::back::wgsl;
-use naga::{ImageClass, StorageFormat, TypeInner};
+use naga::back::pipeline_constants::process_overrides;
+use naga::back::{PipelineConstants, wgsl};
+use naga::valid::ModuleInfo;
+use naga::{ImageClass, Module, StorageFormat, TypeInner};
 
 use super::{Job, Place, Text, Written, text, validate};
 use crate::Language;
@@ -16,7 +18,10 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let ir = job.ir;
     let source = wgsl::write_string(&ir.module, &ir.info, wgsl::WriterFlags::empty())
         .map_err(|error| job.failure(&error))?;
-    read_back(&source, &job.kernel.name)?;
+    let read = read_back(&source, &job.kernel.name)?;
+    if !can_be_set(&read) {
+        return Ok(Written::Unsettable);
+    }
     let places = job
         .bound()
         .iter()
@@ -96,7 +101,14 @@ fn source_after_stage(source: &str) -> String {
         .map_or_else(String::new, |place| rest[place..].to_owned())
 }
 
-fn read_back(source: &str, name: &str) -> Result<(), Failure> {
+/// Whether wgpu can set the constants. naga 30.0.1 folds every function when it does, and may
+/// come to a module that its own validator refuses.
+fn can_be_set((module, info): &(Module, ModuleInfo)) -> bool {
+    module.overrides.is_empty()
+        || process_overrides(module, info, None, &PipelineConstants::default()).is_ok()
+}
+
+fn read_back(source: &str, name: &str) -> Result<(Module, ModuleInfo), Failure> {
     let step = Step::Reread(Language::Wgsl);
     let module = naga::front::wgsl::parse_str(source).map_err(|error| Failure {
         kernel: name.into(),
@@ -108,7 +120,6 @@ fn read_back(source: &str, name: &str) -> Result<(), Failure> {
         message: error.message().to_owned(),
         panicked: false,
     })?;
-    validate(&module, name)
-        .map(drop)
-        .map_err(|failure| Failure { step, ..failure })
+    let info = validate(&module, name).map_err(|failure| Failure { step, ..failure })?;
+    Ok((module, info))
 }

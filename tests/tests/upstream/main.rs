@@ -1,6 +1,8 @@
 //! Bugs of other people's tools that Hankel works around: each of `tests/upstream` is still there.
 //! A test that fails here says which workaround can go.
 
+mod meaning;
+
 use std::env;
 use std::ffi::OsStr;
 use std::fs;
@@ -549,7 +551,7 @@ fn naga_calls_functions_of_doubles_that_hlsl_lacks() {
 
 #[test]
 fn naga_computes_the_condition_of_a_loop_again() {
-    const MENDED: &str = "mended: drop the workaround in codegen/src/translate/cleanup.rs, `plain_loops` and `has_late_loops`";
+    const MENDED: &str = "mended: drop the workaround in codegen/src/translate/cleanup/loops.rs, `plain_loops` and `has_late_loops`";
     let module = wgsl("naga-late-loops");
     let written = spv::write_vec(&module.0, &module.1, &spv::Options::default(), None);
     let words = written.unwrap_or_else(|e| panic!("{e}"));

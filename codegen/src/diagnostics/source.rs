@@ -1,0 +1,425 @@
+//! Looks through a kernel crate's own source for what Rust accepts and shaders do not have, before
+//! anything is compiled.
+//!
+//! It reads syntax, not types, and speaks up only where syntax is enough:
+//!
+//! - a kernel that `kernels![…]` does not list, which nobody would get;
+//! - in kernels and what they call: recursion, statics, trait objects, function pointers, numbers of
+//!   8, 16 and 128 bits.
+//!
+//! What it does not see, rust-gpu refuses later. Calls are followed by name within the crate; a name
+//! that several functions have is not followed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use proc_macro2::Span;
+use syn::punctuated::Punctuated;
+use syn::visit::Visit;
+
+use super::{Diagnostic, Level, Place, shown};
+
+/// A function of the crate.
+struct Function {
+    file: usize,
+    name: Span,
+    is_kernel: bool,
+    /// Names of functions that it calls by a path, each with the place of the first call.
+    calls: BTreeMap<String, Span>,
+    /// Everything that it names.
+    names: BTreeSet<String>,
+    /// What no shader has: where, what, and what to do.
+    refused: Vec<(Span, String, &'static str)>,
+}
+
+#[derive(Default)]
+struct Crate {
+    files: Vec<PathBuf>,
+    functions: BTreeMap<String, Vec<Function>>,
+    statics: BTreeMap<String, (usize, Span)>,
+    /// Names that `kernels![…]` lists; none if it was not found.
+    listed: Option<BTreeSet<String>>,
+}
+
+/// Looks through the crate whose Cargo.toml lies in `folder`. A file that cannot be read or parsed is
+/// left to rustc.
+#[must_use]
+pub fn check(folder: &Path) -> Vec<Diagnostic> {
+    let mut all = Crate::default();
+    for path in rust_files(&folder.join("src")) {
+        let Ok(text) = std::fs::read_to_string(&path) else {
+            continue;
+        };
+        if let Ok(parsed) = syn::parse_file(&text) {
+            all.files.push(path);
+            let file = all.files.len() - 1;
+            Items {
+                all: &mut all,
+                file,
+            }
+            .visit_file(&parsed);
+        }
+    }
+    all.diagnostics()
+}
+
+/// Rust sources below a folder, in order; not those of programs.
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(&next).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                if path != folder.join("bin") {
+                    folders.push(path);
+                }
+            } else if path.extension().is_some_and(|it| it == "rs") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+impl Crate {
+    fn place(&self, file: usize, span: Span) -> Place {
+        let (start, end) = (span.start(), span.end());
+        Place {
+            file: shown(&self.files[file]),
+            line: start.line as u32,
+            column: start.column as u32 + 1,
+            length: match end.line == start.line {
+                true => (end.column - start.column).max(1) as u32,
+                false => 1,
+            },
+        }
+    }
+
+    fn diagnostics(&self) -> Vec<Diagnostic> {
+        let mut found = self.unlisted();
+        for name in self.reached() {
+            let [function] = self.functions[&name].as_slice() else {
+                continue;
+            };
+            let mut tell = |file, span, message: String, help: &str| {
+                found.push(Diagnostic {
+                    place: Some(self.place(file, span)),
+                    level: Level::Error,
+                    message,
+                    help: vec![help.into()],
+                });
+            };
+            for (span, message, help) in &function.refused {
+                tell(function.file, *span, message.clone(), help);
+            }
+            if let Some(span) = self.way_back(&name) {
+                tell(
+                    function.file,
+                    span,
+                    format!("`{name}` calls itself, and a shader has no stack to do so"),
+                    "write a loop; where it branches, with an array of what is left to do",
+                );
+            }
+            for (other, (file, span)) in &self.statics {
+                if function.names.contains(other) {
+                    tell(
+                        *file,
+                        *span,
+                        format!("`{other}` is a static, and a shader has none"),
+                        "write `const`",
+                    );
+                }
+            }
+        }
+        found.sort();
+        found.dedup();
+        found
+    }
+
+    fn unlisted(&self) -> Vec<Diagnostic> {
+        let Some(listed) = &self.listed else {
+            return Vec::new();
+        };
+        let kernels = self.functions.iter().flat_map(|(name, all)| {
+            all.iter()
+                .filter(|function| function.is_kernel)
+                .map(move |function| (name, function))
+        });
+        kernels
+            .filter(|(name, _)| !listed.contains(*name))
+            .map(|(name, function)| Diagnostic {
+                place: Some(self.place(function.file, function.name)),
+                level: Level::Error,
+                message: format!("the kernel `{name}` is not listed, so that nobody gets it"),
+                help: vec![format!("add `{name}` to the crate's `kernels![…]`")],
+            })
+            .collect()
+    }
+
+    /// Kernels that are listed, and the crate's functions that they call, by name.
+    fn reached(&self) -> BTreeSet<String> {
+        let is_kernel = |name: &str| self.functions[name].iter().any(|it| it.is_kernel);
+        let mut open: Vec<&String> = self.functions.keys().filter(|it| is_kernel(it)).collect();
+        let mut reached = BTreeSet::new();
+        while let Some(name) = open.pop() {
+            if !reached.insert(name.clone()) {
+                continue;
+            }
+            let [function] = self.functions[name].as_slice() else {
+                continue;
+            };
+            open.extend(
+                function
+                    .names
+                    .iter()
+                    .filter(|other| self.functions.contains_key(*other)),
+            );
+        }
+        reached
+    }
+
+    /// The call of `name` by which it comes back to itself.
+    fn way_back(&self, name: &str) -> Option<Span> {
+        let calls = |of: &str| match self.functions.get(of).map(Vec::as_slice) {
+            Some([function]) => Some(&function.calls),
+            _ => None,
+        };
+        for (first, span) in calls(name)? {
+            let mut open = vec![first.as_str()];
+            let mut seen = BTreeSet::new();
+            while let Some(next) = open.pop() {
+                if next == name {
+                    return Some(*span);
+                }
+                if seen.insert(next) {
+                    open.extend(
+                        calls(next)
+                            .into_iter()
+                            .flatten()
+                            .map(|(name, _)| name.as_str()),
+                    );
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Whether an item is not part of the shaders: tests, or what is kept from them.
+fn is_elsewhere(attributes: &[syn::Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        let is_cfg = attribute.path().is_ident("cfg");
+        let text = quote::ToTokens::to_token_stream(&attribute.meta).to_string();
+        is_cfg && (text.contains("test") || text.contains("not"))
+    })
+}
+
+struct Items<'a> {
+    all: &'a mut Crate,
+    file: usize,
+}
+
+impl Items<'_> {
+    fn function(
+        &mut self,
+        attributes: &[syn::Attribute],
+        signature: &syn::Signature,
+        block: &syn::Block,
+    ) {
+        let mut body = Body::default();
+        body.visit_signature(signature);
+        body.visit_block(block);
+        let last = |attribute: &syn::Attribute| {
+            attribute
+                .path()
+                .segments
+                .last()
+                .map(|it| it.ident.to_string())
+        };
+        let function = Function {
+            file: self.file,
+            name: signature.ident.span(),
+            is_kernel: attributes
+                .iter()
+                .any(|attribute| last(attribute).as_deref() == Some("kernel")),
+            calls: body.calls,
+            names: body.names,
+            refused: body.refused,
+        };
+        let name = signature.ident.to_string();
+        self.all.functions.entry(name).or_default().push(function);
+    }
+}
+
+impl<'ast> Visit<'ast> for Items<'_> {
+    fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
+        if !is_elsewhere(&item.attrs) {
+            syn::visit::visit_item_mod(self, item);
+        }
+    }
+
+    fn visit_item_fn(&mut self, item: &'ast syn::ItemFn) {
+        if !is_elsewhere(&item.attrs) {
+            self.function(&item.attrs, &item.sig, &item.block);
+        }
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &'ast syn::ImplItemFn) {
+        if !is_elsewhere(&item.attrs) {
+            self.function(&item.attrs, &item.sig, &item.block);
+        }
+    }
+
+    fn visit_item_static(&mut self, item: &'ast syn::ItemStatic) {
+        if !is_elsewhere(&item.attrs) {
+            let place = (self.file, item.ident.span());
+            self.all.statics.insert(item.ident.to_string(), place);
+        }
+    }
+
+    fn visit_macro(&mut self, item: &'ast syn::Macro) {
+        let is_list = item
+            .path
+            .segments
+            .last()
+            .is_some_and(|it| it.ident == "kernels");
+        if !is_list {
+            return;
+        }
+        let paths = item.parse_body_with(Punctuated::<syn::Path, syn::Token![,]>::parse_terminated);
+        let listed = self.all.listed.get_or_insert_default();
+        for path in paths.into_iter().flatten() {
+            listed.extend(path.segments.last().map(|it| it.ident.to_string()));
+        }
+    }
+}
+
+/// What is in a function.
+#[derive(Default)]
+struct Body {
+    calls: BTreeMap<String, Span>,
+    names: BTreeSet<String>,
+    refused: Vec<(Span, String, &'static str)>,
+}
+
+const WIDTHS: [&str; 6] = ["u8", "i8", "u16", "i16", "u128", "i128"];
+
+impl<'ast> Visit<'ast> for Body {
+    fn visit_expr_call(&mut self, call: &'ast syn::ExprCall) {
+        if let syn::Expr::Path(path) = &*call.func
+            && path.qself.is_none()
+            && let Some(last) = path.path.segments.last()
+        {
+            let name = last.ident.to_string();
+            self.calls.entry(name).or_insert_with(|| last.ident.span());
+        }
+        syn::visit::visit_expr_call(self, call);
+    }
+
+    fn visit_ident(&mut self, ident: &'ast proc_macro2::Ident) {
+        self.names.insert(ident.to_string());
+    }
+
+    fn visit_type_path(&mut self, ty: &'ast syn::TypePath) {
+        if let Some(ident) = ty.path.get_ident()
+            && WIDTHS.iter().any(|width| ident == width)
+        {
+            self.refused.push((
+                ident.span(),
+                format!("shaders have no `{ident}`: they compute with 32 bits, and some with 64"),
+                "write `u32` or `i32`, with a mask or shifts where the width matters",
+            ));
+        }
+        syn::visit::visit_type_path(self, ty);
+    }
+
+    fn visit_type_trait_object(&mut self, ty: &'ast syn::TypeTraitObject) {
+        self.refused.push((
+            ty.dyn_token.map_or_else(Span::call_site, |it| it.span),
+            "a shader has no trait objects: which function is called must be known".into(),
+            "take `impl Trait` or a type parameter, or match on an enum",
+        ));
+        syn::visit::visit_type_trait_object(self, ty);
+    }
+
+    fn visit_type_bare_fn(&mut self, ty: &'ast syn::TypeBareFn) {
+        self.refused.push((
+            ty.fn_token.span,
+            "a shader has no function pointers: which function is called must be known".into(),
+            "take `impl Fn(…) -> …`, or match on an enum",
+        ));
+        syn::visit::visit_type_bare_fn(self, ty);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(source: &str) -> Vec<String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("src")).unwrap();
+        std::fs::write(folder.path().join("src/lib.rs"), source).unwrap();
+        check(folder.path())
+            .into_iter()
+            .map(|it| {
+                let place = it.place.unwrap();
+                format!("{}:{} {}", place.line, place.column, it.message)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_kernel_that_is_not_listed_is_named() {
+        let found = told(
+            "#[kernel(compute, threads(64))]\npub fn one(x: f32) -> f32 { x }\n\
+             #[hankel_dsl::kernel(compute, threads(64))]\npub fn two(x: f32) -> f32 { x }\n\
+             #[cfg(test)] mod tests { #[kernel] fn three() {} }\nhankel_dsl::kernels![one];\n",
+        );
+        assert_eq!(
+            found,
+            ["4:8 the kernel `two` is not listed, so that nobody gets it"]
+        );
+        let none = told("#[kernel]\npub fn one(x: f32) -> f32 { x }\n");
+        assert!(none.is_empty(), "{none:?}");
+    }
+
+    #[test]
+    fn what_a_shader_lacks_is_named_where_a_kernel_comes_to_it() {
+        let found = told(
+            "static TABLE: [f32; 2] = [1.0, 2.0];\n\
+             fn even(n: u32) -> bool { n == 0 || odd(n - 1) }\n\
+             fn odd(n: u32) -> bool { n != 0 && even(n - 1) }\n\
+             fn shape(s: &dyn Shape) -> f32 { s.at(1.0) }\n\
+             fn bytes(x: u32) -> u32 { x as u8 as u32 }\n\
+             fn call(f: fn(f32) -> f32) -> f32 { f(1.0) }\n\
+             fn never(x: u8) -> u8 { never(x) }\n\
+             #[kernel(compute)]\n\
+             fn k(n: u32) -> f32 { if even(n) { TABLE[0] } else { shape(&S) + call(g) + bytes(n) as f32 } }\n\
+             kernels![k];",
+        );
+        assert_eq!(
+            found,
+            [
+                "1:8 `TABLE` is a static, and a shader has none",
+                "2:37 `even` calls itself, and a shader has no stack to do so",
+                "3:36 `odd` calls itself, and a shader has no stack to do so",
+                "4:14 a shader has no trait objects: which function is called must be known",
+                "5:32 shaders have no `u8`: they compute with 32 bits, and some with 64",
+                "6:12 a shader has no function pointers: which function is called must be known",
+            ]
+        );
+    }
+
+    #[test]
+    fn plain_kernels_are_left_alone() {
+        let found = told(
+            "struct S; impl S { fn new() -> Self { S } }\nstruct T; impl T { fn new(s: S) -> Self { T } }\n\
+             fn twice(f: impl Fn(f32) -> f32) -> f32 { f(f(1.0)) }\n\
+             #[kernel(compute)]\nfn k(x: f32) -> f32 { let t = T::new(S::new()); twice(|y| y * x) }\nkernels![k];",
+        );
+        assert!(found.is_empty(), "{found:?}");
+    }
+}

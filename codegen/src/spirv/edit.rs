@@ -1,0 +1,212 @@
+//! What several edits need: new ids, and types and constants that are there once.
+
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{GlslStd450Op as GLOp, Op, Word};
+
+use super::{id, literal, op};
+
+/// Makes instructions for a module whose functions were taken out of it.
+pub struct Editor<'a> {
+    module: &'a mut Module,
+}
+
+/// A scalar type of floating-point numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FloatType {
+    pub id: Word,
+    pub bits: u32,
+}
+
+impl<'a> Editor<'a> {
+    pub fn new(module: &'a mut Module) -> Self {
+        Self { module }
+    }
+
+    /// An id that nothing has.
+    pub fn new_id(&mut self) -> Word {
+        match &mut self.module.header {
+            Some(header) => {
+                header.bound += 1;
+                header.bound - 1
+            }
+            None => 0,
+        }
+    }
+
+    fn once(&mut self, op_code: Op, ty: Option<Word>, operands: Vec<Operand>) -> Word {
+        let there = self
+            .module
+            .types_global_values
+            .iter()
+            .find(|it| op(it) == op_code && it.result_type == ty && it.operands == operands);
+        if let Some(found) = there.and_then(|it| it.result_id) {
+            return found;
+        }
+        let new = self.new_id();
+        self.module
+            .types_global_values
+            .push(Instruction::new(op_code, ty, Some(new), operands));
+        new
+    }
+
+    pub fn bool_type(&mut self) -> Word {
+        self.once(Op::TypeBool, None, Vec::new())
+    }
+
+    /// 32 bits without a sign.
+    pub fn word_type(&mut self) -> Word {
+        let operands = vec![Operand::LiteralBit32(32), Operand::LiteralBit32(0)];
+        self.once(Op::TypeInt, None, operands)
+    }
+
+    /// `ty`, if it is a scalar of floats of 32 or 64 bits.
+    pub fn float_type(&self, ty: Word) -> Option<FloatType> {
+        let found = super::global(self.module, ty).filter(|it| op(it) == Op::TypeFloat)?;
+        let bits = literal(found, 0).filter(|bits| matches!(bits, 32 | 64))?;
+        Some(FloatType { id: ty, bits })
+    }
+
+    /// Bits and sign of an integer scalar type.
+    pub fn integer_type(&self, ty: Word) -> Option<(u32, bool)> {
+        let found = super::global(self.module, ty).filter(|it| op(it) == Op::TypeInt)?;
+        Some((literal(found, 0)?, literal(found, 1)? == 1))
+    }
+
+    pub fn word(&mut self, value: u32) -> Word {
+        let ty = self.word_type();
+        self.once(Op::Constant, Some(ty), vec![Operand::LiteralBit32(value)])
+    }
+
+    /// A 32-bit integer of type `ty`.
+    pub fn integer(&mut self, ty: Word, value: u32) -> Word {
+        self.once(Op::Constant, Some(ty), vec![Operand::LiteralBit32(value)])
+    }
+
+    pub fn float(&mut self, ty: FloatType, value: f64) -> Word {
+        let operand = match ty.bits {
+            32 => Operand::LiteralBit32((value as f32).to_bits()),
+            _ => Operand::LiteralBit64(value.to_bits()),
+        };
+        self.once(Op::Constant, Some(ty.id), vec![operand])
+    }
+
+    /// The value of a constant of floats, not of a specialisation constant.
+    pub fn float_value(&self, constant: Word) -> Option<f64> {
+        let found = super::global(self.module, constant).filter(|it| op(it) == Op::Constant)?;
+        let ty = self.float_type(found.result_type?)?;
+        match (ty.bits, found.operands.first()?) {
+            (32, Operand::LiteralBit32(bits)) => Some(f32::from_bits(*bits).into()),
+            (64, Operand::LiteralBit64(bits)) => Some(f64::from_bits(*bits)),
+            _ => None,
+        }
+    }
+
+    /// The value of a constant of integers, with its sign.
+    pub fn integer_value(&self, constant: Word) -> Option<i64> {
+        let found = super::global(self.module, constant).filter(|it| op(it) == Op::Constant)?;
+        let (_, signed) = self.integer_type(found.result_type?)?;
+        Some(match *found.operands.first()? {
+            Operand::LiteralBit32(bits) if signed => (bits as i32).into(),
+            Operand::LiteralBit32(bits) => bits.into(),
+            Operand::LiteralBit64(bits) => bits as i64,
+            _ => return None,
+        })
+    }
+
+    /// The set of GLSL's functions, if the module has it.
+    pub fn functions_set(&self) -> Option<Word> {
+        self.module
+            .ext_inst_imports
+            .iter()
+            .find(|it| it.operands.first() == Some(&Operand::LiteralString("GLSL.std.450".into())))
+            .and_then(|it| it.result_id)
+    }
+}
+
+/// Instructions that take the place of one; the last of them has its id.
+pub struct Sequence<'e, 'm> {
+    editor: &'e mut Editor<'m>,
+    set: Word,
+    made: Vec<Instruction>,
+}
+
+impl<'e, 'm> Sequence<'e, 'm> {
+    /// `set` is that of GLSL's functions.
+    pub fn new(editor: &'e mut Editor<'m>, set: Word) -> Self {
+        Self {
+            editor,
+            set,
+            made: Vec::new(),
+        }
+    }
+
+    pub fn then(&mut self, op_code: Op, ty: Word, operands: &[Word]) -> Word {
+        let new = self.editor.new_id();
+        let operands = operands.iter().map(|it| Operand::IdRef(*it)).collect();
+        self.made
+            .push(Instruction::new(op_code, Some(ty), Some(new), operands));
+        new
+    }
+
+    /// One of GLSL's functions.
+    pub fn call(&mut self, function: GLOp, ty: Word, arguments: &[Word]) -> Word {
+        let new = self.editor.new_id();
+        let mut operands = vec![
+            Operand::IdRef(self.set),
+            Operand::LiteralExtInstInteger(function as u32),
+        ];
+        operands.extend(arguments.iter().map(|it| Operand::IdRef(*it)));
+        self.made
+            .push(Instruction::new(Op::ExtInst, Some(ty), Some(new), operands));
+        new
+    }
+
+    /// The instructions as they are.
+    pub fn ending_in_itself(self) -> Vec<Instruction> {
+        self.made
+    }
+
+    /// The instructions, of which the last makes `result`.
+    pub fn ending_in(mut self, result: Word) -> Vec<Instruction> {
+        if let Some(last) = self.made.last_mut() {
+            last.result_id = Some(result);
+        }
+        self.made
+    }
+}
+
+/// The function, if the instruction calls one of GLSL's; its arguments begin at the third operand.
+pub fn called(instruction: &Instruction, set: Word) -> Option<GLOp> {
+    if op(instruction) != Op::ExtInst || id(instruction, 0) != Some(set) {
+        return None;
+    }
+    match instruction.operands.get(1) {
+        Some(Operand::LiteralExtInstInteger(number)) => GLOp::from_u32(*number),
+        _ => None,
+    }
+}
+
+/// Whether an instruction calls `function`, of whichever set: a module has no other.
+pub fn is_call(instruction: &Instruction, function: GLOp) -> bool {
+    op(instruction) == Op::ExtInst
+        && instruction.operands.get(1) == Some(&Operand::LiteralExtInstInteger(function as u32))
+}
+
+/// Replaces instructions of functions by others: `by` gives those, or nothing.
+pub fn replace_each(
+    module: &mut Module,
+    mut by: impl FnMut(&mut Editor<'_>, &Instruction) -> Option<Vec<Instruction>>,
+) {
+    let mut functions = std::mem::take(&mut module.functions);
+    let mut editor = Editor::new(module);
+    for block in functions.iter_mut().flat_map(|it| &mut it.blocks) {
+        let old = std::mem::take(&mut block.instructions);
+        for instruction in old {
+            match by(&mut editor, &instruction) {
+                Some(new) => block.instructions.extend(new),
+                None => block.instructions.push(instruction),
+            }
+        }
+    }
+    module.functions = functions;
+}

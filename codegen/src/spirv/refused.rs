@@ -1,0 +1,72 @@
+//! What rust-gpu 0.10.0 gets wrong, and nothing after it can put right: the kernel is refused, at the
+//! author's line.
+//!
+//! Rotations of 64-bit numbers: it rotates by the amount modulo 32 and takes what falls off from 32
+//! bits (EmbarkStudios/rust-gpu#1062). Constant amounts of 3 and 35 look alike afterwards.
+
+use std::collections::HashMap;
+
+use rspirv::dr::{Instruction, Module};
+use rspirv::spirv::{Op, Word};
+
+use super::lines::Lines;
+use super::{global, id, literal, op};
+use crate::error::{Failure, Step};
+
+/// Looks through a module as rust-gpu writes it.
+///
+/// # Errors
+///
+/// The first thing that is wrong.
+pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
+    let made: HashMap<Word, &Instruction> = module
+        .functions
+        .iter()
+        .flat_map(|function| function.all_inst_iter())
+        .filter_map(|it| Some((it.result_id?, it)))
+        .collect();
+    for function in &module.functions {
+        for block in &function.blocks {
+            for (place, it) in block.instructions.iter().enumerate() {
+                if op(it) == Op::Select && rotates_wrongly(module, &made, it) == Some(true) {
+                    return Err(Failure {
+                        kernel: kernel.into(),
+                        step: Step::Meaning,
+                        construct: Lines::of(module).before(block, place),
+                        message: "rust-gpu rotates a 64-bit number as if it had 32 bits: write \
+                                  `(x << n) | (x >> (64 - n))` with n between 1 and 63 for \
+                                  `x.rotate_left(n)`"
+                            .into(),
+                        panicked: false,
+                    });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `n == 0 ? x : (x << n | x >> m)` of 64 bits, or the other way round: rust-gpu writes nothing else
+/// so, and a person `m = 64 - n`, which is no constant of 32.
+fn rotates_wrongly(
+    module: &Module,
+    made: &HashMap<Word, &Instruction>,
+    select: &Instruction,
+) -> Option<bool> {
+    let ty = global(module, select.result_type?)?;
+    if op(ty) != Op::TypeInt || literal(ty, 0) != Some(64) {
+        return Some(false);
+    }
+    let is =
+        |word: Option<Word>, wanted: Op| made.get(&word?).copied().filter(|it| op(it) == wanted);
+    let zero = is(id(select, 0), Op::IEqual)?;
+    let both = is(id(select, 2), Op::BitwiseOr)?;
+    let (first, second) = (id(both, 0), id(both, 1));
+    let left = is(first, Op::ShiftLeftLogical).or(is(second, Op::ShiftLeftLogical))?;
+    let right = is(first, Op::ShiftRightLogical).or(is(second, Op::ShiftRightLogical))?;
+    let number = id(select, 1);
+    let same = id(left, 0) == number && id(right, 0) == number;
+    let amount = id(zero, 0);
+    let by_it = id(left, 1) == amount || id(right, 1) == amount;
+    Some(same && by_it)
+}

@@ -1,0 +1,112 @@
+//! Names for what has none: results, and what is loaded.
+
+use naga::{Expression, FunctionResult, Handle, ImageQuery, Module, Type, TypeInner};
+
+/// Names the structure that a vertex or fragment stage with several outputs returns.
+pub fn name_result(module: &mut Module, name: &str, members: &[String]) {
+    let Some(FunctionResult { ty, .. }) = module
+        .entry_points
+        .first()
+        .and_then(|entry| entry.function.result.clone())
+    else {
+        return;
+    };
+    let mut named = module.types[ty].clone();
+    let TypeInner::Struct {
+        members: fields, ..
+    } = &mut named.inner
+    else {
+        return;
+    };
+    if named.name.is_some() || fields.len() != members.len() {
+        return;
+    }
+    for (field, member) in fields.iter_mut().zip(members) {
+        field.name = Some(member.clone());
+    }
+    named.name = Some(name.into());
+    module.types.replace(ty, named);
+}
+
+/// Names loaded values after the member, structure or texture that they come from.
+pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
+    if module.entry_points.len() != 1 {
+        return;
+    }
+    let function = &module.entry_points[0].function;
+    let types = info.get_entry_point(0);
+    let pointee = |pointer: Handle<Expression>| match *types[pointer].ty.inner_with(&module.types) {
+        TypeInner::Pointer { base, .. } => Some(&module.types[base]),
+        _ => None,
+    };
+    let mut names = Vec::new();
+    for (handle, expression) in function.expressions.iter() {
+        let name = match *expression {
+            Expression::Load { pointer } => match function.expressions[pointer] {
+                Expression::AccessIndex { base, index } => match pointee(base) {
+                    Some(Type {
+                        inner: TypeInner::Struct { members, .. },
+                        ..
+                    }) => members[index as usize].name.clone(),
+                    _ => None,
+                },
+                Expression::Access { .. } => match pointee(pointer) {
+                    Some(Type {
+                        name: Some(name),
+                        inner: TypeInner::Struct { .. },
+                    }) => Some(snake_case(name)),
+                    _ => None,
+                },
+                _ => None,
+            },
+            Expression::ImageLoad { image, .. } | Expression::ImageSample { image, .. } => {
+                texture_name(module, function, image).map(|name| format!("{name}_texel"))
+            }
+            Expression::ImageQuery {
+                image,
+                query: ImageQuery::Size { .. },
+            } => texture_name(module, function, image).map(|name| format!("{name}_size")),
+            _ => None,
+        };
+        names.extend(name.map(|name| (handle, name)));
+    }
+    module.entry_points[0]
+        .function
+        .named_expressions
+        .extend(names);
+}
+
+fn texture_name(
+    module: &Module,
+    function: &naga::Function,
+    image: Handle<Expression>,
+) -> Option<String> {
+    match function.expressions[image] {
+        Expression::GlobalVariable(global) => module.global_variables[global].name.clone(),
+        _ => None,
+    }
+}
+
+/// `DepthPair` to `depth_pair`.
+fn snake_case(name: &str) -> String {
+    let mut snake = String::new();
+    let mut after_small = false;
+    for letter in name.chars() {
+        if letter.is_uppercase() && after_small {
+            snake.push('_');
+        }
+        after_small = !letter.is_uppercase() && letter != '_';
+        snake.extend(letter.to_lowercase());
+    }
+    snake
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn snake_case_parts_words() {
+        assert_eq!(super::snake_case("DepthPair"), "depth_pair");
+        assert_eq!(super::snake_case("Moments4"), "moments4");
+        assert_eq!(super::snake_case("VSM"), "vsm");
+    }
+}

@@ -1,0 +1,292 @@
+//! What naga's SPIR-V reader and its writers need of a module, done to a copy of it before it is
+//! read: edits are easier and safer there than in naga's trees, where every expression must follow
+//! what it uses.
+//!
+//! | what | without it | case in `tests/upstream` |
+//! | --- | --- | --- |
+//! | a type of two whole numbers for coordinates into arrays of textures | naga 30.0.1 panics | `naga-arrayed-fetch` |
+//! | the remainder of signed numbers in GLSL | `%`, which GLSL leaves undefined below zero | `naga-glsl-remainder` |
+//! | exchanged bytes in HLSL | DXC 1.7 makes an intrinsic of them that Direct3D does not have | `dxc-byte-swap` |
+//!
+//! And what the reader drops without a word is looked for: [`Dropped`].
+
+use std::collections::{BTreeMap, HashMap};
+
+use naga::Sampling;
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{Decoration, ImageOperands, Op, StorageClass, Word};
+
+use crate::Language;
+use crate::spirv::edit::{Sequence, replace_each};
+use crate::spirv::{decoration, global, id, literal, op};
+
+/// What naga's reader does not take over.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dropped {
+    /// What no text can say, since naga does not have it.
+    pub reason: Option<String>,
+    /// Where varyings are evaluated, by whether they are inputs, and location.
+    pub sampling: BTreeMap<(bool, u32), Sampling>,
+}
+
+impl Dropped {
+    /// Looks through a module.
+    pub fn of(module: &Module) -> Self {
+        let reason = module
+            .functions
+            .iter()
+            .flat_map(|function| function.all_inst_iter())
+            .find_map(|it| dropped(module, it));
+        Self {
+            reason,
+            sampling: samplings(module),
+        }
+    }
+}
+
+/// Why a sampling instruction means less in naga's representation.
+fn dropped(module: &Module, instruction: &Instruction) -> Option<String> {
+    let (compares, place) = match op(instruction) {
+        Op::ImageSampleDrefImplicitLod
+        | Op::ImageSampleDrefExplicitLod
+        | Op::ImageSampleProjDrefImplicitLod
+        | Op::ImageSampleProjDrefExplicitLod
+        | Op::ImageDrefGather => (true, 3),
+        Op::ImageSampleImplicitLod
+        | Op::ImageSampleExplicitLod
+        | Op::ImageSampleProjImplicitLod
+        | Op::ImageSampleProjExplicitLod => (false, 2),
+        Op::ImageGather => (false, 3),
+        _ => return None,
+    };
+    let Some(Operand::ImageOperands(operands)) = instruction.operands.get(place) else {
+        return None;
+    };
+    let known = ImageOperands::BIAS
+        | ImageOperands::LOD
+        | ImageOperands::GRAD
+        | ImageOperands::CONST_OFFSET;
+    if !known.contains(*operands) {
+        return Some(format!(
+            "naga drops what a texture is sampled with: {:?}",
+            *operands - known
+        ));
+    }
+    if compares && operands.contains(ImageOperands::GRAD) {
+        return Some("naga compares at level 0 where gradients are given".into());
+    }
+    // Bias comes before the level.
+    let level = place + 1 + usize::from(operands.contains(ImageOperands::BIAS));
+    let at_zero = || {
+        let constant = global(module, id(instruction, level)?)?;
+        Some(op(constant) == Op::Constant && literal(constant, 0) == Some(0))
+    };
+    (compares && operands.contains(ImageOperands::LOD) && at_zero() != Some(true)).then(|| {
+        "naga compares at level 0 whichever level is given, and so would every text; WGSL and \
+         GLSL ES have no comparison at a level"
+            .into()
+    })
+}
+
+fn samplings(module: &Module) -> BTreeMap<(bool, u32), Sampling> {
+    module
+        .annotations
+        .iter()
+        .filter(|note| op(note) == Op::Decorate)
+        .filter_map(|note| {
+            let sampling = match note.operands.get(1)? {
+                Operand::Decoration(Decoration::Centroid) => Sampling::Centroid,
+                Operand::Decoration(Decoration::Sample) => Sampling::Sample,
+                _ => return None,
+            };
+            let variable = id(note, 0)?;
+            let location = decoration(module, variable, Decoration::Location)?;
+            let class = global(module, variable)?.operands.first()?;
+            let input = *class == Operand::StorageClass(StorageClass::Input);
+            Some(((input, location), sampling))
+        })
+        .collect()
+}
+
+/// Edits that every language needs. Says whether there were any.
+pub fn for_reader(module: &mut Module) -> bool {
+    coordinate_types(module)
+}
+
+/// Edits that a language needs. Says whether there were any.
+pub fn for_language(module: &mut Module, language: Language) -> bool {
+    match language {
+        Language::Glsl | Language::Essl310 | Language::Essl300 => remainders(module),
+        Language::Hlsl => swapped_bytes(module),
+        Language::Spirv | Language::Wgsl | Language::Msl => false,
+    }
+}
+
+/// naga looks for the type of a coordinate without the layer, which nobody may have used.
+fn coordinate_types(module: &mut Module) -> bool {
+    let types: HashMap<Word, Word> = module
+        .all_inst_iter()
+        .filter_map(|it| Some((it.result_id?, it.result_type?)))
+        .collect();
+    let mut wanted = Vec::new();
+    for it in module.functions.iter().flat_map(|it| it.all_inst_iter()) {
+        let (image, coordinate) = match op(it) {
+            Op::ImageFetch | Op::ImageRead | Op::ImageWrite => (id(it, 0), id(it, 1)),
+            _ => continue,
+        };
+        let vector = || {
+            let image = global(module, *types.get(&image?)?)?;
+            let arrayed = literal(image, 3) == Some(1);
+            let vector = global(module, *types.get(&coordinate?)?)?;
+            let size = literal(vector, 1)?;
+            let is_vector = op(vector) == Op::TypeVector && arrayed && size > 2;
+            is_vector.then(|| Some((id(vector, 0)?, size - 1)))?
+        };
+        wanted.extend(vector());
+    }
+    let mut changed = false;
+    for (scalar, size) in wanted {
+        let operands = vec![Operand::IdRef(scalar), Operand::LiteralBit32(size)];
+        let there = module
+            .types_global_values
+            .iter()
+            .any(|it| op(it) == Op::TypeVector && it.operands == operands);
+        let Some(header) = module.header.as_mut().filter(|_| !there) else {
+            continue;
+        };
+        let new = Instruction::new(Op::TypeVector, None, Some(header.bound), operands);
+        header.bound += 1;
+        module.types_global_values.push(new);
+        changed = true;
+    }
+    changed
+}
+
+/// `x % y` of signed numbers is `x - x / y * y`: quotients are truncated everywhere.
+fn remainders(module: &mut Module) -> bool {
+    let mut changed = false;
+    replace_each(module, |editor, it| {
+        if op(it) != Op::SRem {
+            return None;
+        }
+        let (ty, result) = (it.result_type?, it.result_id?);
+        let (left, right) = (id(it, 0)?, id(it, 1)?);
+        let mut steps = Sequence::new(editor, 0);
+        let quotient = steps.then(Op::SDiv, ty, &[left, right]);
+        let product = steps.then(Op::IMul, ty, &[quotient, right]);
+        steps.then(Op::ISub, ty, &[left, product]);
+        changed = true;
+        Some(steps.ending_in(result))
+    });
+    changed
+}
+
+/// Where each byte of a 32-bit number comes from: a number and a byte of it, lowest first.
+type Bytes = [Option<(Word, usize)>; 4];
+
+struct Numbers {
+    /// What makes each number of the functions.
+    made: HashMap<Word, Instruction>,
+    constants: HashMap<Word, u32>,
+}
+
+impl Numbers {
+    fn bytes(&self, number: Word, depth: u32) -> Option<Bytes> {
+        let leaf = [0, 1, 2, 3].map(|byte| Some((number, byte)));
+        let Some(it) = self.made.get(&number).filter(|_| depth > 0) else {
+            return Some(leaf);
+        };
+        let (left, right) = (id(it, 0), id(it, 1));
+        let constant = |word: Option<Word>| self.constants.get(&word?).copied();
+        match op(it) {
+            Op::ShiftLeftLogical | Op::ShiftRightLogical => {
+                let Some(shift) = constant(right).filter(|by| by % 8 == 0 && *by < 32) else {
+                    return Some(leaf);
+                };
+                let from = self.bytes(left?, depth - 1)?;
+                let by = shift as usize / 8;
+                Some(std::array::from_fn(|byte| match op(it) {
+                    Op::ShiftLeftLogical => byte.checked_sub(by).and_then(|byte| from[byte]),
+                    _ => from.get(byte + by).copied().flatten(),
+                }))
+            }
+            Op::BitwiseAnd => {
+                let (mask, of) = match (constant(left), constant(right)) {
+                    (_, Some(mask)) => (mask, left?),
+                    (Some(mask), _) => (mask, right?),
+                    _ => return Some(leaf),
+                };
+                let mask = mask.to_le_bytes();
+                if mask.iter().any(|byte| !matches!(byte, 0 | 0xff)) {
+                    return Some(leaf);
+                }
+                let from = self.bytes(of, depth - 1)?;
+                Some(std::array::from_fn(|byte| {
+                    from[byte].filter(|_| mask[byte] != 0)
+                }))
+            }
+            Op::BitwiseOr => {
+                let (a, b) = (
+                    self.bytes(left?, depth - 1)?,
+                    self.bytes(right?, depth - 1)?,
+                );
+                let apart = a.iter().zip(&b).all(|(a, b)| a.is_none() || b.is_none());
+                if !apart {
+                    return Some(leaf);
+                }
+                Some(std::array::from_fn(|byte| a[byte].or(b[byte])))
+            }
+            _ => Some(leaf),
+        }
+    }
+
+    /// The number whose bytes, in the other order, `number` is made of.
+    fn swapped(&self, number: Word) -> Option<Word> {
+        let bytes = self.bytes(number, 8)?;
+        let (source, _) = bytes[0]?;
+        let all = (0..4).all(|byte| bytes[byte] == Some((source, 3 - byte)));
+        (all && source != number).then_some(source)
+    }
+}
+
+/// Exchanged bytes by way of exchanged bits, of which DXC makes nothing else.
+fn swapped_bytes(module: &mut Module) -> bool {
+    let made = module
+        .functions
+        .iter()
+        .flat_map(|function| function.all_inst_iter())
+        .filter_map(|it| Some((it.result_id?, it.clone())))
+        .collect();
+    let constants = module
+        .types_global_values
+        .iter()
+        .filter(|it| op(it) == Op::Constant)
+        .filter_map(|it| Some((it.result_id?, literal(it, 0)?)))
+        .collect();
+    let numbers = Numbers { made, constants };
+    let mut changed = false;
+    replace_each(module, |editor, it| {
+        if op(it) != Op::BitwiseOr {
+            return None;
+        }
+        let (ty, result) = (it.result_type?, it.result_id?);
+        if editor.integer_type(ty) != Some((32, false)) {
+            return None;
+        }
+        let source = numbers.swapped(result)?;
+        let steps_of = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f)];
+        let constants = steps_of.map(|(by, mask)| (editor.word(by), editor.word(mask)));
+        let mut steps = Sequence::new(editor, 0);
+        let mut bits = steps.then(Op::BitReverse, ty, &[source]);
+        for (by, mask) in constants {
+            let low = steps.then(Op::BitwiseAnd, ty, &[bits, mask]);
+            let up = steps.then(Op::ShiftLeftLogical, ty, &[low, by]);
+            let high = steps.then(Op::ShiftRightLogical, ty, &[bits, by]);
+            let down = steps.then(Op::BitwiseAnd, ty, &[high, mask]);
+            bits = steps.then(Op::BitwiseOr, ty, &[up, down]);
+        }
+        changed = true;
+        Some(steps.ending_in(result))
+    });
+    changed
+}

@@ -1,0 +1,221 @@
+//! What rust-gpu, naga or a language means otherwise than Rust does, and what is done about it. The
+//! modules are those of `tests/upstream`, where the bugs themselves are.
+
+mod support;
+
+use hankel_codegen::finish::finish;
+use hankel_codegen::translate::{Ir, Options, Text, Written};
+use hankel_codegen::{Language, Step};
+use hankel_dsl::native::describe::{Kernel, Stage};
+use rspirv::binary::Disassemble;
+
+/// A kernel about which nothing is said.
+fn kernel(stage: Stage) -> Kernel {
+    Kernel {
+        name: "main".into(),
+        stage,
+        params: Vec::new(),
+        outputs: Vec::new(),
+        ..support::tint()
+    }
+}
+
+fn compute() -> Kernel {
+    kernel(Stage::Compute {
+        threads: [1; 3],
+        dimensions: 1,
+        phases: 0,
+        workgroup_bytes: 0,
+    })
+}
+
+fn written(source: &str, kernel: &Kernel, language: Language, options: &Options) -> Written {
+    let ir = Ir::read(&support::assemble(source), kernel).unwrap_or_else(|e| panic!("{e}"));
+    ir.write(language, kernel, options)
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn text(source: &str, kernel: &Kernel, language: Language) -> String {
+    match written(source, kernel, language, &Options::default()) {
+        Written::Text(Text { source, .. }) => source,
+        other => panic!("{language}: {other:?}"),
+    }
+}
+
+fn reason(source: &str, kernel: &Kernel, language: Language) -> String {
+    match written(source, kernel, language, &Options::default()) {
+        Written::Unsupported(reason) => reason,
+        other => panic!("{language}: {other:?}"),
+    }
+}
+
+#[test]
+fn centroids_stay() {
+    let source = include_str!("../../tests/upstream/naga-centroid/case.spvasm");
+    let kernel = kernel(Stage::Fragment);
+    for language in [
+        Language::Wgsl,
+        Language::Hlsl,
+        Language::Msl,
+        Language::Glsl,
+    ] {
+        let text = text(source, &kernel, language);
+        assert!(text.contains("centroid"), "{language}:\n{text}");
+    }
+    let samples = source
+        .replace("%colour Centroid", "%colour Sample")
+        .replace(
+            "OpCapability Shader",
+            "OpCapability Shader\nOpCapability SampleRateShading",
+        );
+    let text = text(&samples, &kernel, Language::Wgsl);
+    assert!(text.contains("@interpolate(perspective, sample)"), "{text}");
+}
+
+#[test]
+fn layers_are_fetched() {
+    let source = include_str!("../../tests/upstream/naga-arrayed-fetch/case.spvasm");
+    let text = text(source, &kernel(Stage::Fragment), Language::Wgsl);
+    assert!(text.contains("textureLoad("), "{text}");
+}
+
+#[test]
+fn a_comparison_at_a_level_is_refused() {
+    let source = include_str!("../../tests/upstream/naga-compare-level/case.spvasm");
+    let kernel = kernel(Stage::Fragment);
+    for language in [
+        Language::Wgsl,
+        Language::Hlsl,
+        Language::Msl,
+        Language::Glsl,
+    ] {
+        assert!(reason(source, &kernel, language).contains("level 0"));
+    }
+    let at_zero = source.replace("OpConstant %float 2", "OpConstant %float 0");
+    let text = text(&at_zero, &kernel, Language::Wgsl);
+    assert!(text.contains("textureSampleCompareLevel("), "{text}");
+}
+
+#[test]
+fn atomics_of_floats_are_refused_where_they_are_not() {
+    let source = include_str!("../../tests/upstream/naga-hlsl-float-atomics/case.spvasm");
+    let kernel = compute();
+    for language in [
+        Language::Wgsl,
+        Language::Hlsl,
+        Language::Glsl,
+        Language::Essl310,
+    ] {
+        let reason = reason(source, &kernel, language);
+        assert!(reason.contains("no atomics of floats"), "{reason}");
+    }
+    assert!(reason(source, &kernel, Language::Msl).contains("3.0"));
+    let options = Options {
+        msl_version: "3.0".parse().unwrap(),
+        ..Options::default()
+    };
+    let newer = written(source, &kernel, Language::Msl, &options);
+    assert!(matches!(newer, Written::Text(_)), "{newer:?}");
+}
+
+/// With the interface that newer SPIR-V lists.
+fn listed(source: &str) -> String {
+    source.replace("%main \"main\"", "%main \"main\" %input %output")
+}
+
+/// What becomes of a module.
+fn finished(source: &str) -> String {
+    let done =
+        finish(&support::assemble(&listed(source)), &compute()).unwrap_or_else(|e| panic!("{e}"));
+    rspirv::dr::load_bytes(&done.spirv).unwrap().disassemble()
+}
+
+/// A module that stores what `body` computes as `%r` from the float `%x` and the number `%n`.
+fn computing(body: &str) -> String {
+    let frame = include_str!("../../tests/upstream/naga-unordered/case.spvasm");
+    let (before, after) = frame
+        .split_once("      %below = ")
+        .expect("the case compares");
+    let (_, after) = after.split_once("OpStore %b %chosen").expect("and stores");
+    let before = before.replace(
+        "OpMemoryModel",
+        "OpCapability Int64\n%glsl = OpExtInstImport \"GLSL.std.450\"\nOpMemoryModel",
+    );
+    let before = before.replace(
+        "      %input = OpVariable",
+        "        %int = OpTypeInt 32 1\n      %ulong = OpTypeInt 64 0\n      %three = OpConstant %uint 3\n\
+         %long0 = OpConstant %ulong 0\n%float3 = OpConstant %float 3\n%third = OpConstant %float 0.333333343\n\
+         %by29 = OpConstant %uint 29\n      %input = OpVariable",
+    );
+    format!(
+        "{before}{body}\n%bits = OpBitcast %uint %r\n%b = OpAccessChain %b_pointer %output %zero %zero\n\
+         OpStore %b %bits{after}"
+    )
+}
+
+#[test]
+fn comparisons_hold_for_nan_in_every_language() {
+    let source = include_str!("../../tests/upstream/naga-unordered/case.spvasm");
+    let text = finished(source);
+    assert!(
+        text.contains("OpFOrdGreaterThanEqual") && text.contains("OpLogicalNot"),
+        "{text}"
+    );
+    let is_nan = source.replace(
+        "OpFUnordLessThan %bool %x %float0",
+        "OpFUnordNotEqual %bool %x %x",
+    );
+    let text = finished(&is_nan);
+    assert!(
+        text.contains("OpBitcast") && text.contains("OpUGreaterThan") && !text.contains("OpFUnord"),
+        "{text}"
+    );
+}
+
+#[test]
+fn functions_of_libm_are_what_rust_calls_so() {
+    let text = finished(&computing("%r = OpFMod %float %x %float3"));
+    assert!(
+        text.contains("OpFRem") && !text.contains("OpFMod"),
+        "{text}"
+    );
+    let text = finished(&computing("%r = OpExtInst %float %glsl Round %x"));
+    assert_eq!(text.matches(" Trunc ").count(), 2, "{text}");
+    assert!(!text.contains(" Round "), "{text}");
+    // To the third, which needs no power; its root, and to a number that is not known, which do.
+    let text = finished(&computing("%r = OpExtInst %float %glsl Pow %x %float3"));
+    assert_eq!(text.matches("OpFMul").count(), 2, "{text}");
+    assert!(!text.contains("OpExtInst "), "{text}");
+    let text = finished(&computing("%r = OpExtInst %float %glsl Pow %x %third"));
+    assert!(
+        text.contains("OpFNegate") && text.contains("OpSelect"),
+        "{text}"
+    );
+    let text = finished(&computing(
+        "%i = OpBitcast %int %x\n%f = OpConvertSToF %float %i\n%r = OpExtInst %float %glsl Pow %x %f",
+    ));
+    assert!(
+        text.contains("OpBitwiseAnd") && text.contains("OpSelect"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_rotation_of_64_bits_is_refused() {
+    let body = "%w = OpBitcast %uint %x\n%l = OpUConvert %ulong %w\n%up = OpShiftLeftLogical %ulong %l %three\n\
+                %down = OpShiftRightLogical %ulong %l %by29\n%or = OpBitwiseOr %ulong %up %down\n\
+                %no = OpIEqual %bool %three %zero\n%s = OpSelect %ulong %no %l %or\n%n = OpUConvert %uint %s\n\
+                %r = OpBitcast %float %n";
+    let wrong = finish(&support::assemble(&listed(&computing(body))), &compute()).unwrap_err();
+    assert_eq!(wrong.step, Step::Meaning);
+    assert!(wrong.to_string().contains("64 - n"), "{wrong}");
+    // By hand, without a choice.
+    let plain = body
+        .replace("%no = OpIEqual %bool %three %zero\n", "")
+        .replace(
+            "%s = OpSelect %ulong %no %l %or",
+            "%s = OpCopyObject %ulong %or",
+        );
+    finish(&support::assemble(&listed(&computing(&plain))), &compute())
+        .unwrap_or_else(|e| panic!("{e}"));
+}

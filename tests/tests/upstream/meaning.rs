@@ -1,0 +1,142 @@
+//! Texts and SPIR-V that mean something else than what they were made of.
+
+use super::*;
+
+/// The SPIR-V of a case's assembly.
+fn assembled(name: &str) -> Vec<u8> {
+    let assembler = spirv_tools::assembler::create(Some(TargetEnv::Vulkan_1_1));
+    let binary = assembler.assemble(&text(name, "case.spvasm"), AssemblerOptions::default());
+    binary.unwrap_or_else(|e| panic!("{e}")).as_bytes().to_vec()
+}
+
+fn read_by_naga(name: &str) -> (naga::Module, ModuleInfo) {
+    let options = naga::front::spv::Options::default();
+    let read = naga::front::spv::parse_u8_slice(&assembled(name), &options);
+    validated(read.unwrap_or_else(|e| panic!("{e}")))
+}
+
+fn to_wgsl((module, info): &(naga::Module, ModuleInfo)) -> String {
+    naga::back::wgsl::write_string(module, info, naga::back::wgsl::WriterFlags::empty())
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn dxc_takes_half_of_a_long_literal() {
+    const LONG: u64 = 13_787_848_793_156_543_929;
+    let longs = |spirv: &[u8]| {
+        let made = module(spirv);
+        let constants = all(&made, Op::Constant);
+        let longs = constants.iter().filter_map(|c| match c.operands[..] {
+            [Operand::LiteralBit64(bits)] => Some(bits),
+            _ => None,
+        });
+        longs.collect::<Vec<_>>()
+    };
+    let source = text("dxc-long-literal", "case.hlsl");
+    assert!(
+        longs(&dxc(&source)).contains(&(LONG & 0xffff_ffff)),
+        "mended: drop the `LL` of codegen/src/translate/text.rs, `suffixed`"
+    );
+    assert!(longs(&dxc(&source.replace("uL", "uLL"))).contains(&LONG));
+}
+
+#[test]
+fn dxc_exchanges_bytes_by_what_direct3d_lacks() {
+    let source = text("dxc-byte-swap", "case.hlsl");
+    // SPIR-V is fine.
+    dxc(&source);
+    let dxc = tools(Tool::Dxc).dxc().unwrap_or_else(|e| panic!("{e}"));
+    let out = folder();
+    let (file, made) = (out.path().join("case.hlsl"), out.path().join("case.dxil"));
+    fs::write(&file, source).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    let done = finish(&mut dxc.command(&file, "main", "cs_6_2", &made));
+    assert!(
+        !done.status.success() && done.words().contains("llvm.bswap.i32"),
+        "mended: drop the workaround in codegen/src/translate/reading.rs, `swapped_bytes`; {}",
+        done.words()
+    );
+}
+
+#[test]
+fn glslang_refuses_zeros_for_an_array() {
+    let file = case("glslang-zero-array", "case.hlsl");
+    let (spirv, words) = glslang(&file, &["-D", "-e", "main"]);
+    assert!(
+        spirv.is_none() && words.contains("array constructor needs one argument"),
+        "mended: drop the workaround in codegen/src/translate/hlsl.rs, `without_zero_arrays`; {words}"
+    );
+    dxc(&text("glslang-zero-array", "case.hlsl"));
+}
+
+#[test]
+fn naga_leaves_remainders_to_glsl() {
+    let source = to_glsl(&wgsl("naga-glsl-remainder"));
+    assert!(
+        source.contains(" % 7"),
+        "mended: drop the workaround in codegen/src/translate/reading.rs, `remainders`\n{source}"
+    );
+    let six = (-6_i32) as u32;
+    assert_ne!(word(On::Llvmpipe, source.as_bytes(), six), six);
+}
+
+#[test]
+fn naga_counts_bits_in_low_precision() {
+    let source = to_glsl(&wgsl("naga-essl-lowp-bits"));
+    let counted = |source: &str| word(On::Llvmpipe, source.as_bytes(), 0x1fff);
+    assert_eq!(
+        counted(&source),
+        1_300_000 & 0xffff,
+        "mended: drop the workaround in codegen/src/translate/cleanup/bits.rs\n{source}"
+    );
+}
+
+#[test]
+fn naga_reads_unordered_comparisons_as_ordered() {
+    let wgsl = to_wgsl(&read_by_naga("naga-unordered"));
+    assert!(
+        wgsl.contains(" < 0f") && !wgsl.contains('!'),
+        "mended: drop the workaround in codegen/src/spirv/order.rs\n{wgsl}"
+    );
+    // The driver knows what it means.
+    let spirv = assembled("naga-unordered");
+    assert_eq!(word(On::Lavapipe, &spirv, f32::NAN.to_bits()), 1);
+}
+
+#[test]
+fn naga_evaluates_centroids_at_the_center() {
+    let wgsl = to_wgsl(&read_by_naga("naga-centroid"));
+    assert!(
+        !wgsl.contains("centroid"),
+        "mended: drop the workaround in codegen/src/translate/cleanup/sampling.rs\n{wgsl}"
+    );
+}
+
+#[test]
+fn naga_panics_at_a_fetch_from_an_array_of_textures() {
+    let spirv = assembled("naga-arrayed-fetch");
+    let read = std::panic::catch_unwind(|| {
+        naga::front::spv::parse_u8_slice(&spirv, &naga::front::spv::Options::default()).is_ok()
+    });
+    assert!(
+        read.is_err(),
+        "mended: drop the workaround in codegen/src/translate/reading.rs, `coordinate_types`"
+    );
+}
+
+#[test]
+fn naga_compares_at_level_0() {
+    let wgsl = to_wgsl(&read_by_naga("naga-compare-level"));
+    assert!(
+        wgsl.contains("textureSampleCompareLevel("),
+        "mended, if it is an error: drop the check in codegen/src/translate/reading.rs, `Dropped`\n{wgsl}"
+    );
+}
+
+#[test]
+fn naga_adds_floats_as_whole_numbers_in_hlsl() {
+    let hlsl = to_hlsl(&read_by_naga("naga-hlsl-float-atomics"));
+    assert!(
+        hlsl.contains(".InterlockedAdd(") && hlsl.contains(", 0.5, _e"),
+        "mended, if it is an error: drop the check in codegen/src/translate/mod.rs, `float_atomics`\n{hlsl}"
+    );
+}
