@@ -43,7 +43,11 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let words = spirv::words(raw, name)?;
     validate(&words, name)?;
     let mut module = spirv::load(&words, name)?;
-    refused::check(&module, name)?;
+    let place = Some(format!("{}:{}", kernel.file, kernel.line));
+    refused::check(&module, name).map_err(|failure| Failure {
+        construct: failure.construct.clone().or_else(|| place.clone()),
+        ..failure
+    })?;
     libm::mend(&mut module);
     let words = optimise(module, name)?;
     let mut module = spirv::load(&words, name)?;
@@ -52,7 +56,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         return Err(Failure {
             kernel: name.into(),
             step: Step::Meaning,
-            construct: Some(format!("{}:{}", kernel.file, kernel.line)),
+            construct: place,
             message: "not every invocation of a workgroup reaches each barrier. A barrier in a \
                       branch, or a loop, that some do not take; or a division, an index or an \
                       `unwrap` before it, which ends an invocation where it fails: write \

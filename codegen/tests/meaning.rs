@@ -219,3 +219,47 @@ fn a_rotation_of_64_bits_is_refused() {
     finish(&support::assemble(&listed(&computing(&plain))), &compute())
         .unwrap_or_else(|e| panic!("{e}"));
 }
+
+/// A barrier in a branch that depends on `BUILT_IN`.
+const BARRIER: &str = "
+    OpCapability Shader
+    OpMemoryModel Logical GLSL450
+    OpEntryPoint GLCompute %main \"main\" %number
+    OpExecutionMode %main LocalSize 1 1 1
+    OpDecorate %number BuiltIn BUILT_IN
+    %void = OpTypeVoid
+    %bool = OpTypeBool
+    %uint = OpTypeInt 32 0
+    %uvec3 = OpTypeVector %uint 3
+    %pointer = OpTypePointer Input %uvec3
+    %fn = OpTypeFunction %void
+    %zero = OpConstant %uint 0
+    %workgroup = OpConstant %uint 2
+    %release = OpConstant %uint 264
+    %number = OpVariable %pointer Input
+    %main = OpFunction %void None %fn
+    %start = OpLabel
+    %all = OpLoad %uvec3 %number
+    %x = OpCompositeExtract %uint %all 0
+    %first = OpIEqual %bool %x %zero
+    OpSelectionMerge %join None
+    OpBranchConditional %first %yes %join
+    %yes = OpLabel
+    OpControlBarrier %workgroup %workgroup %release
+    OpBranch %join
+    %join = OpLabel
+    OpReturn
+    OpFunctionEnd";
+
+#[test]
+fn a_barrier_that_some_do_not_reach_is_refused() {
+    let divided = support::assemble(&BARRIER.replace("BUILT_IN", "LocalInvocationId"));
+    let error = finish(&divided, &compute()).unwrap_err();
+    assert_eq!(error.step, Step::Meaning);
+    let told = error.to_string();
+    assert!(told.contains("src/lib.rs:7: kernel `main`: "), "{told}");
+    assert!(told.contains("checked_div"), "{told}");
+    // Whole workgroups take the one way or the other.
+    let together = support::assemble(&BARRIER.replace("BUILT_IN", "WorkgroupId"));
+    finish(&together, &compute()).unwrap_or_else(|e| panic!("{e}"));
+}

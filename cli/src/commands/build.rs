@@ -1,5 +1,7 @@
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 
+use hankel_codegen::Language;
 use hankel_codegen::build::build;
 
 use super::print_json;
@@ -40,14 +42,13 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
         report.unchanged,
         report.removed.len()
     );
-    if !report.unsupported.is_empty() {
-        println!(
-            "{} shaders have no form in a language; the manifest says why (for example {} in {}: {})",
-            report.unsupported.len(),
-            report.unsupported[0].0,
-            report.unsupported[0].1,
-            report.unsupported[0].2
-        );
+    let mut missing: BTreeMap<(Language, &str), Vec<&str>> = BTreeMap::new();
+    for (kernel, language, why) in &report.unsupported {
+        let kernels = missing.entry((*language, why.as_str())).or_default();
+        kernels.push(kernel.as_str());
+    }
+    for ((language, why), kernels) in missing {
+        println!("no {language} of {}: {why}", kernels.join(", "));
     }
     Ok(Outcome::Fine)
 }

@@ -212,6 +212,8 @@ impl<'a> Analysis<'a> {
             | Op::AtomicOr
             | Op::AtomicXor
             | Op::AtomicFAddEXT => true,
+            // A subgroup is not the workgroup.
+            other if is_of_subgroup(other) => true,
             Op::ImageRead => any || self.memory == Memory::Doubted,
             _ => any,
         }
@@ -263,6 +265,12 @@ impl<'a> Analysis<'a> {
             all.any(|it| op(it) == Op::ControlBarrier)
         })
     }
+}
+
+/// SPIR-V numbers them in a row.
+fn is_of_subgroup(op: Op) -> bool {
+    let row = Op::GroupNonUniformElect as u32..=Op::GroupNonUniformQuadSwap as u32;
+    row.contains(&(op as u32))
 }
 
 /// Storage that is decorated so that it cannot be written.
@@ -336,6 +344,19 @@ fn joins(successors: &[Vec<usize>]) -> Vec<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn operations_of_subgroups_differ_within_a_workgroup() {
+        for op in [
+            Op::GroupNonUniformElect,
+            Op::GroupNonUniformBallot,
+            Op::GroupNonUniformBroadcastFirst,
+            Op::GroupNonUniformFAdd,
+        ] {
+            assert!(is_of_subgroup(op), "{op:?}");
+        }
+        assert!(!is_of_subgroup(Op::IAdd) && !is_of_subgroup(Op::ControlBarrier));
+    }
 
     #[test]
     fn ways_meet_where_all_lead_through() {
