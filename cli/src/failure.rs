@@ -121,7 +121,9 @@ impl From<codegen::Error> for Failure {
                 Blame::Kernel
             }
             E::DuplicateKernel { .. } | E::DuplicateLayout { .. } => Blame::Kernel,
-            E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } => Blame::Machine,
+            E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } | E::Busy { .. } => {
+                Blame::Machine
+            }
             _ => Blame::Input,
         };
         Self::new(blame, &error, error.advice())
