@@ -110,8 +110,8 @@ Examples:
   hankel build --out shaders --set encoding=1 --kernel shade_hamburger
   hankel build --out shaders --manifest-path my-kernels/Cargo.toml
 
-The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. It is left alone if nothing
-has changed.")]
+The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. Files that are right already
+are left alone. A build that was stopped is finished by the next one.")]
 pub struct Build {
     #[command(flatten)]
     pub generate: Generate,

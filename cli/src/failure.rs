@@ -123,7 +123,9 @@ impl From<codegen::Error> for Failure {
             | E::Kernel(_)
             | E::Kernels(_) => Blame::Kernel,
             E::DuplicateKernel { .. } | E::DuplicateLayout { .. } => Blame::Kernel,
-            E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } => Blame::Machine,
+            E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } | E::Busy { .. } => {
+                Blame::Machine
+            }
             _ => Blame::Input,
         };
         Self::new(blame, &error, error.advice())

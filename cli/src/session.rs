@@ -3,9 +3,10 @@
 //! The built-in kernels are linked into this program, and their SPIR-V is embedded in it. Inside
 //! a checkout whose kernels were edited since, or for anybody's crate, the crate is built as a
 //! plug-in that describes its kernels, and its SPIR-V is made with rust-gpu's compiler and kept
-//! under cargo's target folder for as long as the sources' hash holds. SPIR-V of other sources is
-//! never used. Native code is compiled only for the kernels that a command runs.
+//! under cargo's target folder for as long as nothing that it was made from changes. SPIR-V of
+//! other sources is never used. Native code is compiled only for the kernels that a command runs.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,8 +14,8 @@ use std::str::FromStr;
 
 use hankel_codegen::build::{Modules, Request, finish_all};
 use hankel_codegen::bundle::Bundle;
-use hankel_codegen::compile::{Compiler, compile};
-use hankel_codegen::source_hash::{Sources, hash};
+use hankel_codegen::compile::{Compiled, Compiler, compile};
+use hankel_codegen::inputs::Inputs;
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
@@ -39,10 +40,8 @@ pub struct Session {
     pub krate: KernelCrate,
     /// Whether it is.
     linked: bool,
-    /// Hash of the sources.
-    source_sha256: String,
-    /// The sources on disk; `None` for the built-in kernels outside of a checkout.
-    sources: Option<(PathBuf, Sources)>,
+    /// Its Cargo.toml; `None` for the built-in kernels outside of a checkout.
+    manifest: Option<PathBuf>,
     quiet: bool,
 }
 
@@ -52,8 +51,7 @@ impl Session {
         Self {
             krate: built_in(),
             linked: true,
-            source_sha256: hankel_embedded::SOURCE_SHA256.into(),
-            sources: None,
+            manifest: None,
             quiet,
         }
     }
@@ -74,33 +72,27 @@ impl Session {
                 "Give the path of a kernel crate's Cargo.toml.",
             ));
         }
-        let mut sources = hash(&manifest).map_err(Error::from)?;
-        let same = sources.sha256 == hankel_embedded::SOURCE_SHA256
-            && sources.name == hankel_embedded::CRATE_NAME;
-        let krate = if same {
+        let linked = is_linked(&manifest);
+        let krate = if linked {
             built_in()
         } else {
             let progress = Progress::new(quiet);
-            progress.begin(&format!("Reading the kernels of {}", sources.name));
-            let krate = KernelCrate::load(&manifest, Native::Descriptions, &mut |line| {
+            progress.begin(&format!("Reading the kernels of {}", manifest.display()));
+            KernelCrate::load(&manifest, Native::Descriptions, &mut |line| {
                 progress.detail(line);
-            })?;
-            // cargo may have written the lock file just now, which is part of the sources.
-            sources = hash(&manifest).map_err(Error::from)?;
-            krate
+            })?
         };
         Ok(Self {
             krate,
-            linked: same,
-            source_sha256: sources.sha256.clone(),
-            sources: Some((manifest, sources)),
+            linked,
+            manifest: Some(manifest),
             quiet,
         })
     }
 
     /// The crate with the native code of the entry points called `names`.
     pub fn native<'a>(&self, names: impl IntoIterator<Item = &'a String>) -> Result<KernelCrate> {
-        let Some((manifest, _)) = self.sources.as_ref().filter(|_| !self.linked) else {
+        let Some(manifest) = self.manifest.as_ref().filter(|_| !self.linked) else {
             return Ok(self.krate.clone());
         };
         let names: Vec<String> = names.into_iter().cloned().collect();
@@ -158,7 +150,6 @@ impl Session {
             filter,
             targets,
             options,
-            source_sha256: self.source_sha256.clone(),
             rust_gpu: RUST_GPU_VERSION.into(),
         }
     }
@@ -190,39 +181,69 @@ impl Session {
     }
 
     fn bundle(&self) -> Result<Bundle> {
-        let wanted = self.source_sha256.as_str();
-        if wanted == hankel_embedded::SOURCE_SHA256 && !hankel_embedded::FILES.is_empty() {
-            let embedded = Bundle::from_files(hankel_embedded::FILES)?;
-            if embedded.check_current(wanted).is_ok() {
-                return Ok(embedded);
+        let kernels = self.kernels();
+        // What is wrong with the SPIR-V that was looked at last.
+        let reason = RefCell::new(None);
+        let fits = |bundle: &Bundle| {
+            if bundle.origin.crate_name != self.krate.name {
+                return false;
             }
+            let made = bundle.check_made(&kernels, RUST_GPU_VERSION);
+            let checked = made.and_then(|()| match &self.manifest {
+                Some(manifest) => bundle.check_inputs(folder_of(manifest)),
+                None => stale_when_built(),
+            });
+            let fits = checked.is_ok();
+            *reason.borrow_mut() = checked.err().map(|error| error.to_string());
+            fits
+        };
+        if self.krate.name == hankel_embedded::CRATE_NAME
+            && let Ok(embedded) = Bundle::from_files(hankel_embedded::FILES)
+            && fits(&embedded)
+        {
+            return Ok(embedded);
         }
-        let Some((manifest, sources)) = &self.sources else {
+        let Some(manifest) = &self.manifest else {
+            let reason = reason.take().unwrap_or_else(|| "there is none".into());
             return Err(Failure::machine(
-                "this program was built without SPIR-V of its own kernels",
+                format!("this program was built without SPIR-V of its own kernels: {reason}"),
                 Some("Run it inside of its repository, with rust-gpu's compiler installed.".into()),
             ));
         };
-        let target = target_folder(manifest)?;
-        let kept = target.join("hankel/final").join(&sources.name);
         let committed = checkout().map(|root| root.join(COMMITTED));
-        for folder in committed.iter().chain([&kept]) {
-            if let Ok(bundle) = Bundle::read(folder)
-                && bundle.origin.crate_name == sources.name
-                && bundle.check_current(wanted).is_ok()
-            {
-                return Ok(bundle);
-            }
+        if let Some(folder) = committed
+            && let Ok(bundle) = Bundle::read(&folder)
+            && fits(&bundle)
+        {
+            return Ok(bundle);
         }
-        let raw = self.compile(manifest, &target)?;
-        let kernels = self.kernels();
-        let bundle = Bundle::new(sources, RUST_GPU_VERSION, finish_all(&raw, &kernels)?);
+        let target = target_folder(manifest)?;
+        let kept = target.join("hankel/final").join(&self.krate.name);
+        let toolchain = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
+        if let Ok(bundle) = Bundle::read(&kept)
+            && fits(&bundle)
+            // Another compiler may make something else of the same sources.
+            && toolchain.is_ok_and(|found| {
+                found.is_none_or(|it| it.rustc_version == bundle.origin.made_by.compiler)
+            })
+        {
+            return Ok(bundle);
+        }
+        let compiled = self.compile(manifest, &target, reason.take())?;
+        let modules = finish_all(&compiled.modules, &kernels)?;
+        let bundle = Bundle::new(
+            &self.krate.name,
+            &kernels,
+            RUST_GPU_VERSION,
+            &compiled,
+            modules,
+        );
         bundle.write(&kept)?;
         Ok(bundle)
     }
 
     /// Raw SPIR-V from rust-gpu.
-    fn compile(&self, manifest: &Path, target: &Path) -> Result<BTreeMap<String, Vec<u8>>> {
+    fn compile(&self, manifest: &Path, target: &Path, reason: Option<String>) -> Result<Compiled> {
         let mut progress = Progress::new(self.quiet);
         let options = hankel_toolchain::Options::from_env();
         let toolchain = hankel_toolchain::ensure(&options, &mut progress).map_err(|error| {
@@ -230,9 +251,10 @@ impl Session {
                 hankel_toolchain::Error::NotInstalled { .. } => String::new(),
                 other => format!(": {other}"),
             };
+            let reason = reason.map(|it| format!(" ({it})")).unwrap_or_default();
             Failure::machine(
                 format!(
-                    "{} has no SPIR-V that belongs to its present sources, and there is no rust-gpu compiler to make it{why}",
+                    "{} has no SPIR-V that belongs to its present sources{reason}, and there is no rust-gpu compiler to make it{why}",
                     self.krate.name
                 ),
                 Some("`hankel toolchain install` installs one; `hankel toolchain status` says what it takes.".into()),
@@ -262,6 +284,38 @@ impl Session {
 /// The kernels that are linked into this program.
 fn built_in() -> KernelCrate {
     KernelCrate::from_entries(hankel_embedded::CRATE_NAME, hankel_shadows::entries())
+}
+
+/// Whether the SPIR-V in this program was made from the sources that it was compiled from.
+fn stale_when_built() -> hankel_codegen::Result<()> {
+    if hankel_embedded::STALE.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Stale {
+            reason: hankel_embedded::STALE.into(),
+        })
+    }
+}
+
+/// Whether the kernels in this program are those of the crate at `manifest`: nothing that they were
+/// compiled from has changed since.
+fn is_linked(manifest: &Path) -> bool {
+    let Ok(manifest) = std::path::absolute(manifest) else {
+        return false;
+    };
+    manifest.ends_with(BUILT_IN)
+        && manifest.ancestors().nth(3).is_some_and(|root| {
+            serde_json::from_str::<Inputs>(hankel_embedded::SOURCES)
+                .is_ok_and(|sources| sources.changes(root).is_empty())
+        })
+}
+
+/// The folder that a Cargo.toml lies in.
+fn folder_of(manifest: &Path) -> &Path {
+    match manifest.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// The checkout that the present folder belongs to.
@@ -298,19 +352,23 @@ fn target_folder(manifest: &Path) -> Result<PathBuf> {
 
 /// `CONSTANT=VALUE` pairs.
 fn constants(pairs: &[String]) -> Result<BTreeMap<String, u32>> {
-    pairs
-        .iter()
-        .map(|pair| {
-            pair.split_once('=')
-                .and_then(|(name, value)| {
-                    Some((name.trim().to_owned(), value.trim().parse().ok()?))
-                })
-                .ok_or_else(|| {
-                    Failure::input(
-                        format!("--set {pair}: a specialisation constant is set to a whole number"),
-                        "Write --set NAME=NUMBER.",
-                    )
-                })
-        })
-        .collect()
+    const HELP: &str = "Write --set NAME=NUMBER, once for each constant.";
+    let mut values = BTreeMap::new();
+    for pair in pairs {
+        let wrong = |problem: String| Failure::input(format!("--set {pair}: {problem}"), HELP);
+        let (name, text) = pair
+            .split_once('=')
+            .ok_or_else(|| wrong("there is no `=`".into()))?;
+        let (name, text) = (name.trim(), text.trim());
+        let value: u32 = text.parse().map_err(|_| {
+            wrong(format!(
+                "a specialisation constant is a whole number from 0 to {}, which `{text}` is not",
+                u32::MAX
+            ))
+        })?;
+        if let Some(before) = values.insert(name.to_owned(), value) {
+            return Err(wrong(format!("`{name}` was set to {before} already")));
+        }
+    }
+    Ok(values)
 }

@@ -181,7 +181,20 @@ fn misuse_of_build_is_explained() {
     desk.hankel("build --bounds-checks some")
         .fails(2, &["bounds checks `some`"]);
     desk.hankel("build --set encoding=unit")
-        .fails(2, &["whole number"]);
+        .fails(2, &["whole number", "`unit`"]);
+    desk.hankel("build --set encoding")
+        .fails(2, &["--set encoding", "no `=`"]);
+    desk.hankel("build --set encoding=4294967296")
+        .fails(2, &["from 0 to 4294967295", "`4294967296` is not"]);
+    desk.hankel("build --set encoding=1 --set encoding=2")
+        .fails(2, &["--set encoding=2", "`encoding` was set to 1 already"]);
+    desk.write("file", "");
+    desk.hankel("build --out file")
+        .fails(2, &["file is a file", "goes into a folder"]);
+    desk.hankel("build --out file/deeper")
+        .fails(3, &["file/deeper", "Not a directory"]);
+    desk.hankel("check file")
+        .fails(2, &["file", "it is no folder"]);
     desk.hankel("build --set nosuch=1").fails(2, &["nosuch"]);
     desk.hankel("build --manifest-path nowhere/Cargo.toml")
         .fails(2, &["nowhere", "no such file"]);
@@ -202,6 +215,127 @@ fn files_of_ones_own_are_not_overwritten() {
         "nothing is half-written"
     );
     desk.hankel("build --out s --kernel vsm --force").code(0);
+}
+
+/// What stands where a build reads or writes may be anything: nothing is waited for, followed, or
+/// read to an end that never comes.
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_refused() {
+    use std::os::unix::fs::symlink;
+    let desk = Desk::new();
+    symlink("nowhere", desk.path("dangling")).expect("a link");
+    desk.hankel("build --out dangling")
+        .fails(2, &["dangling is a symbolic link that leads nowhere"]);
+    let build = "build --out s --kernel vsm --target wgsl --target hlsl";
+    desk.hankel(build).code(0);
+    let fifo = |name: &str| {
+        let _ = fs::remove_file(desk.path(name));
+        let made = Command::new("mkfifo").arg(desk.path(name)).status();
+        assert!(made.is_ok_and(|status| status.success()), "{name}");
+    };
+    fifo("s/manifest.json");
+    desk.hankel(build).fails(
+        2,
+        &["s/manifest.json is in the way: it is a FIFO", "--force"],
+    );
+    let out = desk
+        .hankel("check s --kernel vsm --target wgsl --target hlsl")
+        .code(1)
+        .out();
+    assert!(out.contains("s/manifest.json is a FIFO"), "{out}");
+    desk.hankel(&format!("{build} --force")).code(0);
+    fifo("s/wgsl/vsm.wgsl");
+    desk.hankel(build).fails(2, &["it is a FIFO"]);
+    desk.hankel(&format!("{build} --force")).code(0);
+    // A folder of the output leads elsewhere.
+    fs::create_dir(desk.path("victim")).expect("a folder");
+    fs::rename(desk.path("s/hlsl/vsm.hlsl"), desk.path("victim/vsm.hlsl")).expect("it moves");
+    fs::remove_dir(desk.path("s/hlsl")).expect("it is empty");
+    symlink(desk.path("victim"), desk.path("s/hlsl")).expect("a link");
+    desk.hankel("build --out s --kernel vsm --target wgsl")
+        .code(0);
+    assert!(
+        desk.path("victim/vsm.hlsl").is_file(),
+        "nothing is removed through a link"
+    );
+    desk.hankel(build).fails(
+        2,
+        &[
+            "s/hlsl is in the way: it is a symbolic link",
+            "follows no links",
+        ],
+    );
+    fifo("budget.toml");
+    for budget in ["nope.toml", "budget.toml", "/dev/zero", "s"] {
+        desk.hankel(&format!("check s --budget {budget}"))
+            .fails(2, &[budget, "cannot be read"]);
+    }
+}
+
+/// Builds that are killed at any time leave nothing in the way of the next one, with other options
+/// or the same.
+#[cfg(unix)]
+#[test]
+fn a_killed_build_leaves_nothing_behind() {
+    let desk = Desk::new();
+    let lines = [
+        "build --out s --kernel *4msm* --target wgsl --target msl",
+        "build --out s --kernel *4msm* --target wgsl --target hlsl --set nothing",
+    ]
+    .map(|line| line.replace(" --set nothing", " --shader-model 6.2"));
+    let start = std::time::Instant::now();
+    desk.hankel(&lines[0]).code(0);
+    let whole = start.elapsed();
+    for round in 0..12_u32 {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hankel"))
+            .args(lines[round as usize % 2].split_whitespace())
+            .current_dir(desk.0.path())
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .expect("hankel starts");
+        // The files are written at the end.
+        std::thread::sleep(whole * (80 + 2 * round) / 100);
+        child.kill().expect("it is ours");
+        child.wait().expect("it ends");
+    }
+    desk.hankel(&lines[1]).code(0);
+    desk.hankel(&lines[1].replace("build --out", "check"))
+        .code(0);
+    let names: Vec<String> = fs::read_dir(desk.path("s"))
+        .expect("it was built")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    assert_eq!(names.len(), 4, "{names:?}");
+}
+
+#[test]
+fn two_builds_at_once_do_not_mix() {
+    let desk = Desk::new();
+    let lines = [
+        "build -q --out s --kernel *4msm* --target wgsl",
+        "build -q --out s --kernel quantize_4* --target hlsl",
+    ];
+    for _ in 0..6 {
+        let children = lines.map(|line| {
+            Command::new(env!("CARGO_BIN_EXE_hankel"))
+                .args(line.split_whitespace())
+                .current_dir(desk.0.path())
+                .spawn()
+                .expect("hankel starts")
+        });
+        for mut child in children {
+            assert!(child.wait().is_ok_and(|status| status.success()));
+        }
+        let right = lines
+            .iter()
+            .filter(|line| {
+                let line = line.replace("build -q --out", "check");
+                desk.hankel(&line).0.status.success()
+            })
+            .count();
+        assert_eq!(right, 1, "the folder is that of one build");
+    }
 }
 
 #[test]

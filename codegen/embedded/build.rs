@@ -1,24 +1,27 @@
-//! Lists the committed SPIR-V, and hashes the kernels that this build is compiled with.
+//! Lists the committed SPIR-V, and records the sources that this build is compiled with.
 
-#[path = "../src/source_hash.rs"]
+#[path = "../src/inputs.rs"]
 #[allow(dead_code, reason = "codegen uses the rest")]
-mod source_hash;
+mod inputs;
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use inputs::{Inputs, Names};
+
+/// What is read of the committed SPIR-V's `source.json`.
+#[derive(serde::Deserialize)]
+struct Origin {
+    inputs: Inputs,
+}
 
 fn main() {
     let here = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
     let root = here.ancestors().nth(2).expect("the crate lies in codegen/");
-    let kernels = root.join("kernels/shadows/Cargo.toml");
-    let sources = source_hash::hash(&kernels).unwrap_or_else(|error| panic!("{error}"));
-    for file in &sources.files {
-        println!("cargo::rerun-if-changed={}", file.display());
-    }
-    // New files change the folders.
-    for folder in &sources.folders {
-        println!("cargo::rerun-if-changed={}", folder.join("src").display());
-    }
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=../src/inputs.rs");
+    let sources = Inputs::take(root, &sources(root)).unwrap_or_else(|error| panic!("{error}"));
+    watch(&sources, root);
     let bundle = root.join("snapshots/spirv");
     // A folder that is not there would count as changed each time: watch the one above it.
     let watched = if bundle.is_dir() {
@@ -27,7 +30,17 @@ fn main() {
         root.join("snapshots")
     };
     println!("cargo::rerun-if-changed={}", watched.display());
-    println!("cargo::rerun-if-changed=build.rs");
+    let stale = match std::fs::read(bundle.join("source.json")) {
+        Ok(json) => match serde_json::from_slice::<Origin>(&json) {
+            Ok(origin) => {
+                let folder = root.join("kernels/shadows");
+                watch(&origin.inputs, &folder);
+                origin.inputs.changes(&folder).join("; ")
+            }
+            Err(error) => format!("source.json cannot be read: {error}"),
+        },
+        Err(_) => "there is none".into(),
+    };
     let mut files: Vec<PathBuf> = std::fs::read_dir(&bundle)
         .into_iter()
         .flatten()
@@ -35,15 +48,18 @@ fn main() {
         .filter(|path| path.is_file())
         .collect();
     files.sort();
+    let json = serde_json::to_string(&sources).expect("it has a JSON form");
     let mut code = format!(
-        "/// Hash of the kernels' sources that this program was compiled with.\n\
-         pub const SOURCE_SHA256: &str = {:?};\n\
+        "/// The sources that this program was compiled with, as JSON of `Inputs`, from the\n\
+         /// repository's folder.\n\
+         pub const SOURCES: &str = {json:?};\n\
+         /// Why the committed SPIR-V is not made from these sources; empty if it is.\n\
+         pub const STALE: &str = {stale:?};\n\
          /// The built-in kernel crate.\n\
-         pub const CRATE_NAME: &str = {:?};\n\
+         pub const CRATE_NAME: &str = \"hankel-shadows\";\n\
          /// The committed SPIR-V: file names and contents, as `Bundle::from_files` reads them.\n\
          /// Empty if there was none.\n\
          pub static FILES: &[(&str, &[u8])] = &[\n",
-        sources.sha256, sources.name
     );
     for file in &files {
         let name = file
@@ -60,4 +76,36 @@ fn main() {
     code.push_str("];\n");
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     std::fs::write(out.join("files.rs"), code).expect("OUT_DIR can be written");
+}
+
+/// Everything that the crates in `kernels/` are compiled from, natively as for SPIR-V: a test
+/// compares it with what the compiler says that it read.
+fn sources(root: &Path) -> Names {
+    let mut names = Names::default();
+    names
+        .files
+        .extend(["Cargo.toml".into(), "Cargo.lock".into()]);
+    let kernels = root.join("kernels");
+    for entry in std::fs::read_dir(&kernels).expect("kernels/ can be read") {
+        let entry = entry.expect("kernels/ can be read");
+        if entry.path().join("Cargo.toml").is_file() {
+            let name = format!("kernels/{}", entry.file_name().to_string_lossy());
+            names.files.insert(format!("{name}/Cargo.toml"));
+            names.files.insert(format!("{name}/build.rs"));
+            names.folders.insert(format!("{name}/src"));
+        }
+    }
+    names
+}
+
+/// Runs this again when something of it changes.
+fn watch(inputs: &Inputs, folder: &Path) {
+    for (name, hash) in inputs.files.iter().chain(&inputs.folders) {
+        if hash.is_some() {
+            println!("cargo::rerun-if-changed={}", folder.join(name).display());
+        }
+    }
+    for name in inputs.environment.keys() {
+        println!("cargo::rerun-if-env-changed={name}");
+    }
 }

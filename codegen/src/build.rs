@@ -7,26 +7,27 @@
 //! ```
 //!
 //! The folder holds what the last build asked for: files that an earlier build wrote and this one
-//! does not make are removed. The manifest's `inputs_sha256` says what the files follow from;
-//! while it is the same and the files are as they were written, nothing is done. Files that hankel
-//! did not write, or that were edited since, are not overwritten unless `force` says so.
+//! does not make are removed, files that are right already are left alone. What is right is known
+//! by making it, not by what the folder says of itself. Files that hankel did not write, or that
+//! were edited since, are not overwritten unless `force` says so.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use hankel_dsl::native::describe::{Kernel, Role};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Language;
-use crate::error::{During, Error, Failure, Result, Step};
-use crate::files::{sha256, write_whole};
+use crate::error::{Error, Failure, Result, Step};
+use crate::files::sha256;
 use crate::finish::{self, Finished};
+use crate::folder::{Change, Folder, Found, Owned};
 use crate::headers::{self, Layouts};
 use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
 };
-use crate::translate::{Ir, Options, Place, WRITERS, Written};
+use crate::translate::{Ir, Options, Place, Written};
 
 /// The manifest's file.
 pub const MANIFEST_FILE: &str = "manifest.json";
@@ -44,8 +45,6 @@ pub struct Request {
     pub targets: Vec<Language>,
     /// How.
     pub options: Options,
-    /// Hash of the sources ([`crate::source_hash::hash`]).
-    pub source_sha256: String,
     /// Version of rust-gpu.
     pub rust_gpu: String,
 }
@@ -145,7 +144,7 @@ impl Request {
     }
 
     /// Hash of everything that the files follow from.
-    fn inputs_sha256(&self, chosen: &[&Kernel]) -> String {
+    fn inputs_sha256(&self, chosen: &[&Kernel], spirv: &BTreeMap<&str, String>) -> String {
         let options = WriteOptions::of(&self.options);
         let versions = Versions::with(&self.rust_gpu);
         let inputs = (
@@ -155,8 +154,8 @@ impl Request {
             self.targets(),
             options,
             versions,
-            WRITERS,
-            &self.source_sha256,
+            env!("HANKEL_CODEGEN_SHA256"),
+            spirv,
         );
         // Nothing in it can fail to become JSON.
         sha256(&serde_json::to_vec(&inputs).unwrap_or_default())
@@ -235,7 +234,6 @@ fn collect<T, C: FromIterator<T>>(results: Vec<Result<T, Failure>>) -> Result<C>
 /// The request asks for what is not there, or kernels fail: all of those are named.
 pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
     let chosen = request.chosen()?;
-    let inputs_sha256 = request.inputs_sha256(&chosen);
     let all: Vec<Kernel> = chosen.iter().map(|kernel| (*kernel).clone()).collect();
     let layouts = Layouts::of(&all);
     let targets = request.targets();
@@ -243,10 +241,12 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
         .par_iter()
         .map(|kernel| one(kernel, modules, &targets, &layouts, &request.options))
         .collect();
-    let made: Vec<(KernelEntry, Files)> = collect(results)?;
+    let made: Vec<(KernelEntry, Files, String)> = collect(results)?;
     let mut files = BTreeMap::new();
     let mut kernels = BTreeMap::new();
-    for (kernel, (entry, texts)) in chosen.iter().zip(made) {
+    let mut spirv = BTreeMap::new();
+    for (kernel, (entry, texts, hash)) in chosen.iter().zip(made) {
+        spirv.insert(kernel.name.as_str(), hash);
         kernels.insert(kernel.name.clone(), entry);
         files.extend(texts);
     }
@@ -266,7 +266,7 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
         format: manifest::FORMAT,
         made_by: Versions::with(&request.rust_gpu),
         crate_name: request.crate_name.clone(),
-        inputs_sha256,
+        inputs_sha256: request.inputs_sha256(&chosen, &spirv),
         options: WriteOptions::of(&request.options),
         kernels,
         layouts: manifest::layouts(&layouts),
@@ -310,14 +310,14 @@ impl Readings<'_> {
     }
 }
 
-/// One kernel in every language.
+/// One kernel in every language, and the hash of its SPIR-V.
 fn one(
     kernel: &Kernel,
     modules: &Modules,
     targets: &BTreeSet<Language>,
     layouts: &Layouts,
     options: &Options,
-) -> Result<(KernelEntry, Files), Failure> {
+) -> Result<(KernelEntry, Files, String), Failure> {
     let open = open_module(kernel, modules, options)?;
     let mut entry = manifest::entry(kernel, layouts, options, open.cost);
     let mut files = Vec::new();
@@ -401,7 +401,7 @@ fn one(
             }
         }
     }
-    Ok((entry, files))
+    Ok((entry, files, sha256(&open.spirv)))
 }
 
 fn defaults(kernel: &Kernel) -> BTreeMap<String, u32> {
@@ -438,51 +438,31 @@ fn open_module(kernel: &Kernel, modules: &Modules, options: &Options) -> Result<
     }
 }
 
-/// Builds into the folder `out`, if anything has changed.
-///
-/// `modules` is only called if it has: it may compile. The whole check of a folder that is up to
-/// date takes some milliseconds.
+/// Builds into the folder `out`: writes the files that are not right already.
 ///
 /// # Errors
 ///
 /// As for [`generate`]; a file that hankel did not write is in the way, unless `force`; a file
-/// cannot be written. Nothing is written unless everything could be made.
-pub fn build(
-    request: &Request,
-    out: &Path,
-    force: bool,
-    modules: impl FnOnce() -> Result<Modules>,
-) -> Result<Report> {
-    let chosen = request.chosen()?;
-    let before = read_manifest(out);
-    if let Some(before) = &before
-        && before.inputs_sha256 == request.inputs_sha256(&chosen)
-        && is_whole(before, out)
-    {
-        return Ok(report(
-            before,
-            Vec::new(),
-            before.files.len() + 1,
-            Vec::new(),
-        ));
-    }
-    let generated = generate(request, &modules()?)?;
-    let (changed, unchanged) = compare(&generated, before.as_ref(), out, force)?;
-    let mut written = Vec::new();
-    for path in changed {
-        write_whole(&out.join(path), &generated.files[path])?;
-        written.push(path.clone());
-    }
-    let removed = remove_old(&generated, before.as_ref(), out)?;
-    Ok(report(&generated.manifest, written, unchanged, removed))
+/// cannot be written. Nothing is written unless everything could be made. A build that is stopped
+/// while it writes is finished by the next one.
+pub fn build(request: &Request, modules: &Modules, out: &Path, force: bool) -> Result<Report> {
+    let generated = generate(request, modules)?;
+    let folder = Folder::create(out)?;
+    let owned = written_before(&folder)?;
+    let change = folder.update(&generated.files, MANIFEST_FILE, owned, force)?;
+    Ok(report(&generated.manifest, change))
 }
 
-fn report(
-    manifest: &Manifest,
-    written: Vec<String>,
-    unchanged: usize,
-    removed: Vec<String>,
-) -> Report {
+/// Whether `out` is, or can become, a folder: to be asked before much is done for it.
+///
+/// # Errors
+///
+/// It is something else.
+pub fn check_output(out: &Path) -> Result<()> {
+    Folder::open(out).map(drop)
+}
+
+fn report(manifest: &Manifest, change: Change) -> Report {
     let unsupported = manifest
         .kernels
         .iter()
@@ -494,93 +474,35 @@ fn report(
         })
         .collect();
     Report {
-        written,
-        unchanged,
-        removed,
+        written: change.written,
+        unchanged: change.unchanged,
+        removed: change.removed,
         kernels: manifest.kernels.len(),
         unsupported,
     }
 }
 
-/// The manifest of the last build, if it is one that this hankel reads.
-fn read_manifest(out: &Path) -> Option<Manifest> {
-    Manifest::from_json(&std::fs::read(out.join(MANIFEST_FILE)).ok()?).ok()
-}
-
-/// Whether every file is as the manifest says.
-fn is_whole(manifest: &Manifest, out: &Path) -> bool {
-    manifest.files.iter().all(|(path, entry)| {
-        std::fs::read(out.join(path)).is_ok_and(|bytes| sha256(&bytes) == entry.sha256)
-    })
-}
-
-/// The files that must be written, the manifest last, and how many need not be.
-fn compare<'a>(
-    generated: &'a Generated,
-    before: Option<&Manifest>,
-    out: &Path,
-    force: bool,
-) -> Result<(Vec<&'a String>, usize)> {
-    let mut changed = Vec::new();
-    let mut unchanged = 0;
-    for (name, bytes) in &generated.files {
-        let path = out.join(name);
-        let there = match std::fs::read(&path) {
-            Ok(there) => there,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                changed.push(name);
-                continue;
-            }
-            Err(source) => {
-                return Err(Error::Io {
-                    action: "read",
-                    path,
-                    source,
-                });
-            }
-        };
-        if there == *bytes {
-            unchanged += 1;
-            continue;
-        }
-        let ours = if name == MANIFEST_FILE {
-            before.is_some()
-        } else {
-            before
-                .and_then(|before| before.files.get(name))
-                .is_some_and(|entry| entry.sha256 == sha256(&there))
-        };
-        if !ours && !force {
-            return Err(Error::InTheWay { path });
-        }
-        changed.push(name);
+/// What the manifest in the folder says that its build wrote. Manifests of other versions are
+/// understood, too.
+fn written_before(folder: &Folder) -> Result<Owned> {
+    #[derive(Deserialize)]
+    struct Before {
+        #[serde(rename = "format")]
+        _format: u32,
+        #[serde(rename = "made_by")]
+        _made_by: serde::de::IgnoredAny,
+        files: BTreeMap<String, FileEntry>,
     }
-    changed.sort_by_key(|name| *name == MANIFEST_FILE);
-    Ok((changed, unchanged))
-}
-
-/// Removes files of the last build that this one does not make, unless they were edited.
-fn remove_old(generated: &Generated, before: Option<&Manifest>, out: &Path) -> Result<Vec<String>> {
-    let mut removed = Vec::new();
-    for (name, entry) in before.into_iter().flat_map(|before| &before.files) {
-        // A manifest from elsewhere must not lead out of the folder.
-        let inside = Path::new(name)
-            .components()
-            .all(|part| matches!(part, std::path::Component::Normal(_)));
-        if generated.files.contains_key(name) || !inside {
-            continue;
-        }
-        let path = out.join(name);
-        if std::fs::read(&path).is_ok_and(|bytes| sha256(&bytes) == entry.sha256) {
-            std::fs::remove_file(&path).during("remove", &path)?;
-            removed.push(name.clone());
-            // The folder goes with its last file; if it is not empty, it stays.
-            if let Some(folder) = path.parent().filter(|folder| *folder != out) {
-                let _ = std::fs::remove_dir(folder);
-            }
+    let mut owned = Owned::new();
+    if let Found::File(bytes) = folder.read(MANIFEST_FILE)?
+        && let Ok(before) = serde_json::from_slice::<Before>(&bytes)
+    {
+        owned.insert(MANIFEST_FILE.into(), [sha256(&bytes)].into());
+        for (name, entry) in before.files {
+            owned.insert(name, [entry.sha256].into());
         }
     }
-    Ok(removed)
+    Ok(owned)
 }
 
 #[cfg(test)]

@@ -6,12 +6,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use hankel_dsl::native::describe::Kernel;
 use serde::{Deserialize, Serialize};
 
+use crate::compile::Compiled;
 use crate::error::{During, Error, Result};
-use crate::files::{sha256, write_whole};
+use crate::files::{self, sha256};
 use crate::finish::PIPELINE;
-use crate::source_hash::Sources;
+use crate::folder::{Folder, MOST_BYTES, Owned};
+use crate::inputs::Inputs;
 
 /// The file that says what a bundle is made from.
 pub const SOURCE_FILE: &str = "source.json";
@@ -22,14 +25,28 @@ pub const SOURCE_FILE: &str = "source.json";
 pub struct Origin {
     /// The kernel crate.
     pub crate_name: String,
-    /// [`Sources::sha256`] of it.
-    pub source_sha256: String,
-    /// Version of rust-gpu.
-    pub rust_gpu: String,
-    /// [`PIPELINE`] of the Hankel that finished the modules.
-    pub pipeline: u32,
+    /// What made it.
+    pub made_by: MadeBy,
+    /// Hash of the kernels' descriptions, as far as SPIR-V follows from them.
+    pub kernels: String,
+    /// What the compiler read.
+    pub inputs: Inputs,
     /// SHA-256 of each module, by entry point.
     pub modules: BTreeMap<String, String>,
+}
+
+/// What made a bundle.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MadeBy {
+    /// Version of rust-gpu.
+    pub rust_gpu: String,
+    /// What its compiler's `rustc --version` prints.
+    pub compiler: String,
+    /// The crate with SPIRV-Tools.
+    pub spirv_tools: String,
+    /// [`PIPELINE`] of the Hankel that finished the modules.
+    pub pipeline: String,
 }
 
 /// Final SPIR-V of a kernel crate, and where it comes from.
@@ -42,13 +59,24 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// Modules that were just made from `sources`.
-    pub fn new(sources: &Sources, rust_gpu: &str, modules: BTreeMap<String, Vec<u8>>) -> Self {
+    /// `modules`, which were just finished from what was `compiled` of `kernels`.
+    pub fn new(
+        crate_name: &str,
+        kernels: &[Kernel],
+        rust_gpu: &str,
+        compiled: &Compiled,
+        modules: BTreeMap<String, Vec<u8>>,
+    ) -> Self {
         let origin = Origin {
-            crate_name: sources.name.clone(),
-            source_sha256: sources.sha256.clone(),
-            rust_gpu: rust_gpu.into(),
-            pipeline: PIPELINE,
+            crate_name: crate_name.into(),
+            made_by: MadeBy {
+                rust_gpu: rust_gpu.into(),
+                compiler: compiled.compiler.clone(),
+                spirv_tools: env!("HANKEL_SPIRV_TOOLS_VERSION").into(),
+                pipeline: PIPELINE.into(),
+            },
+            kernels: hash_of(kernels),
+            inputs: compiled.inputs.clone(),
             modules: modules
                 .iter()
                 .map(|(name, bytes)| (name.clone(), sha256(bytes)))
@@ -63,11 +91,9 @@ impl Bundle {
     ///
     /// A file is missing, unreadable, or not the one that `source.json` means.
     pub fn read(folder: &Path) -> Result<Self> {
-        let path = folder.join(SOURCE_FILE);
-        let source = std::fs::read(&path).during("read", &path)?;
+        let source = files::read(&folder.join(SOURCE_FILE), MOST_BYTES)?;
         Self::assemble(folder, &source, |name| {
-            let path = folder.join(name);
-            std::fs::read(&path).during("read", &path)
+            files::read(&folder.join(name), MOST_BYTES)
         })
     }
 
@@ -120,63 +146,92 @@ impl Bundle {
     ///
     /// A file cannot be written or removed.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        std::fs::create_dir_all(folder).during("create", folder)?;
-        let put = |name: &str, bytes: &[u8]| {
-            let path = folder.join(name);
-            let there = std::fs::read(&path).is_ok_and(|there| there == bytes);
-            if there {
-                Ok(())
-            } else {
-                write_whole(&path, bytes)
-            }
-        };
-        for (name, bytes) in &self.modules {
-            put(&format!("{name}.spv"), bytes)?;
-        }
         let mut json =
             serde_json::to_string_pretty(&self.origin).map_err(|error| Error::Bundle {
                 path: folder.join(SOURCE_FILE),
                 problem: error.to_string(),
             })?;
         json.push('\n');
-        put(SOURCE_FILE, json.as_bytes())?;
+        let mut files: BTreeMap<String, Vec<u8>> = self
+            .modules
+            .iter()
+            .map(|(name, bytes)| (format!("{name}.spv"), bytes.clone()))
+            .collect();
+        files.insert(SOURCE_FILE.into(), json.into_bytes());
+        let place = Folder::create(folder)?;
+        let mut owned = Owned::new();
         for entry in std::fs::read_dir(folder).during("read", folder)? {
             let path = entry.during("read", folder)?.path();
-            let name = path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            let module = path.extension().is_some_and(|extension| extension == "spv");
-            if module && !self.modules.contains_key(&name) {
-                std::fs::remove_file(&path).during("remove", &path)?;
+            if path.extension().is_some_and(|extension| extension == "spv") {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                let hash = sha256(&files::read(&path, MOST_BYTES)?);
+                owned.insert(name.into_owned(), [hash].into());
             }
         }
+        place.update(&files, SOURCE_FILE, owned, true)?;
         Ok(())
     }
 
-    /// Whether the bundle is made from the sources with this hash, by this pipeline.
+    /// Whether the bundle is made of these kernels by this Hankel and this version of rust-gpu.
     ///
     /// # Errors
     ///
     /// [`Error::Stale`] says what differs.
-    pub fn check_current(&self, source_sha256: &str) -> Result<()> {
-        let short = |hash: &str| hash.chars().take(12).collect::<String>();
-        let reason = if self.origin.pipeline != PIPELINE {
-            format!(
-                "it was finished by pipeline {}, this is {PIPELINE}",
-                self.origin.pipeline
-            )
-        } else if self.origin.source_sha256 != source_sha256 {
-            format!(
-                "`{}` has changed (its hash is {}, the SPIR-V's {})",
-                self.origin.crate_name,
-                short(source_sha256),
-                short(&self.origin.source_sha256)
-            )
-        } else {
-            return Ok(());
+    pub fn check_made(&self, kernels: &[Kernel], rust_gpu: &str) -> Result<()> {
+        let made = &self.origin.made_by;
+        let mut reasons = Vec::new();
+        let mut compare = |what: &str, theirs: &str, ours: &str| {
+            if theirs != ours {
+                let short = |text: &str| text.chars().take(12).collect::<String>();
+                reasons.push(format!("{what} {}, not {}", short(theirs), short(ours)));
+            }
         };
-        Err(Error::Stale { reason })
+        compare("it was made by rust-gpu", &made.rust_gpu, rust_gpu);
+        compare(
+            "it was made with SPIRV-Tools",
+            &made.spirv_tools,
+            env!("HANKEL_SPIRV_TOOLS_VERSION"),
+        );
+        compare("it was finished by pipeline", &made.pipeline, PIPELINE);
+        compare(
+            "the kernels' descriptions have the hash",
+            &self.origin.kernels,
+            &hash_of(kernels),
+        );
+        stale(reasons)
     }
+
+    /// Whether everything that the compiler read is as it was, for the crate in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Stale`] says what differs.
+    pub fn check_inputs(&self, folder: &Path) -> Result<()> {
+        stale(self.origin.inputs.changes(folder))
+    }
+}
+
+fn stale(reasons: Vec<String>) -> Result<()> {
+    const SHOWN: usize = 3;
+    if reasons.is_empty() {
+        return Ok(());
+    }
+    let mut reason = reasons[..reasons.len().min(SHOWN)].join("; ");
+    if reasons.len() > SHOWN {
+        reason.push_str(&format!("; and {} more", reasons.len() - SHOWN));
+    }
+    Err(Error::Stale { reason })
+}
+
+/// Hash of what SPIR-V follows from: all but where a kernel stands and what is said of it.
+fn hash_of(kernels: &[Kernel]) -> String {
+    let mut kernels = kernels.to_vec();
+    kernels.sort_by(|a, b| a.name.cmp(&b.name));
+    for kernel in &mut kernels {
+        kernel.file.clear();
+        kernel.line = 0;
+        kernel.summary.clear();
+    }
+    // Nothing in it can fail to become JSON.
+    sha256(&serde_json::to_vec(&kernels).unwrap_or_default())
 }

@@ -6,12 +6,17 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::build::{Generated, MANIFEST_FILE};
-use crate::error::{During, Error, Failure, Result};
+use crate::build::Generated;
+use crate::error::{Error, Failure, Result};
+use crate::files;
 use crate::finish;
+use crate::folder::{Folder, Found, STAGE, SUBFOLDERS};
 use crate::lint::Finding;
 use crate::manifest::KernelEntry;
 use crate::spirv;
+
+/// Size of the largest budget, in bytes.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// Limits on a kernel's cost; see [`Cost`](crate::cost::Cost) for what is counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,11 +81,17 @@ impl Config {
     ///
     /// The file cannot be read, or says something that is not known.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).during("read", path)?;
-        toml::from_str(&text).map_err(|error| Error::Budget {
+        let wrong = |problem: String| Error::Budget {
             path: path.to_owned(),
-            problem: error.to_string().trim().to_owned(),
-        })
+            problem,
+        };
+        let bytes = files::read(path, MOST_BYTES).map_err(|error| match error {
+            Error::Io { source, .. } => wrong(format!("it cannot be read: {source}")),
+            Error::NotAFile { kind, .. } => wrong(format!("it cannot be read: it is {kind}")),
+            other => other,
+        })?;
+        let text = std::str::from_utf8(&bytes).map_err(|_| wrong("it is not UTF-8".into()))?;
+        toml::from_str(text).map_err(|error| wrong(error.to_string().trim().to_owned()))
     }
 }
 
@@ -129,6 +140,8 @@ pub struct Changed {
 pub struct Report {
     /// Files that are as they should be.
     pub same: usize,
+    /// A build of the folder was stopped before its end.
+    pub stopped: bool,
     /// Files that differ.
     pub changed: Vec<Changed>,
     /// Files that should be there.
@@ -148,6 +161,7 @@ impl Report {
     pub fn is_fine(&self) -> bool {
         let Self {
             same: _,
+            stopped,
             changed,
             missing,
             extra,
@@ -155,7 +169,8 @@ impl Report {
             over_budget,
             unknown_in_budget,
         } = self;
-        changed.is_empty()
+        !stopped
+            && changed.is_empty()
             && missing.is_empty()
             && extra.is_empty()
             && invalid.is_empty()
@@ -168,14 +183,18 @@ impl Report {
 ///
 /// # Errors
 ///
-/// A file that is there cannot be read.
+/// It is no folder, or a file that is there cannot be read.
 pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result<Report> {
     let mut report = Report::default();
+    let folder = Folder::open(committed)?;
     for (name, expected) in &generated.files {
-        let path = committed.join(name);
-        match std::fs::read(&path) {
-            Ok(there) if there == *expected => report.same += 1,
-            Ok(there) => {
+        let found = match &folder {
+            Some(folder) => folder.read(name)?,
+            None => Found::Nothing,
+        };
+        match found {
+            Found::File(there) if there == *expected => report.same += 1,
+            Found::File(there) => {
                 if name.ends_with(".spv") {
                     report
                         .invalid
@@ -186,23 +205,17 @@ pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result
                     diff: diff(name, &there, expected),
                 });
             }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                report.missing.push(name.clone());
-            }
-            Err(source) => {
-                return Err(Error::Io {
-                    action: "read",
-                    path,
-                    source,
-                });
-            }
+            Found::Nothing => report.missing.push(name.clone()),
+            Found::Other(path, kind) => report.changed.push(Changed {
+                file: name.clone(),
+                diff: format!("{} is {kind}\n", path.display()),
+            }),
         }
     }
-    list(committed, "", &mut |name| {
-        if !generated.files.contains_key(name) {
-            report.extra.push(name.to_owned());
-        }
-    })?;
+    if let Some(folder) = &folder {
+        report.stopped = folder.was_stopped()?;
+        report.extra = extra(folder, generated)?;
+    }
     report.extra.sort();
     for (kernel, entry) in &generated.manifest.kernels {
         report
@@ -272,44 +285,31 @@ fn diff(name: &str, there: &[u8], expected: &[u8]) -> String {
     }
 }
 
-/// Every file below a folder that could be a build's, by its path with `/`.
-fn list(folder: &Path, prefix: &str, visit: &mut impl FnMut(&str)) -> Result<()> {
-    let entries = match std::fs::read_dir(folder) {
-        Ok(entries) => entries,
-        // Everything is missing, then.
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(source) => {
-            return Err(Error::Io {
-                action: "read",
-                path: folder.to_owned(),
-                source,
-            });
-        }
-    };
-    for entry in entries {
-        let entry = entry.during("read", folder)?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let path = entry.path();
-        if path.is_dir() {
-            // Folders of a build; whatever else lies beside them is none of its business.
-            let ours = crate::Language::ALL
-                .iter()
-                .any(|language| language.name() == name)
-                || name == "include";
-            if !prefix.is_empty() || ours {
-                list(&path, &format!("{prefix}{name}/"), visit)?;
+/// Files in the folders of a build that are none of it. What else lies beside them is none of its
+/// business; hidden files are an editor's or the system's.
+fn extra(folder: &Folder, generated: &Generated) -> Result<Vec<String>> {
+    let mut extra = Vec::new();
+    for sub in SUBFOLDERS {
+        for file in folder.files_in(sub)? {
+            let name = format!("{sub}/{file}");
+            if !file.starts_with('.') && !generated.files.contains_key(&name) {
+                extra.push(name);
             }
-        } else if !prefix.is_empty() || name == MANIFEST_FILE {
-            visit(&format!("{prefix}{name}"));
         }
     }
-    Ok(())
+    Ok(extra)
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for changed in &self.changed {
             writeln!(f, "{}", changed.diff)?;
+        }
+        if self.stopped {
+            writeln!(
+                f,
+                "{STAGE}: a build of this folder was stopped; the next `hankel build` finishes it"
+            )?;
         }
         for file in &self.missing {
             writeln!(f, "missing: {file}")?;

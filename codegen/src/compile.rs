@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::{Duration, SystemTime};
 
 use rspirv::spirv::Capability;
 use rustc_codegen_spirv_types::{CompileResult, ModuleResult, SpirvTarget, TargetSpecVersion};
@@ -17,8 +18,9 @@ use serde::Deserialize;
 
 use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
+use crate::gather::{Build, gather};
+use crate::inputs::Inputs;
 use crate::spirv::trim;
-use crate::translate::text;
 
 /// What the modules are compiled for.
 const TARGET: &str = "spirv-unknown-vulkan1.2";
@@ -73,19 +75,21 @@ impl Compiler {
     ///
     /// rustc does not run.
     pub fn version(&self) -> Result<String> {
-        let mut rustc = self.command("rustc");
-        let program = PathBuf::from(rustc.get_program());
-        let output = rustc
-            .arg("--version")
-            .output()
-            .map_err(|source| Error::Run {
-                program: program.clone(),
-                source,
-            })?;
+        self.ask("rustc", &["--version"])
+    }
+
+    /// What a program of the toolchain prints.
+    fn ask(&self, program: &str, arguments: &[&str]) -> Result<String> {
+        let mut command = self.command(program);
+        let program = PathBuf::from(command.get_program());
+        let fail = |source| Error::Run {
+            program: program.clone(),
+            source,
+        };
+        let output = command.args(arguments).output().map_err(fail)?;
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            let source = std::io::Error::other(said);
-            return Err(Error::Run { program, source });
+            return Err(fail(std::io::Error::other(said)));
         }
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     }
@@ -119,6 +123,23 @@ fn leaks(name: &str) -> bool {
     NAMES.contains(&name) || PREFIXES.iter().any(|prefix| name.starts_with(prefix))
 }
 
+/// What came of a kernel crate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compiled {
+    /// Raw SPIR-V by entry point.
+    pub modules: BTreeMap<String, Vec<u8>>,
+    /// What it was made from.
+    pub inputs: Inputs,
+    /// What the compiler's `rustc --version` prints.
+    pub compiler: String,
+}
+
+/// How often a crate is compiled whose files change meanwhile.
+const MOST_ATTEMPTS: u32 = 4;
+
+/// File systems tell the time of a change in steps; the kernel's clock for it lags a little.
+const CLOCK_STEP: Duration = Duration::from_millis(50);
+
 /// Compiles the kernel crate whose Cargo.toml is `manifest`.
 ///
 /// `target_dir` is cargo's target folder (the artefacts go into [`TARGET_SUBFOLDER`] of it);
@@ -127,14 +148,14 @@ fn leaks(name: &str) -> bool {
 ///
 /// # Errors
 ///
-/// The crate does not compile, or lacks one of the entry points.
+/// The crate does not compile, lacks one of the entry points, or does not stop changing.
 pub fn compile(
     manifest: &Path,
     compiler: &Compiler,
     target_dir: &Path,
     kernels: &[&str],
     progress: &mut (dyn FnMut(&str) + Send),
-) -> Result<BTreeMap<String, Vec<u8>>> {
+) -> Result<Compiled> {
     let manifest = std::path::absolute(manifest).during("resolve", manifest)?;
     let folder = manifest
         .parent()
@@ -150,7 +171,70 @@ pub fn compile(
     let target_dir = std::path::absolute(target_dir)
         .during("resolve", target_dir)?
         .join(TARGET_SUBFOLDER);
-    let mut cargo = cargo(compiler, &manifest, folder, &target_dir)?;
+    // One compilation at a time: another one would write over what this one is about to read.
+    std::fs::create_dir_all(&target_dir).during("create", &target_dir)?;
+    let lock = target_dir.join("hankel.lock");
+    let lock = std::fs::File::create(&lock).during("create", &lock)?;
+    // File systems without locks are used without.
+    let _ = lock.lock();
+    let version = compiler.version()?;
+    let sysroot = compiler.ask("rustc", &["--print", "sysroot"])?;
+    let own = [target_dir.clone(), sysroot.into(), compiler.backend.clone()];
+    let mut before = None;
+    for _ in 0..MOST_ATTEMPTS {
+        let start = SystemTime::now() - CLOCK_STEP;
+        let messages = run(
+            compiler,
+            &version,
+            &manifest,
+            folder,
+            &target_dir,
+            kernels,
+            progress,
+        )?;
+        let artefact = last_artefact(&messages).ok_or_else(|| Error::Manifest {
+            path: manifest.clone(),
+            problem: "cargo made no SPIR-V of it: its [lib] needs crate-type = [\"lib\", \"dylib\"] and a kernel".into(),
+        })?;
+        if !artefact.belongs_to(&manifest)? {
+            continue;
+        }
+        let modules = read_modules(&manifest, &artefact.file, kernels)?;
+        let names = gather(&Build {
+            folder,
+            own: &own,
+            messages: &messages,
+        })?;
+        let inputs = Inputs::take(folder, &names)?;
+        // A file that changed while cargo ran may have been read before or after that. If nothing
+        // changes while cargo runs again, this is what it read.
+        let settled = inputs.newest(folder).is_none_or(|newest| newest < start);
+        if settled || before.as_ref() == Some(&inputs) {
+            return Ok(Compiled {
+                modules,
+                inputs,
+                compiler: version,
+            });
+        }
+        before = Some(inputs);
+    }
+    Err(Error::Inputs {
+        path: folder.to_owned(),
+        problem: "its files change while they are compiled".into(),
+    })
+}
+
+/// Runs cargo; gives its messages.
+fn run(
+    compiler: &Compiler,
+    version: &str,
+    manifest: &Path,
+    folder: &Path,
+    target_dir: &Path,
+    kernels: &[&str],
+    progress: &mut (dyn FnMut(&str) + Send),
+) -> Result<String> {
+    let mut cargo = cargo(compiler, version, manifest, folder, target_dir)?;
     let program = PathBuf::from(cargo.get_program());
     let mut child = cargo
         .stdout(Stdio::piped())
@@ -190,23 +274,19 @@ pub fn compile(
         .wait()
         .map_err(|source| Error::Run { program, source })?;
     if !status.success() {
-        return Err(failure(&manifest, kernels, &said, &messages));
+        return Err(failure(manifest, kernels, &said, &messages));
     }
-    let artefact = last_artefact(&messages).ok_or_else(|| Error::Manifest {
-        path: manifest.clone(),
-        problem: "cargo made no SPIR-V of it: its [lib] needs crate-type = [\"lib\", \"dylib\"] and a kernel".into(),
-    })?;
-    read_modules(&manifest, &artefact, kernels)
+    Ok(messages)
 }
 
 fn cargo(
     compiler: &Compiler,
+    said: &str,
     manifest: &Path,
     folder: &Path,
     target_dir: &Path,
 ) -> Result<Command> {
-    let said = compiler.version()?;
-    let version = parse_version(&said).ok_or_else(|| Error::Run {
+    let version = parse_version(said).ok_or_else(|| Error::Run {
         program: "rustc".into(),
         source: std::io::Error::other(format!("its version is no version: {said}")),
     })?;
@@ -314,7 +394,7 @@ fn failure(manifest: &Path, kernels: &[&str], said: &str, messages: &str) -> Err
     );
     let kernel = kernels
         .iter()
-        .find(|name| text::has_name(&output, name))
+        .find(|name| has_name(&output, name))
         .map(ToString::to_string);
     let panicked = output.contains("panicked at") || output.contains("internal compiler error");
     Error::Compile {
@@ -325,21 +405,74 @@ fn failure(manifest: &Path, kernels: &[&str], said: &str, messages: &str) -> Err
     }
 }
 
+/// Whether a name stands in the text as a word of its own.
+fn has_name(text: &str, name: &str) -> bool {
+    let is_part = |letter: char| letter == '_' || letter.is_alphanumeric();
+    text.match_indices(name).any(|(place, _)| {
+        !text[..place].ends_with(is_part) && !text[place + name.len()..].starts_with(is_part)
+    })
+}
+
 /// rust-gpu's list of what it made.
-fn last_artefact(messages: &str) -> Option<PathBuf> {
+#[derive(Debug, PartialEq)]
+struct Artefact {
+    file: PathBuf,
+    /// cargo thinks that it was made before.
+    fresh: bool,
+}
+
+impl Artefact {
+    /// Whether it was made of the crate at `manifest`. Two crates of one name that share a target
+    /// folder have one place for it, and cargo calls it fresh for both. What was made of the other
+    /// one is removed, so that cargo makes it again.
+    fn belongs_to(&self, manifest: &Path) -> Result<bool> {
+        let owner = self.file.with_extension("hankel-owner");
+        let made = std::fs::metadata(&self.file)
+            .and_then(|data| data.modified())
+            .during("read", &self.file)?;
+        let ours = format!("{}\n{made:?}\n", manifest.display());
+        if std::fs::read_to_string(&owner).is_ok_and(|it| it == ours) {
+            return Ok(true);
+        }
+        if self.fresh {
+            let name = self.file.file_name().unwrap_or_default();
+            let folder = self.file.parent().unwrap_or(Path::new("."));
+            for file in [self.file.clone(), folder.join("deps").join(name)] {
+                match std::fs::remove_file(&file) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(error).during("remove", &file);
+                    }
+                    _ => {}
+                }
+            }
+            return Ok(false);
+        }
+        std::fs::write(&owner, &ours).during("write", &owner)?;
+        Ok(true)
+    }
+}
+
+fn last_artefact(messages: &str) -> Option<Artefact> {
     #[derive(Deserialize)]
     struct Message {
         reason: String,
         #[serde(default)]
-        filenames: Vec<String>,
+        filenames: Vec<PathBuf>,
+        #[serde(default)]
+        fresh: bool,
     }
     messages
         .lines()
         .filter_map(|line| serde_json::from_str::<Message>(line).ok())
         .filter(|message| message.reason == "compiler-artifact")
-        .flat_map(|message| message.filenames)
-        .rfind(|file| file.ends_with(".spv.json"))
-        .map(PathBuf::from)
+        .flat_map(|message| {
+            message.filenames.into_iter().map(move |file| Artefact {
+                file,
+                fresh: message.fresh,
+            })
+        })
+        .filter(|artefact| artefact.file.to_string_lossy().ends_with(".spv.json"))
+        .last()
 }
 
 fn read_modules(
@@ -449,8 +582,9 @@ mod tests {
     #[test]
     fn the_last_artefact_counts() {
         let messages = "{\"reason\":\"compiler-artifact\",\"filenames\":[\"a.rlib\"]}\nnoise\n\
-            {\"reason\":\"compiler-artifact\",\"filenames\":[\"b.spv.json\"]}\n{\"reason\":\"build-finished\"}";
-        assert_eq!(last_artefact(messages), Some("b.spv.json".into()));
+            {\"reason\":\"compiler-artifact\",\"filenames\":[\"b.spv.json\"],\"fresh\":true}\n{\"reason\":\"build-finished\"}";
+        let found = last_artefact(messages).unwrap();
+        assert_eq!((found.file, found.fresh), ("b.spv.json".into(), true));
         assert_eq!(last_artefact("{}"), None);
     }
 }

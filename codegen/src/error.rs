@@ -116,6 +116,14 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// What a kernel crate is made from cannot be told.
+    #[error("{}: {problem}", path.display())]
+    Inputs {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// rust-gpu or rustc rejected the kernel crate.
     #[error("{} does not compile to SPIR-V{}{}\n{output}", manifest.display(),
         kernel.as_ref().map(|name| format!(" (kernel `{name}`)")).unwrap_or_default(),
@@ -151,7 +159,7 @@ pub enum Error {
         .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Kernels(Vec<Failure>),
     /// SPIR-V that was not made from the present sources.
-    #[error("the committed SPIR-V is not made from the present sources: {reason}")]
+    #[error("the SPIR-V at hand is not made from the present sources: {reason}")]
     Stale {
         /// What does not match.
         reason: String,
@@ -201,11 +209,40 @@ pub enum Error {
         /// What may be given.
         expected: &'static str,
     },
-    /// A file that hankel did not write is where one must go.
-    #[error("{} is in the way: hankel did not write it, or it was edited since", path.display())]
+    /// What hankel did not write is where a file must go.
+    #[error("{} is in the way: {}", path.display(), match kind {
+        Some(kind) => format!("it is {kind}"),
+        None => "hankel did not write it, or it was edited since".to_owned(),
+    })]
     InTheWay {
         /// The file.
         path: PathBuf,
+        /// What it is, where it is no regular file.
+        kind: Option<&'static str>,
+    },
+    /// The output is no folder.
+    #[error("{} is {kind}: the output goes into a folder", path.display())]
+    NotAFolder {
+        /// What was given.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
+    },
+    /// Another process does not stop changing a folder.
+    #[error("{} has been locked by another hankel for {seconds} s", path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+        /// How long it was waited for.
+        seconds: u64,
+    },
+    /// A file that is no file, or larger than it can be.
+    #[error("cannot read {}: it is {kind}", path.display())]
+    NotAFile {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: String,
     },
     /// Two kernels with one name.
     #[error("two kernels are named `{name}`")]
@@ -267,12 +304,23 @@ impl Error {
             Self::UnknownKernel { .. } => {
                 "Name one of these, or part of a name with `*`; `hankel list` shows them.".into()
             }
+            Self::InTheWay {
+                kind: None | Some("a FIFO" | "a socket" | "a device"),
+                ..
+            } => "Move it away or choose another output folder; with `--force` it is overwritten."
+                .into(),
             Self::InTheWay { .. } => {
-                "Move it away or choose another output folder; with `--force` it is overwritten."
+                "Move it away or choose another output folder: hankel follows no links below it."
                     .into()
             }
+            Self::NotAFolder { .. } => "Choose another folder, or move it away.".into(),
+            Self::Busy { .. } => "Wait for it, or end it, and try again.".into(),
             Self::DuplicateKernel { .. } | Self::DuplicateLayout { .. } => {
                 "Rename one of them.".into()
+            }
+            Self::Inputs { .. } => {
+                "Everything that a kernel is made from must be a file that can be read again."
+                    .into()
             }
             Self::Manifest { .. } => "Give the path of a kernel crate's Cargo.toml.".into(),
             Self::Run { .. } => {
@@ -280,6 +328,7 @@ impl Error {
             }
             Self::UnknownConstant { .. } => "Give the constant's name in the kernel.".into(),
             Self::Io { .. }
+            | Self::NotAFile { .. }
             | Self::UnknownTarget { .. }
             | Self::Option { .. }
             | Self::Budget { .. }

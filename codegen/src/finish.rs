@@ -17,9 +17,9 @@ use crate::spirv::{self, exact, libm, names, order, refused, split, trim, unifor
 /// What the modules are for.
 const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
 
-/// Number of what this module does to SPIR-V. To be raised with every change that gives other
-/// bytes: committed SPIR-V of another number counts as stale.
-pub const PIPELINE: u32 = 3;
+/// Hash of this crate's code that final SPIR-V follows from (`build.rs` collects it): committed
+/// SPIR-V of another hash counts as stale.
+pub const PIPELINE: &str = env!("HANKEL_PIPELINE_SHA256");
 
 /// Rounds of optimisation at most; the built-in kernels take one or two.
 const MOST_ROUNDS: u32 = 8;

@@ -44,7 +44,7 @@ impl Language {
     ];
 
     /// The name on the command line, in the manifest and of the output's folder.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Spirv => "spirv",
             Self::Wgsl => "wgsl",

@@ -23,12 +23,14 @@ pub mod diagnostics;
 mod error;
 pub mod files;
 pub mod finish;
+mod folder;
+mod gather;
 pub mod headers;
+pub mod inputs;
 mod language;
 pub mod lint;
 pub mod manifest;
 pub mod scaffold;
-pub mod source_hash;
 pub mod spirv;
 pub mod translate;
 
@@ -38,9 +40,9 @@ pub use language::Language;
 /// This crate's version, which the generated files name.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-impl From<source_hash::HashError> for Error {
-    fn from(error: source_hash::HashError) -> Self {
-        Self::Manifest {
+impl From<inputs::InputError> for Error {
+    fn from(error: inputs::InputError) -> Self {
+        Self::Inputs {
             path: error.path,
             problem: error.problem,
         }

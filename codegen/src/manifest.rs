@@ -10,7 +10,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cost::Cost;
-use crate::finish::PIPELINE;
 use crate::headers::Layouts;
 use crate::lint::Finding;
 use crate::spirv::names::output_name;
@@ -30,7 +29,7 @@ pub struct Manifest {
     pub made_by: Versions,
     /// The kernel crate.
     pub crate_name: String,
-    /// SHA-256 over everything that the files follow from: sources, options, versions.
+    /// SHA-256 over everything that the files follow from: SPIR-V, descriptions, options, versions.
     pub inputs_sha256: String,
     /// The options that they were made with.
     pub options: WriteOptions,
@@ -53,8 +52,6 @@ pub struct Versions {
     pub spirv_tools: String,
     /// naga.
     pub naga: String,
-    /// Number of what Hankel does to SPIR-V between those.
-    pub pipeline: u32,
 }
 
 impl Versions {
@@ -65,7 +62,6 @@ impl Versions {
             rust_gpu: rust_gpu.into(),
             spirv_tools: env!("HANKEL_SPIRV_TOOLS_VERSION").into(),
             naga: env!("HANKEL_NAGA_VERSION").into(),
-            pipeline: PIPELINE,
         }
     }
 }

@@ -6,17 +6,18 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
 
+use hankel_codegen::Error;
 use hankel_codegen::build::{Modules, build, finish_all, generate};
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::check::{Budget, Config, Limits, check};
+use hankel_codegen::compile::Compiled;
+use hankel_codegen::inputs::{Inputs, Names};
 use hankel_codegen::manifest::{Manifest, schema};
 use hankel_codegen::scaffold::{Dsl, scaffold};
-use hankel_codegen::{Error, source_hash};
 
 fn build_all(out: &Path) -> hankel_codegen::build::Report {
-    build(&support::request(), out, false, || Ok(support::modules())).unwrap()
+    build(&support::request(), &support::modules(), out, false).unwrap()
 }
 
 #[test]
@@ -160,12 +161,7 @@ fn nothing_is_done_while_nothing_changes() {
             )
         })
         .collect();
-    let start = Instant::now();
-    let second = build(&support::request(), folder.path(), false, || {
-        panic!("nothing to compile")
-    })
-    .unwrap();
-    assert!(start.elapsed().as_secs_f64() < 0.3);
+    let second = build_all(folder.path());
     assert_eq!(
         (second.written.len(), second.unchanged),
         (0, first.written.len())
@@ -183,13 +179,59 @@ fn nothing_is_done_while_nothing_changes() {
     // A deleted file comes back, and only that is written.
     fs::remove_file(folder.path().join("wgsl/bound.wgsl")).unwrap();
     assert_eq!(build_all(folder.path()).written, ["wgsl/bound.wgsl"]);
-    // No temporary file is left.
-    let odd: Vec<_> = fs::read_dir(folder.path().join("wgsl"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .filter(|name| name.starts_with('.'))
-        .collect();
-    assert!(odd.is_empty(), "{odd:?}");
+    // Nothing of the preparation is left.
+    assert!(!folder.path().join(".hankel").exists());
+}
+
+/// What is right is not asked of the folder itself.
+#[test]
+fn a_manifest_that_was_edited_is_not_believed() {
+    let folder = tempfile::tempdir().unwrap();
+    build_all(folder.path());
+    let path = folder.path().join("manifest.json");
+    let right = fs::read_to_string(&path).unwrap();
+    let mut json: serde_json::Value = serde_json::from_str(&right).unwrap();
+    json["files"] = serde_json::json!({});
+    fs::write(&path, json.to_string()).unwrap();
+    fs::remove_dir_all(folder.path().join("hlsl")).unwrap();
+    let report = build_all(folder.path());
+    assert!(
+        report.written.contains(&"hlsl/bound.hlsl".into()),
+        "{report:?}"
+    );
+    assert_eq!(fs::read_to_string(&path).unwrap(), right);
+    let edited = right.replacen("\"binding\": 0", "\"binding\": 7", 1);
+    assert_ne!(edited, right);
+    fs::write(&path, edited).unwrap();
+    assert_eq!(build_all(folder.path()).written, ["manifest.json"]);
+    assert_eq!(fs::read_to_string(&path).unwrap(), right);
+    // One of an older format still says what its build wrote.
+    let mut json: serde_json::Value = serde_json::from_str(&right).unwrap();
+    json["format"] = 0.into();
+    json["made_by"] = serde_json::json!({ "hankel": "0.0.1" });
+    json.as_object_mut().unwrap().remove("kernels");
+    let old = "// of another version\n";
+    fs::write(folder.path().join("wgsl/bound.wgsl"), old).unwrap();
+    json["files"]["wgsl/bound.wgsl"]["sha256"] =
+        hankel_codegen::files::sha256(old.as_bytes()).into();
+    fs::write(&path, json.to_string()).unwrap();
+    assert_eq!(
+        build_all(folder.path()).written,
+        ["wgsl/bound.wgsl", "manifest.json"]
+    );
+    // One that is no manifest is the user's.
+    fs::write(&path, "{}").unwrap();
+    let error = build(
+        &support::request(),
+        &support::modules(),
+        folder.path(),
+        false,
+    )
+    .unwrap_err();
+    assert!(
+        error.to_string().contains("manifest.json is in the way"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -200,7 +242,7 @@ fn the_folder_holds_what_was_asked_for_last() {
     let mut request = support::request();
     request.filter = vec!["bo*".into()];
     request.targets = vec![hankel_codegen::Language::Wgsl];
-    let report = build(&request, folder.path(), false, || Ok(support::modules())).unwrap();
+    let report = build(&request, &support::modules(), folder.path(), false).unwrap();
     assert!(
         report.removed.contains(&"hlsl/bound.hlsl".to_owned()),
         "{report:?}"
@@ -209,7 +251,7 @@ fn the_folder_holds_what_was_asked_for_last() {
     assert!(folder.path().join("wgsl/bound.wgsl").exists());
     assert!(folder.path().join("notes.txt").exists());
     request.filter = vec!["nothing".into()];
-    let error = build(&request, folder.path(), false, || Ok(support::modules())).unwrap_err();
+    let error = build(&request, &support::modules(), folder.path(), false).unwrap_err();
     assert!(
         error.to_string().contains("`nothing`") && error.to_string().contains("resample"),
         "{error}"
@@ -223,9 +265,9 @@ fn files_of_the_users_stay() {
     fs::create_dir(folder.path().join("wgsl")).unwrap();
     fs::write(&path, "mine").unwrap();
     let request = support::request();
-    let error = build(&request, folder.path(), false, || Ok(support::modules())).unwrap_err();
+    let error = build(&request, &support::modules(), folder.path(), false).unwrap_err();
     assert!(
-        matches!(&error, Error::InTheWay { path: other } if *other == path),
+        matches!(&error, Error::InTheWay { path: other, .. } if *other == path),
         "{error}"
     );
     assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
@@ -233,10 +275,10 @@ fn files_of_the_users_stay() {
         !folder.path().join("manifest.json").exists(),
         "nothing is half-written"
     );
-    build(&request, folder.path(), true, || Ok(support::modules())).unwrap();
+    build(&request, &support::modules(), folder.path(), true).unwrap();
     // An edit counts as the user's too.
     fs::write(&path, "edited").unwrap();
-    assert!(build(&request, folder.path(), false, || Ok(support::modules())).is_err());
+    assert!(build(&request, &support::modules(), folder.path(), false).is_err());
 }
 
 #[test]
@@ -301,6 +343,20 @@ fn a_check_shows_what_differs() {
     );
     let json = serde_json::to_value(&report).unwrap();
     assert_eq!(json["missing"][0], "msl/tint.metal");
+    // A build that was stopped shows.
+    fs::create_dir(folder.path().join(".hankel")).unwrap();
+    let report = check(&generated, folder.path(), &Budget::default()).unwrap();
+    assert!(report.stopped && !report.is_fine(), "{report}");
+    assert!(
+        report
+            .to_string()
+            .contains("a build of this folder was stopped"),
+        "{report}"
+    );
+    // An editor's own files do not.
+    fs::write(folder.path().join("glsl/.old.comp.swp"), "").unwrap();
+    let report = check(&generated, folder.path(), &Budget::default()).unwrap();
+    assert_eq!(report.extra, ["glsl/old.comp"]);
     // A folder that is not there lacks everything.
     let report = check(&generated, &folder.path().join("none"), &Budget::default()).unwrap();
     assert_eq!(report.missing.len(), generated.files.len());
@@ -325,10 +381,23 @@ fn budgets_are_read() {
         error.contains("hankel.toml") && error.contains("branchs"),
         "{error}"
     );
+    // What is no file is neither read to its end nor waited for.
+    for (path, problem) in [
+        (folder.path().join("nope.toml"), "No such file"),
+        (folder.path().to_owned(), "a folder"),
+        ("/dev/zero".into(), "a device"),
+    ] {
+        let error = Config::read(&path).unwrap_err();
+        assert!(matches!(error, Error::Budget { .. }), "{error:?}");
+        assert!(error.to_string().contains(problem), "{error}");
+    }
+    fs::write(&path, vec![b'#'; 2 << 20]).unwrap();
+    let error = Config::read(&path).unwrap_err().to_string();
+    assert!(error.contains("larger than 1 MiB"), "{error}");
 }
 
-/// A crate with a path dependency, a workspace and a lock file.
-fn write_crates(root: &Path) {
+/// A crate with a path dependency, a workspace and a lock file, and the record of a build of it.
+fn write_crates(root: &Path) -> Names {
     let write = |path: &str, text: &str| {
         let path = root.join(path);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -336,98 +405,221 @@ fn write_crates(root: &Path) {
     };
     write(
         "Cargo.toml",
-        "[workspace]\nmembers = [\"a\", \"b\"]\n[workspace.dependencies]\nb = { path = \"b\" }\n",
+        "[workspace]\nmembers = [\"a\", \"b\"]\n[workspace.dependencies]\nb = { path = \"b\" }\nc = \"1\"\n",
     );
     write(
         "Cargo.lock",
-        "[[package]]\nname = \"glam\"\nversion = \"1.0.0\"\nsource = \"s\"\nchecksum = \"c\"\n[[package]]\nname = \"rayon\"\nversion = \"1.0.0\"\nsource = \"s\"\n",
+        "[[package]]\nname = \"a\"\nversion = \"0.1.0\"\ndependencies = [\"b\"]\n\
+         [[package]]\nname = \"b\"\nversion = \"0.1.0\"\ndependencies = [\"glam\", \"rayon\"]\n\
+         [[package]]\nname = \"glam\"\nversion = \"1.0.0\"\nsource = \"s\"\nchecksum = \"c\"\n\
+         [[package]]\nname = \"rayon\"\nversion = \"1.0.0\"\nsource = \"s\"\n",
     );
     write(
         "a/Cargo.toml",
-        "[package]\nname = \"a\"\n[dependencies]\nb.workspace = true\n",
+        "[package]\nname = \"a\"\nversion = \"0.1.0\"\n[dependencies]\nb.workspace = true\n",
     );
     write("a/src/lib.rs", "// a\n");
+    write("coef.txt", "1\r\n");
+    write("a/data/table.bin", "1");
     write(
         "b/Cargo.toml",
-        "[package]\nname = \"b\"\n[dependencies]\nglam = \"1\"\n[target.'cfg(not(target_arch = \"spirv\"))'.dependencies]\nrayon = \"1\"\n",
+        "[package]\nname = \"b\"\nversion = \"0.1.0\"\n",
     );
     write("b/src/lib.rs", "// b\n");
     write("b/src/native/host.rs", "// host\n");
-    write("b/tests/t.rs", "// test\n");
+    let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    Names {
+        files: set(&[
+            "Cargo.toml",
+            "build.rs",
+            "src/lib.rs",
+            "../coef.txt",
+            "../b/Cargo.toml",
+            "../b/build.rs",
+            "../b/src/lib.rs",
+        ]),
+        folders: set(&["data"]),
+        environment: set(&["HANKEL_TEST_WEIGHT"]),
+        packages: set(&["a 0.1.0", "b 0.1.0", "glam 1.0.0"]),
+    }
 }
 
 #[test]
-fn the_source_hash_follows_the_sources_alone() {
+fn a_record_of_inputs_follows_what_was_read() {
     let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    write_crates(one.path());
+    let names = write_crates(one.path());
     write_crates(two.path());
-    let hash = |root: &Path| source_hash::hash(&root.join("a/Cargo.toml")).unwrap();
-    let before = hash(one.path());
-    assert_eq!(
-        before.sha256,
-        hash(two.path()).sha256,
-        "the place does not count"
-    );
-    assert_eq!((before.name.as_str(), before.files.len()), ("a", 5));
-    let changes = |path: &str, text: &str| {
-        let path = two.path().join(path);
-        let old = fs::read_to_string(&path).ok();
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(&path, text).unwrap();
-        let changed = hash(two.path()).sha256 != before.sha256;
+    let recorded = Inputs::take(&one.path().join("a"), &names).unwrap();
+    assert_eq!(recorded.names(), names);
+    let root = two.path();
+    let changes = || recorded.changes(&root.join("a"));
+    assert_eq!(changes(), [""; 0], "the place does not count");
+    let edit = |path: &str, text: Option<&str>| {
+        let path = root.join(path);
+        let old = fs::read(&path).ok();
+        match text {
+            Some(text) => {
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(&path, text).unwrap();
+            }
+            None => fs::remove_file(&path).unwrap(),
+        }
+        let found = changes();
         match old {
             Some(old) => fs::write(&path, old).unwrap(),
             None => fs::remove_file(&path).unwrap(),
         }
-        changed
+        found.join("; ")
     };
-    assert!(changes("a/src/lib.rs", "// A\n"));
-    assert!(changes("b/src/lib.rs", "// B\n"));
-    assert!(changes("b/src/more.rs", ""));
-    assert!(changes(
-        "a/Cargo.toml",
-        "[package]\nname = \"a\"\n[dependencies]\nb = { path = \"../b\" }\n"
-    ));
-    let lock = fs::read_to_string(two.path().join("Cargo.lock")).unwrap();
-    assert!(changes("Cargo.lock", &lock.replacen("1.0.0", "1.0.1", 1)));
-    assert!(!changes(
-        "Cargo.lock",
-        &lock.replace(
+    for (path, text, expected) in [
+        ("a/src/lib.rs", Some("// A\n"), "`src/lib.rs` has changed"),
+        (
+            "b/src/lib.rs",
+            Some("// B\n"),
+            "`../b/src/lib.rs` has changed",
+        ),
+        ("b/src/lib.rs", None, "`../b/src/lib.rs` is gone"),
+        ("coef.txt", Some("1\n"), "`../coef.txt` has changed"),
+        ("a/build.rs", Some("fn main() {}"), "`build.rs` is new"),
+        ("a/data/more/new.bin", Some("2"), "`data` has changed"),
+        ("a/data/table.bin", None, "`data` has changed"),
+        // Line ends of sources, and what was not read, do not count.
+        ("a/src/lib.rs", Some("// a\r\n"), ""),
+        ("b/src/native/host.rs", Some("// other\n"), ""),
+        ("a/README.md", Some("other"), ""),
+        ("a/shaders/include/hankel.rs", Some("other"), ""),
+        ("a/data/.table.bin.swp", Some("other"), ""),
+        ("a/.cargo/config.toml", Some("[build]\njobs = 1\n"), ""),
+        (
+            "a/.cargo/config.toml",
+            Some("[patch.crates-io]\nglam = { path = \"x\" }\n"),
+            "cargo's configuration or the workspace's Cargo.toml has changed",
+        ),
+        (
+            "a/.cargo/config.toml",
+            Some("[env]\nHANKEL_TEST_WEIGHT = \"2\"\n"),
+            "the environment variable `HANKEL_TEST_WEIGHT` is new; cargo's configuration or the \
+             workspace's Cargo.toml has changed",
+        ),
+    ] {
+        assert_eq!(edit(path, text), expected, "{path}");
+    }
+    let shared = fs::read_to_string(root.join("Cargo.toml")).unwrap();
+    for (from, to, counts) in [
+        ("c = \"1\"", "c = \"2\"", false),
+        ("path = \"b\"", "path = \"b\", features = [\"x\"]", true),
+        (
+            "[workspace]",
+            "[profile.release]\nopt-level = 1\n[workspace]",
+            true,
+        ),
+    ] {
+        assert_ne!(shared.replace(from, to), shared);
+        let found = edit("Cargo.toml", Some(&shared.replace(from, to)));
+        assert_eq!(
+            found.contains("workspace's Cargo.toml"),
+            counts,
+            "{from}: {found}"
+        );
+    }
+    let lock = fs::read_to_string(root.join("Cargo.lock")).unwrap();
+    for (from, to, expected) in [
+        (
+            "\"c\"",
+            "\"d\"",
+            "Cargo.lock's entry of `glam 1.0.0` has changed",
+        ),
+        (
             "\"rayon\"\nversion = \"1.0.0\"",
-            "\"rayon\"\nversion = \"1.0.1\""
-        )
-    ));
-    assert!(!changes("a/src/lib.rs", "// a\r\n"));
-    assert!(!changes("b/src/native/host.rs", "// other\n"));
-    assert!(!changes("b/tests/t.rs", "// other\n"));
-    assert!(!changes("a/README.md", "other"));
-    fs::remove_file(two.path().join("b/Cargo.toml")).unwrap();
-    let error = source_hash::hash(&two.path().join("a/Cargo.toml")).unwrap_err();
-    assert!(error.to_string().contains("Cargo.toml"), "{error}");
+            "\"rayon\"\nversion = \"1.0.1\"",
+            "",
+        ),
+        (
+            "\"glam\"\nversion = \"1.0.0\"",
+            "\"glam\"\nversion = \"1.0.1\"",
+            "Cargo.lock's entry of `b 0.1.0` has changed; Cargo.lock's entry of `glam 1.0.0` is gone",
+        ),
+        // A second version, for a package that was not compiled.
+        (
+            "dependencies = [\"glam\", \"rayon\"]",
+            "dependencies = [\"glam 1.0.0\", \"rayon\"]\n[[package]]\nname = \"glam\"\nversion = \"2.0.0\"\nsource = \"s\"",
+            "",
+        ),
+    ] {
+        assert_ne!(lock.replacen(from, to, 1), lock, "{from}");
+        assert_eq!(
+            edit("Cargo.lock", Some(&lock.replacen(from, to, 1))),
+            expected
+        );
+    }
+}
+
+/// The folder that a build script watches when it says nothing is the whole package: with the
+/// build's own output in it, but that is no source.
+#[test]
+fn a_build_in_the_crate_is_no_source_of_it() {
+    let place = tempfile::tempdir().unwrap();
+    let mut names = write_crates(place.path());
+    names.folders = [".".to_owned()].into();
+    let folder = place.path().join("a");
+    let recorded = Inputs::take(&folder, &names).unwrap();
+    build_all(&folder.join("shaders"));
+    assert_eq!(recorded.changes(&folder), [""; 0]);
+    fs::write(folder.join("new.txt"), "").unwrap();
+    assert_eq!(recorded.changes(&folder), ["`.` has changed"]);
 }
 
 #[test]
 fn bundles_are_read_back_and_never_stale() {
     let (crates, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    write_crates(crates.path());
-    let sources = source_hash::hash(&crates.path().join("a/Cargo.toml")).unwrap();
+    let names = write_crates(crates.path());
+    let krate = crates.path().join("a");
     let Modules::Raw(raw) = support::modules() else {
         unreachable!()
     };
-    let modules = finish_all(&raw, &support::all()).unwrap();
-    let bundle = Bundle::new(&sources, "0.10.0", modules);
+    let compiled = Compiled {
+        inputs: Inputs::take(&krate, &names).unwrap(),
+        compiler: "rustc 1.98.1".into(),
+        modules: raw,
+    };
+    let kernels = support::all();
+    let modules = finish_all(&compiled.modules, &kernels).unwrap();
+    let bundle = Bundle::new("a", &kernels, "0.10.0", &compiled, modules);
     fs::write(folder.path().join("old.spv"), "").unwrap();
     bundle.write(folder.path()).unwrap();
     assert!(!folder.path().join("old.spv").exists());
     let read = Bundle::read(folder.path()).unwrap();
     assert_eq!(read, bundle);
-    read.check_current(&sources.sha256).unwrap();
-    let error = read.check_current(&"1".repeat(64)).unwrap_err();
+    read.check_made(&kernels, "0.10.0").unwrap();
+    read.check_inputs(&krate).unwrap();
+    fs::write(krate.join("src/lib.rs"), "// edited\n").unwrap();
+    let error = read.check_inputs(&krate).unwrap_err();
     assert!(matches!(error, Error::Stale { .. }), "{error}");
+    assert!(
+        error.to_string().contains("`src/lib.rs` has changed"),
+        "{error}"
+    );
     assert!(error.advice().unwrap().contains("hankel toolchain install"));
+    // Whatever made it must be the same.
+    let refuses = |bundle: &Bundle, kernels: &[_], rust_gpu: &str, word: &str| {
+        let error = bundle
+            .check_made(kernels, rust_gpu)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(word), "{error}");
+    };
+    refuses(&read, &kernels, "0.11.0", "rust-gpu 0.10.0, not 0.11.0");
+    refuses(&read, &kernels[1..], "0.10.0", "descriptions");
     let mut older = read.clone();
-    older.origin.pipeline -= 1;
-    assert!(older.check_current(&sources.sha256).is_err());
+    older.origin.made_by.pipeline = "1".repeat(64);
+    refuses(&older, &kernels, "0.10.0", "pipeline 111111111111");
+    let mut older = read.clone();
+    older.origin.made_by.spirv_tools = "0.1.0".into();
+    refuses(&older, &kernels, "0.10.0", "SPIRV-Tools 0.1.0");
+    // Where a kernel stands, and what is said of it, does not count.
+    let mut moved = kernels.clone();
+    moved[0].line += 1;
+    read.check_made(&moved, "0.10.0").unwrap();
     let files: Vec<(String, Vec<u8>)> = fs::read_dir(folder.path())
         .unwrap()
         .map(|entry| entry.unwrap())
@@ -475,13 +667,10 @@ fn a_new_crate_is_whole() {
     let path = folder.path().join("my-kernels");
     let written = scaffold(&path, &dsl).unwrap();
     assert_eq!(written.len(), 5);
-    let sources = source_hash::hash(&path.join("Cargo.toml")).unwrap();
-    assert_eq!(sources.name, "my-kernels");
+    let manifest = fs::read_to_string(path.join("Cargo.toml")).unwrap();
     assert!(
-        sources
-            .folders
-            .iter()
-            .any(|folder| folder.ends_with("kernels/macros"))
+        manifest.contains("name = \"my-kernels\"") && manifest.contains("kernels/dsl"),
+        "{manifest}"
     );
     for (name, problem) in [
         ("my-kernels", "not empty"),

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use hankel_codegen::build::{Generated, Modules, Request, generate};
 use hankel_codegen::bundle::Bundle;
-use hankel_codegen::source_hash::hash;
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::Entry;
+use hankel_dsl::native::describe::Kernel;
+use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
 /// The repository.
 #[must_use]
@@ -65,10 +66,13 @@ impl Crate {
     fn new(entries: Vec<Entry>, folder: &str, snapshots: &str) -> Self {
         let manifest = root().join(folder).join("Cargo.toml");
         let bundle = Bundle::read(&root().join(snapshots)).unwrap_or_else(|e| panic!("{e}"));
-        let sources = hash(&manifest).unwrap_or_else(|e| panic!("{e}"));
-        bundle.check_current(&sources.sha256).unwrap_or_else(|e| {
-            panic!("{e}\nrun `cargo xtask spirv`, with rust-gpu's compiler installed")
-        });
+        let kernels: Vec<Kernel> = entries.iter().map(|e| e.kernel.clone()).collect();
+        bundle
+            .check_made(&kernels, RUST_GPU_VERSION)
+            .and_then(|()| bundle.check_inputs(&root().join(folder)))
+            .unwrap_or_else(|e| {
+                panic!("{e}\nrun `cargo xtask spirv`, with rust-gpu's compiler installed")
+            });
         Self {
             entries,
             bundle,
@@ -85,8 +89,7 @@ impl Crate {
             filter: Vec::new(),
             targets: Vec::new(),
             options: Options::default(),
-            source_sha256: self.bundle.origin.source_sha256.clone(),
-            rust_gpu: self.bundle.origin.rust_gpu.clone(),
+            rust_gpu: self.bundle.origin.made_by.rust_gpu.clone(),
         };
         let modules = Modules::Final(self.bundle.modules.clone());
         generate(&request, &modules).unwrap_or_else(|e| panic!("{e}"))

@@ -8,7 +8,6 @@ use std::process::ExitCode;
 use hankel_codegen::build::finish_all;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiler, compile};
-use hankel_codegen::source_hash::hash;
 use hankel_dsl::native::Entry;
 use hankel_dsl::native::describe::Kernel;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
@@ -44,6 +43,7 @@ fn root() -> PathBuf {
 
 /// A crate whose SPIR-V is committed.
 struct Committed {
+    crate_name: &'static str,
     manifest: &'static str,
     folder: &'static str,
     kernels: Vec<Kernel>,
@@ -53,16 +53,19 @@ fn committed() -> [Committed; 3] {
     let kernels = |entries: Vec<Entry>| entries.into_iter().map(|e| e.kernel).collect();
     [
         Committed {
+            crate_name: "hankel-shadows",
             manifest: "kernels/shadows/Cargo.toml",
             folder: "snapshots/spirv",
             kernels: kernels(hankel_shadows::entries()),
         },
         Committed {
+            crate_name: "hankel-conformance",
             manifest: "tests/conformance/Cargo.toml",
             folder: "snapshots/conformance",
             kernels: kernels(hankel_conformance::entries()),
         },
         Committed {
+            crate_name: "hankel-listing",
             manifest: "tests/listing/Cargo.toml",
             folder: "snapshots/listing",
             kernels: kernels(hankel_listing::entries()),
@@ -81,9 +84,8 @@ impl Committed {
             channel: toolchain.channel,
         };
         let manifest = root().join(self.manifest);
-        let sources = hash(&manifest)?;
         let names: Vec<&str> = self.kernels.iter().map(|k| k.name.as_str()).collect();
-        let raw = compile(
+        let compiled = compile(
             &manifest,
             &compiler,
             &root().join("target"),
@@ -91,9 +93,11 @@ impl Committed {
             &mut |_| {},
         )?;
         Ok(Bundle::new(
-            &sources,
+            self.crate_name,
+            &self.kernels,
             RUST_GPU_VERSION,
-            finish_all(&raw, &self.kernels)?,
+            &compiled,
+            finish_all(&compiled.modules, &self.kernels)?,
         ))
     }
 }

@@ -1,8 +1,7 @@
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use hankel_codegen::Language;
-use hankel_codegen::build::build;
+use hankel_codegen::build::{build, check_output};
 
 use super::print_json;
 use crate::args::{Build, Format};
@@ -10,23 +9,12 @@ use crate::failure::{Outcome, Result};
 use crate::session::Session;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
+    check_output(&args.out)?;
     let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
     let request = session.request(&args.generate)?;
-    // `build` knows codegen's errors only: one of this crate's waits here meanwhile.
-    let failure = RefCell::new(None);
-    let result = build(&request, &args.out, args.force, || {
-        session.modules().map_err(|e| {
-            let stale = hankel_codegen::Error::Stale {
-                reason: e.to_string(),
-            };
-            *failure.borrow_mut() = Some(e);
-            stale
-        })
-    });
-    if let Some(failure) = failure.into_inner() {
-        return Err(failure);
-    }
-    let report = result?;
+    // What is wrong with the request is told before anything is compiled.
+    request.chosen()?;
+    let report = build(&request, &session.modules()?, &args.out, args.force)?;
     if args.format == Format::Json {
         print_json(&report);
         return Ok(Outcome::Fine);

@@ -13,8 +13,13 @@ const DEFAULT_BUDGET: &str = "hankel.toml";
 
 pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
     if !args.folder.is_dir() {
+        let problem = if args.folder.exists() {
+            "it is no folder"
+        } else {
+            "there is no such folder"
+        };
         return Err(Failure::input(
-            format!("{}: there is no such folder", args.folder.display()),
+            format!("{}: {problem}", args.folder.display()),
             "Give the folder that `hankel build --out` made and that is committed.",
         ));
     }
@@ -27,6 +32,8 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
     };
     let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
     let request = session.request(&args.generate)?;
+    // What is wrong with the request is told before anything is compiled.
+    request.chosen()?;
     let generated = generate(&request, &session.modules()?)?;
     let report = check(&generated, &args.folder, &budget)?;
     if args.format == Format::Json {

@@ -1,11 +1,10 @@
-//! The committed SPIR-V of the built-in kernels.
+//! The committed SPIR-V of the built-in kernels, and what this program was compiled from.
 //!
 //! ```text
-//! Bundle::from_files(hankel_embedded::FILES)?.check_current(hankel_embedded::SOURCE_SHA256)?
+//! Bundle::from_files(hankel_embedded::FILES)?.check_made(&kernels, rust_gpu)?
 //! ```
 //!
-//! tells whether it belongs to the kernels that this program was compiled with: their hash is
-//! taken when the program is built. A crate of its own, so that an edited kernel does not compile
-//! the code generator anew.
+//! and [`STALE`] tell whether it belongs to the kernels that this program was compiled with. A
+//! crate of its own, so that an edited kernel does not compile the code generator anew.
 
 include!(concat!(env!("OUT_DIR"), "/files.rs"));

@@ -48,10 +48,6 @@ use crate::spirv::uniform::{self, Memory};
 use crate::{Error, Language, VERSION, spirv};
 use reading::Dropped;
 
-/// Number of how texts are written. To be raised with every change that gives other ones: a build by
-/// another number is stale.
-pub(crate) const WRITERS: u32 = 3;
-
 /// What to do about an index that is out of range, beyond the kernel's own guard.
 ///
 /// As far as naga's writers go: MSL checks everything; GLSL checks reads of textures; HLSL

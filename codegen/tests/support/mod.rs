@@ -351,7 +351,6 @@ pub fn request() -> hankel_codegen::build::Request {
             shader_model: "6.2".parse().unwrap(),
             ..Default::default()
         },
-        source_sha256: "0".repeat(64),
         rust_gpu: "0.10.0".into(),
     }
 }

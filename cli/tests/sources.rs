@@ -1,0 +1,271 @@
+//! Shaders are never called right that no longer follow from what they were made from, wherever
+//! that is. These tests compile to SPIR-V: without rust-gpu's compiler they are skipped, and say
+//! so; with `HANKEL_REQUIRE_COMPILER`, which CI sets where it has one, they fail instead.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("cli/ lies in the repository")
+}
+
+/// Whether there is a compiler; says so if not.
+fn has_compiler() -> bool {
+    let options = hankel_toolchain::Options::from_env();
+    match hankel_toolchain::ensure(&options, &mut hankel_toolchain::Silent) {
+        Ok(_) => true,
+        Err(hankel_toolchain::Error::NotInstalled { .. }) => {
+            assert!(
+                std::env::var_os("HANKEL_REQUIRE_COMPILER").is_none(),
+                "HANKEL_REQUIRE_COMPILER is set, but there is no rust-gpu compiler"
+            );
+            eprintln!("SKIPPED: there is no rust-gpu compiler here");
+            false
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// A folder outside of the repository, where a test works.
+struct Desk(TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("a folder");
+        fs::write(path, text).expect("the desk can be written");
+    }
+
+    /// `hankel` with these words, in the crate's folder, with an environment variable.
+    fn hankel_with(&self, line: &str, offset: &str) -> Run {
+        let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
+            .args(line.split_whitespace())
+            .current_dir(self.path("my-kernels"))
+            // What this repository has compiled for the DSL serves here, too.
+            .env("CARGO_TARGET_DIR", root().join("target"))
+            .env("HANKEL_TEST_OFFSET", offset)
+            .output()
+            .expect("hankel starts");
+        Run(output)
+    }
+
+    fn hankel(&self, line: &str) -> Run {
+        self.hankel_with(line, "1")
+    }
+}
+
+struct Run(Output);
+
+impl Run {
+    fn out(&self) -> String {
+        String::from_utf8_lossy(&self.0.stdout).into_owned()
+    }
+
+    fn code(&self, expected: i32) -> &Self {
+        assert_eq!(
+            self.0.status.code(),
+            Some(expected),
+            "{}\n{}",
+            self.out(),
+            String::from_utf8_lossy(&self.0.stderr)
+        );
+        self
+    }
+}
+
+/// Makes a crate with `hankel new`, and lets it have what a test needs. Its dependencies are the
+/// repository's, so that nothing is fetched.
+fn new_crate() -> Desk {
+    let desk = Desk::new();
+    let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
+        .arg("new")
+        .arg(desk.path("my-kernels"))
+        .output()
+        .expect("hankel starts");
+    Run(output).code(0);
+    let lock = desk.path("my-kernels/Cargo.lock");
+    fs::copy(root().join("Cargo.lock"), lock).expect("a copy");
+    desk
+}
+
+const KERNEL: &str = r#"
+#![no_std]
+use hankel_dsl::{Element, kernel};
+
+#[path = "../../outside.rs"]
+mod outside;
+#[path = "../tests/table.rs"]
+mod table;
+mod native;
+mod generated {
+    include!(concat!(env!("OUT_DIR"), "/generated.rs"));
+}
+
+const INCLUDED: f32 = include!("../coefficient.txt");
+const BYTES: f32 = include_bytes!("../../table.bin")[0] as f32;
+const OF_SCRIPT: f32 = (env!("HANKEL_TEST_WEIGHT").as_bytes()[0] - b'0') as f32;
+const OF_CALLER: f32 = (env!("HANKEL_TEST_OFFSET").as_bytes()[0] - b'0') as f32;
+
+/// A number.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Number {
+    /// The number.
+    pub x: f32,
+}
+
+/// Adds everything that the crate is made from.
+#[kernel(compute, threads(64))]
+pub fn add(#[element] number: Number) -> Number {
+    let x = number.x * INCLUDED + number.x * number.x * BYTES;
+    let x = x * OF_SCRIPT + number.x * OF_CALLER;
+    let x = x * outside::FACTOR + number.x * table::FACTOR;
+    let x = x * native::FACTOR + number.x * cfg_if::FACTOR;
+    Number { x: x * generated::FACTOR + number.x }
+}
+
+hankel_dsl::kernels![add];
+"#;
+
+/// One crate that is made from everything that a crate can be made from. What is edited is found,
+/// and only that.
+#[test]
+fn every_input_counts_wherever_it_is() {
+    if !has_compiler() {
+        return;
+    }
+    let desk = new_crate();
+    let lock = fs::read_to_string(desk.path("my-kernels/Cargo.lock")).expect("it was copied");
+    let version = lock
+        .lines()
+        .skip_while(|line| *line != "name = \"cfg-if\"")
+        .find_map(|line| line.strip_prefix("version = \"")?.strip_suffix('"'))
+        .expect("cfg-if is in the lock file");
+    let manifest = fs::read_to_string(desk.path("my-kernels/Cargo.toml")).expect("it was made");
+    let manifest = manifest.replace(
+        "[dependencies]\n",
+        &format!("[dependencies]\ncfg-if = \"={version}\"\n"),
+    );
+    desk.write(
+        "my-kernels/Cargo.toml",
+        &format!("{manifest}\n[patch.crates-io]\ncfg-if = {{ path = \"../patched\" }}\n"),
+    );
+    let factor = |value: u32| format!("/// A factor.\npub const FACTOR: f32 = {value}.5;\n");
+    desk.write(
+        "patched/Cargo.toml",
+        &format!("[package]\nname = \"cfg-if\"\nversion = \"{version}\"\nedition = \"2024\"\n"),
+    );
+    desk.write("patched/src/lib.rs", &format!("#![no_std]\n{}", factor(1)));
+    desk.write("outside.rs", &factor(2));
+    desk.write("table.bin", "3");
+    desk.write("my-kernels/tests/table.rs", &factor(4));
+    desk.write(
+        "my-kernels/src/native/mod.rs",
+        "mod deep;\npub use deep::FACTOR;\n",
+    );
+    desk.write("my-kernels/src/native/deep.rs", &factor(5));
+    desk.write("my-kernels/coefficient.txt", "6.5");
+    desk.write("my-kernels/weight.txt", "7");
+    desk.write("my-kernels/data/a.txt", "8");
+    desk.write(
+        "my-kernels/build.rs",
+        r#"
+fn main() {
+    println!("cargo::rerun-if-changed=weight.txt");
+    println!("cargo::rerun-if-changed=data");
+    let weight = std::fs::read_to_string("weight.txt").unwrap();
+    println!("cargo::rustc-env=HANKEL_TEST_WEIGHT={}", weight.trim());
+    let sum: u32 = std::fs::read_dir("data")
+        .unwrap()
+        .map(|it| std::fs::read_to_string(it.unwrap().path()).unwrap().trim().parse::<u32>().unwrap())
+        .sum();
+    let out = std::env::var("OUT_DIR").unwrap();
+    std::fs::write(format!("{out}/generated.rs"), format!("pub const FACTOR: f32 = {sum}.0;")).unwrap();
+}
+"#,
+    );
+    desk.write("my-kernels/src/lib.rs", KERNEL);
+    let shader = || fs::read_to_string(desk.path("my-kernels/shaders/wgsl/add.wgsl"));
+    desk.hankel("build --manifest-path Cargo.toml --target wgsl")
+        .code(0);
+    let mut before = shader().expect("it was built");
+    let built = |before: &mut String, what: &str, offset: &str| {
+        let line = "build --manifest-path Cargo.toml --target wgsl";
+        desk.hankel_with(line, offset).code(0);
+        let now = shader().expect("it was built");
+        assert_ne!(now, *before, "{what}");
+        *before = now;
+    };
+    for (path, text) in [
+        ("my-kernels/coefficient.txt", "1.25".to_owned()),
+        ("table.bin", "5".into()),
+        ("my-kernels/src/native/deep.rs", factor(15)),
+        ("outside.rs", factor(12)),
+        ("my-kernels/tests/table.rs", factor(14)),
+        ("my-kernels/weight.txt", "9".into()),
+        ("my-kernels/data/b.txt", "3".into()),
+        ("patched/src/lib.rs", format!("#![no_std]\n{}", factor(11))),
+    ] {
+        desk.write(path, &text);
+        built(&mut before, path, "1");
+    }
+    built(&mut before, "the environment", "2");
+    // Nothing of it was the build's own output, and what nobody read does not count.
+    desk.write("my-kernels/README.md", "Other words.\n");
+    desk.write("my-kernels/src/not-a-module.rs", "Not Rust.\n");
+    let check = |offset: &str| {
+        let line = "check shaders --manifest-path Cargo.toml --target wgsl";
+        desk.hankel_with(line, offset)
+    };
+    check("2").code(0);
+    let out = check("1").code(1).out();
+    assert!(out.contains("+++ generated/wgsl/add.wgsl"), "{out}");
+    // A module that moves.
+    fs::create_dir(desk.path("my-kernels/src/native/deep")).expect("a folder");
+    fs::remove_file(desk.path("my-kernels/src/native/deep.rs")).expect("it is removed");
+    desk.write("my-kernels/src/native/deep/mod.rs", &factor(25));
+    built(&mut before, "deep/mod.rs", "2");
+}
+
+/// The example of `hankel new --help`, and the check of what it made.
+#[test]
+fn a_new_crate_is_built_and_checked() {
+    if !has_compiler() {
+        return;
+    }
+    let desk = new_crate();
+    let out = desk
+        .hankel("build --manifest-path Cargo.toml")
+        .code(0)
+        .out();
+    assert!(out.contains("2 kernels"), "{out}");
+    let check = "check shaders --manifest-path Cargo.toml";
+    desk.hankel(check).code(0);
+    let out = desk
+        .hankel("build --manifest-path Cargo.toml")
+        .code(0)
+        .out();
+    assert!(out.contains(" 0 files written"), "{out}");
+    // An editor's lock on a file that is being edited is no source.
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("user@host.1:2", desk.path("my-kernels/src/.#lib.rs"))
+        .expect("a dangling link");
+    desk.hankel(check).code(0);
+    let path = desk.path("my-kernels/src/lib.rs");
+    let text = fs::read_to_string(&path).expect("it was made");
+    fs::write(&path, text.replace("lit!(3.0)", "lit!(3.5)")).expect("it can be written");
+    desk.hankel(check).code(1);
+}
