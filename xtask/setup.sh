@@ -32,6 +32,8 @@ if [ "${for_tests:-no}" = yes ]; then
     need_library libEGL_mesa.so.0 libegl-mesa0
     need node nodejs
     need npm npm
+    need ninja ninja-build
+    need cmake cmake
     need pip3 python3-pip
 fi
 

@@ -121,6 +121,14 @@ pub struct Build {
     /// Overwrite files that hankel did not write or that were edited since.
     #[arg(long)]
     pub force: bool,
+    /// Write what the shaders are made from to this file, as a rule in Make's syntax for
+    /// OUT/manifest.json.
+    #[arg(long, value_name = "FILE")]
+    pub depfile: Option<PathBuf>,
+    /// Stay, and build again after each edit. A kernel that does not compile is reported, and what
+    /// was built before stays.
+    #[arg(long)]
+    pub watch: bool,
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

@@ -5,9 +5,11 @@
 
 mod args;
 mod commands;
+mod depfile;
 mod failure;
 mod progress;
 mod session;
+mod watch;
 
 use std::process::ExitCode;
 

@@ -12,10 +12,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::str::FromStr;
 
-use hankel_codegen::build::{Modules, Request, finish_all};
+use hankel_codegen::build::{Modules, Request};
 use hankel_codegen::bundle::Bundle;
+use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::compile::{Compiled, Compiler, compile};
-use hankel_codegen::inputs::Inputs;
+use hankel_codegen::inputs::{Inputs, normal};
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
@@ -88,6 +89,34 @@ impl Session {
             manifest: Some(manifest),
             quiet,
         })
+    }
+
+    /// The folder of the crate at `manifest`, or else of the built-in one; `None` for the built-in
+    /// one outside of a checkout.
+    pub fn sources(manifest: Option<&Path>) -> Option<PathBuf> {
+        match manifest {
+            Some(path) if path.is_dir() => Some(path.to_owned()),
+            Some(path) => Some(folder_of(path).to_owned()),
+            None => checkout().map(|root| folder_of(&root.join(BUILT_IN)).to_owned()),
+        }
+    }
+
+    /// Every file and folder that the SPIR-V was made from, as absolute paths; none for the
+    /// built-in kernels outside of a checkout.
+    pub fn inputs(&self) -> Result<Vec<PathBuf>> {
+        let Some(manifest) = &self.manifest else {
+            return Ok(Vec::new());
+        };
+        let folder = std::path::absolute(folder_of(manifest))
+            .map_err(|e| Failure::machine(format!("{}: {e}", manifest.display()), None))?;
+        let inputs = self.bundle()?.origin.inputs;
+        let present = |all: &BTreeMap<String, Option<String>>| -> Vec<PathBuf> {
+            all.iter()
+                .filter(|(_, hash)| hash.is_some())
+                .map(|(name, _)| normal(&folder.join(name)))
+                .collect()
+        };
+        Ok([present(&inputs.files), present(&inputs.folders)].concat())
     }
 
     /// The crate with the native code of the entry points called `names`.
@@ -230,7 +259,8 @@ impl Session {
             return Ok(bundle);
         }
         let compiled = self.compile(manifest, &target, reason.take())?;
-        let modules = finish_all(&compiled.modules, &kernels)?;
+        let finished = finished::folder(&target, &self.krate.name);
+        let modules = finish_all(&compiled.modules, &kernels, Some(&finished))?;
         let bundle = Bundle::new(
             &self.krate.name,
             &kernels,

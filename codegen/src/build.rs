@@ -184,26 +184,7 @@ pub fn matches(pattern: &str, name: &str) -> bool {
     }
 }
 
-/// Finishes raw modules: what a bundle is made of. In parallel.
-///
-/// # Errors
-///
-/// Each kernel that fails, or has no module.
-pub fn finish_all(
-    raw: &BTreeMap<String, Vec<u8>>,
-    kernels: &[Kernel],
-) -> Result<BTreeMap<String, Vec<u8>>> {
-    let results: Vec<_> = kernels
-        .par_iter()
-        .map(|kernel| {
-            let module = raw.get(&kernel.name).ok_or_else(|| missing(kernel))?;
-            Ok((kernel.name.clone(), finish::finish(module, kernel)?.spirv))
-        })
-        .collect();
-    collect(results)
-}
-
-fn missing(kernel: &Kernel) -> Failure {
+pub(crate) fn missing(kernel: &Kernel) -> Failure {
     Failure {
         kernel: kernel.name.clone(),
         step: Step::Describe,
@@ -214,7 +195,7 @@ fn missing(kernel: &Kernel) -> Failure {
 }
 
 /// All results, or all failures.
-fn collect<T, C: FromIterator<T>>(results: Vec<Result<T, Failure>>) -> Result<C> {
+pub(crate) fn collect<T, C: FromIterator<T>>(results: Vec<Result<T, Failure>>) -> Result<C> {
     let mut failures = Vec::new();
     let collected = results
         .into_iter()

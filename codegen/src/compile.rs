@@ -342,10 +342,12 @@ fn cargo(
         // Whatever the crate's own workspace says: one profile, the same bytes everywhere.
         .env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1")
         .env("CARGO_PROFILE_RELEASE_DEBUG", "0")
-        .env("CARGO_PROFILE_RELEASE_INCREMENTAL", "false")
+        // After an edit only what follows from it is compiled. With one codegen unit the modules
+        // are those of a build from nothing, byte for byte.
+        .env("CARGO_PROFILE_RELEASE_INCREMENTAL", "true")
         .env("CARGO_PROFILE_RELEASE_LTO", "off")
         .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "3")
-        .env("CARGO_INCREMENTAL", "0")
+        .env("CARGO_INCREMENTAL", "1")
         .env("CARGO_TERM_COLOR", "never")
         .env("CARGO_TERM_PROGRESS_WHEN", "never");
     Ok(cargo)

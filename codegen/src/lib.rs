@@ -23,6 +23,7 @@ pub mod diagnostics;
 mod error;
 pub mod files;
 pub mod finish;
+pub mod finished;
 mod folder;
 mod gather;
 pub mod headers;

@@ -8,7 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use hankel_codegen::Error;
-use hankel_codegen::build::{Modules, build, finish_all, generate};
+use hankel_codegen::build::{Modules, build, generate};
+use hankel_codegen::finished::finish_all;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::check::{Budget, Config, Limits, check};
 use hankel_codegen::compile::Compiled;
@@ -36,7 +37,7 @@ fn the_same_bytes_each_time() {
     let Modules::Raw(raw) = support::modules() else {
         unreachable!()
     };
-    let done = Modules::Final(finish_all(&raw, &support::all()).unwrap());
+    let done = Modules::Final(finish_all(&raw, &support::all(), None).unwrap());
     assert_eq!(
         generate(&support::request(), &done).unwrap().files,
         first.files
@@ -583,7 +584,7 @@ fn bundles_are_read_back_and_never_stale() {
         modules: raw,
     };
     let kernels = support::all();
-    let modules = finish_all(&compiled.modules, &kernels).unwrap();
+    let modules = finish_all(&compiled.modules, &kernels, None).unwrap();
     let bundle = Bundle::new("a", &kernels, "0.10.0", &compiled, modules);
     fs::write(folder.path().join("old.spv"), "").unwrap();
     bundle.write(folder.path()).unwrap();

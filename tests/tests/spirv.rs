@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use hankel_codegen::build::finish_all;
+use hankel_codegen::finished::finish_all;
 use hankel_codegen::compile::{Compiler, compile};
 use hankel_tests::{Crate, root};
 use hankel_toolchain::{Options, Silent};
@@ -42,7 +42,7 @@ fn committed_spirv_follows_from_its_sources() {
         let target = root().join("target");
         let compiled = compile(&one.manifest, &compiler, &target, &names, &mut |_| {})
             .unwrap_or_else(|e| panic!("{e}"));
-        let fresh = finish_all(&compiled.modules, &kernels).unwrap_or_else(|e| panic!("{e}"));
+        let fresh = finish_all(&compiled.modules, &kernels, None).unwrap_or_else(|e| panic!("{e}"));
         for (name, bytes) in &fresh {
             assert_eq!(
                 Some(bytes),

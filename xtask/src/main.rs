@@ -5,7 +5,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use hankel_codegen::build::finish_all;
+use hankel_codegen::finished::finish_all;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiler, compile};
 use hankel_dsl::native::Entry;
@@ -97,7 +97,7 @@ impl Committed {
             &self.kernels,
             RUST_GPU_VERSION,
             &compiled,
-            finish_all(&compiled.modules, &self.kernels)?,
+            finish_all(&compiled.modules, &self.kernels, None)?,
         ))
     }
 }

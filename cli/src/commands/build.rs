@@ -1,20 +1,75 @@
 use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::SystemTime;
 
 use hankel_codegen::Language;
-use hankel_codegen::build::{build, check_output};
+use hankel_codegen::build::{MANIFEST_FILE, build, check_output};
+use hankel_codegen::files::write_whole;
 
 use super::print_json;
 use crate::args::{Build, Format};
-use crate::failure::{Outcome, Result};
+use crate::depfile;
+use crate::failure::{Failure, Outcome, Result};
 use crate::session::Session;
+use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
+    if args.watch {
+        return watch(args, quiet);
+    }
+    let session = open(args, quiet)?;
+    once(args, &session, quiet)
+}
+
+fn open(args: &Build, quiet: bool) -> Result<Session> {
     check_output(&args.out)?;
-    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
+    Session::open(args.generate.source.manifest_path.as_deref(), quiet)
+}
+
+/// Builds after each edit, until the program is stopped.
+fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
+    let sources = Session::sources(args.generate.source.manifest_path.as_deref()).ok_or_else(|| {
+        Failure::input(
+            "--watch: the built-in kernels have no sources here",
+            "Give a kernel crate with --manifest-path, or run it in Hankel's repository.",
+        )
+    })?;
+    let mut edits = Edits::new(&args.out)?;
+    loop {
+        // Before the build: what is edited meanwhile is built next.
+        edits.add(&[], &sources);
+        let built = open(args, quiet).and_then(|session| {
+            once(args, &session, quiet)?;
+            session.inputs()
+        });
+        match built {
+            Ok(inputs) => edits.add(&inputs, &sources),
+            Err(failure) => eprintln!("{:?}", miette::Report::new(failure)),
+        }
+        edits.wait()?;
+    }
+}
+
+/// Gives a file the present time.
+fn touch(file: &Path) -> Result<()> {
+    std::fs::File::options()
+        .append(true)
+        .open(file)
+        .and_then(|file| file.set_modified(SystemTime::now()))
+        .map_err(|e| Failure::machine(format!("{}: {e}", file.display()), None))
+}
+
+fn once(args: &Build, session: &Session, quiet: bool) -> Result<Outcome> {
     let request = session.request(&args.generate)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
     let report = build(&request, &session.modules()?, &args.out, args.force)?;
+    if let Some(file) = &args.depfile {
+        let text = depfile::rule(&args.out.join(MANIFEST_FILE), &session.inputs()?);
+        write_whole(file, text.as_bytes())?;
+        // Make compares times: a manifest that stays as it was must not be older than its inputs.
+        touch(&args.out.join(MANIFEST_FILE))?;
+    }
     if args.format == Format::Json {
         print_json(&report);
         return Ok(Outcome::Fine);
