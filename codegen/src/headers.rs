@@ -95,7 +95,9 @@ fn buffers(kernel: &Kernel) -> impl Iterator<Item = &Layout> {
     let params = kernel.params.iter().filter_map(|param| match &param.role {
         Role::Uniform { layout, .. }
         | Role::Element { layout, .. }
-        | Role::Storage { layout, .. } => Some(layout),
+        | Role::ElementMut { layout, .. }
+        | Role::Storage { layout, .. }
+        | Role::StorageMut { layout, .. } => Some(layout),
         _ => None,
     });
     let outputs = kernel.outputs.iter().filter_map(|output| match output {

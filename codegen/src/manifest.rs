@@ -100,6 +100,44 @@ pub struct FileEntry {
     pub bytes: u64,
 }
 
+/// How many invocations of a compute kernel run. Those that the last workgroups have beyond it do
+/// nothing.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum RangeEntry {
+    /// As many as a buffer has elements.
+    Elements {
+        /// The binding's name.
+        name: String,
+    },
+    /// A fixed number along x, y, z.
+    Fixed {
+        /// It.
+        size: [u32; 3],
+    },
+    /// What a uniform says: as many `u32` in a row as there are dimensions.
+    Uniform {
+        /// The binding's name.
+        name: String,
+        /// Where they begin, in bytes.
+        offset: u32,
+    },
+}
+
+fn range_entry(range: &describe::Range) -> Option<RangeEntry> {
+    Some(match range {
+        describe::Range::Outputs => return None,
+        describe::Range::Elements { param } => RangeEntry::Elements {
+            name: param.clone(),
+        },
+        describe::Range::Fixed { size } => RangeEntry::Fixed { size: *size },
+        describe::Range::Uniform { param, offset } => RangeEntry::Uniform {
+            name: param.clone(),
+            offset: *offset,
+        },
+    })
+}
+
 /// An entry point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KernelEntry {
@@ -122,6 +160,9 @@ pub struct KernelEntry {
     /// Compute: bytes of workgroup memory.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub workgroup_bytes: Option<u32>,
+    /// Compute: how many invocations run where the outputs do not say it.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub range: Option<RangeEntry>,
     /// Floating-point type of a function that has several: `f32` or `f64`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub precision: Option<String>,
@@ -201,7 +242,7 @@ pub enum BindingKind {
     Uniform,
     /// A storage buffer.
     Storage,
-    /// A storage buffer of `u32` counters.
+    /// A storage buffer of integers on which only atomic operations work.
     Atomic,
     /// A texture that is read.
     Texture,
@@ -372,10 +413,11 @@ pub(crate) fn entry(
             threads,
             dimensions,
             workgroup_bytes,
+            range,
             ..
         } => (
             StageName::Compute,
-            Some((*threads, *dimensions, *workgroup_bytes)),
+            Some((*threads, *dimensions, *workgroup_bytes, range_entry(range))),
         ),
         Stage::Vertex => (StageName::Vertex, None),
         Stage::Fragment => (StageName::Fragment, None),
@@ -387,9 +429,10 @@ pub(crate) fn entry(
         line: kernel.line,
         summary: kernel.summary.clone(),
         stage,
-        workgroup_size: compute.map(|it| it.0),
-        dimensions: compute.map(|it| it.1),
-        workgroup_bytes: compute.map(|it| it.2),
+        workgroup_size: compute.as_ref().map(|it| it.0),
+        dimensions: compute.as_ref().map(|it| it.1),
+        workgroup_bytes: compute.as_ref().map(|it| it.2),
+        range: compute.and_then(|it| it.3),
         precision: kernel.precision.map(|precision| {
             match precision {
                 describe::Precision::F32 => "f32",
@@ -513,9 +556,22 @@ fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
             Role::Storage { binding, layout } => {
                 buffer(*binding, name, BindingKind::Storage, layout)
             }
-            Role::Atomic { binding } => Binding {
+            Role::ElementMut { binding, layout } => Binding {
                 written: true,
-                ty: Some("u32".into()),
+                element_for_each: Some("invocation".into()),
+                ..buffer(*binding, name, BindingKind::Storage, layout)
+            },
+            Role::StorageMut {
+                binding, layout, ..
+            } => Binding {
+                written: true,
+                ..buffer(*binding, name, BindingKind::Storage, layout)
+            },
+            Role::Atomic {
+                binding, scalar, ..
+            } => Binding {
+                written: true,
+                ty: Some(layouts.spell(&describe::Type::Scalar { scalar: *scalar })),
                 stride: Some(4),
                 ..plain(*binding, name, BindingKind::Atomic)
             },
@@ -541,20 +597,9 @@ fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
         .filter_map(|(index, output)| {
             let name = output_name(kernel, index);
             Some(match output {
-                Output::Buffer {
-                    binding,
-                    layout,
-                    per_group,
-                } => Binding {
+                Output::Buffer { binding, layout } => Binding {
                     written: true,
-                    element_for_each: Some(
-                        if *per_group {
-                            "workgroup"
-                        } else {
-                            "invocation"
-                        }
-                        .into(),
-                    ),
+                    element_for_each: Some("invocation".into()),
                     ..buffer(*binding, &name, BindingKind::Storage, layout)
                 },
                 Output::Texture {

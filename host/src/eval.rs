@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use hankel_dsl::native::describe::{Kernel, Output, Precision, Role, Scalar, Stage};
+use hankel_dsl::native::describe::{Kernel, Output, Precision, Range, Role, Scalar, Stage};
 
 use crate::crates::{KernelCrate, KernelEntry};
 use crate::device::{Bind, Device, DeviceError, Shader};
@@ -243,25 +243,24 @@ impl Table {
             kernel: kernel.name.clone(),
             why: why.into(),
         };
-        match kernel.stage {
+        match &kernel.stage {
             Stage::Compute {
                 dimensions: 1,
-                phases: 0,
+                cooperative: false,
+                range: Range::Outputs,
                 ..
             } => {}
+            Stage::Compute {
+                dimensions: 1,
+                cooperative: false,
+                ..
+            } => return Err(not("its range is not that of its rows")),
             Stage::Compute { dimensions: 1, .. } => return Err(not("its rows share memory")),
             Stage::Compute { .. } => return Err(not("it runs over texels")),
             Stage::Vertex => return Err(not("it is a vertex stage")),
             Stage::Fragment => return Err(not("it is a fragment stage")),
         }
-        let [
-            Output::Buffer {
-                layout: output,
-                per_group: false,
-                ..
-            },
-        ] = &kernel.outputs[..]
-        else {
+        let [Output::Buffer { layout: output, .. }] = &kernel.outputs[..] else {
             return Err(not("it does not return one element for each row"));
         };
         let mut arguments = Vec::new();

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use hankel_dsl::native::describe::{self, Kernel, Output, TextureKind, Type};
 use hankel_dsl::native::{Address, Filter};
+use hankel_host::device::extent;
 use hankel_host::device::slots::{self, Given, Use};
 use hankel_host::inputs::{self, Case as HostCase, Input};
 use hankel_host::parity::execute::Written;
@@ -154,18 +155,21 @@ fn groups(kernel: &Kernel, case: &HostCase) -> [u32; 3] {
         return [1; 3];
     };
     let slots = slots::slots(kernel);
-    let given: Vec<Given> = case
+    let given: Vec<Given<'_>> = case
         .args
         .iter()
         .zip(0..)
         .map(|(input, id)| match input {
-            Input::Bytes(b) => Given::Buffer { id, bytes: b.len() },
+            Input::Bytes(b) => match slots[id as usize].role {
+                Use::Uniform(_) => Given::Bytes(b),
+                _ => Given::Buffer { id, bytes: b.len() },
+            },
             Input::Texture { shape, .. } => Given::Texture { id, shape: *shape },
             Input::Sampler(s) => Given::Sampler(*s),
         })
         .collect();
     // The inputs are made to fit.
-    let extent = slots::extent(kernel, &slots, &given).unwrap_or([0; 3]);
+    let extent = extent::extent(kernel, &slots, &given).unwrap_or([0; 3]);
     [0, 1, 2].map(|i| extent[i].div_ceil(threads[i].max(1)))
 }
 
@@ -189,8 +193,8 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
     Ok(match slot.role {
         Use::Uniform(_) => Role::Uniform,
         Use::Element(_) | Use::Storage(_) => Role::Read,
-        Use::Atomic => Role::Atomic,
-        Use::Output { .. } => Role::Write,
+        Use::Atomic { .. } => Role::Atomic,
+        Use::ElementMut(_) | Use::StorageMut { .. } | Use::Output(_) => Role::Write,
         Use::Sampler => Role::Sampler,
         Use::Texture(kind) => Role::Texture {
             dimensions: if kind == TextureKind::Texture3d { 3 } else { 2 },

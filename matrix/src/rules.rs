@@ -32,11 +32,14 @@ pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
 #[must_use]
 pub fn lacking(kernel: &Kernel, column: Column) -> Option<String> {
     let wide = slots::slots(kernel).iter().any(|slot| match slot.role {
-        Use::Uniform(l) | Use::Element(l) | Use::Storage(l) | Use::Output { layout: l, .. } => {
-            flat::leaves(l)
-                .iter()
-                .any(|leaf| leaf.scalar == Scalar::F64)
-        }
+        Use::Uniform(l)
+        | Use::Element(l)
+        | Use::ElementMut(l)
+        | Use::Storage(l)
+        | Use::StorageMut { layout: l, .. }
+        | Use::Output(l) => flat::leaves(l)
+            .iter()
+            .any(|leaf| leaf.scalar == Scalar::F64),
         _ => false,
     });
     // `tests/upstream/glslang-templated-load`.

@@ -2,7 +2,7 @@ use hankel_codegen::Language;
 use hankel_codegen::build::generate;
 use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
-use hankel_dsl::native::describe::{Kernel, Output, Precision, Role, Stage, Type};
+use hankel_dsl::native::describe::{BuiltIn, Kernel, Output, Precision, Role, Stage, Type};
 
 use super::print_json;
 use crate::args::{Format, List};
@@ -41,7 +41,7 @@ fn row(kernel: &Kernel, entry: &KernelEntry) {
     let stage = match &kernel.stage {
         Stage::Compute {
             dimensions,
-            phases: 0,
+            cooperative: false,
             ..
         } => format!("map {dimensions}-D"),
         Stage::Compute { .. } => "workgroup".into(),
@@ -89,33 +89,58 @@ fn bindings(kernel: &Kernel) {
                     shape(&layout.name, layout)
                 )
             }
-            Role::Atomic { binding } => format!("binding {binding}: counters"),
+            Role::ElementMut { binding, layout } => format!(
+                "binding {binding}: element of {}, changed in place",
+                shape(&layout.name, layout)
+            ),
+            Role::StorageMut {
+                binding,
+                layout,
+                unordered,
+            } => format!(
+                "binding {binding}: buffer of {}, written{}",
+                shape(&layout.name, layout),
+                in_order(*unordered)
+            ),
+            Role::Atomic {
+                binding,
+                scalar,
+                unordered,
+            } => format!(
+                "binding {binding}: atomic {}{}",
+                spell(&Type::Scalar { scalar: *scalar }),
+                in_order(*unordered)
+            ),
             Role::Texture { binding, texture } => format!("binding {binding}: {texture:?}"),
             Role::Sampler { binding } => format!("binding {binding}: sampler"),
             Role::Constant { id, default } => format!("constant {id}, default {default}"),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
             Role::Varying { location, ty } => format!("varying {location}: {}", spell(ty)),
             Role::Index => "the invocation's index".into(),
-            Role::Group => "workgroup memory".into(),
-            Role::Phase => "the phase".into(),
+            Role::BuiltIn { built_in } => match built_in {
+                BuiltIn::LocalId => "the invocation's place in its workgroup",
+                BuiltIn::LocalIndex => "the invocation's number in its workgroup",
+                BuiltIn::GroupId => "the workgroup",
+                BuiltIn::GroupCount => "how many workgroups there are",
+            }
+            .into(),
+            Role::Shared {
+                layout,
+                length,
+                atomic,
+            } => format!(
+                "workgroup memory: {length} of {}{}",
+                shape(&layout.name, layout),
+                if *atomic { ", atomic" } else { "" }
+            ),
         };
         println!("    {:<12} {what}", p.name);
     }
     for o in &kernel.outputs {
         let what = match o {
-            Output::Buffer {
-                binding,
-                layout,
-                per_group,
-            } => format!(
-                "binding {binding}: {}{}",
-                shape(&layout.name, layout),
-                if *per_group {
-                    ", one for each workgroup"
-                } else {
-                    ""
-                }
-            ),
+            Output::Buffer { binding, layout } => {
+                format!("binding {binding}: {}", shape(&layout.name, layout))
+            }
             Output::Texture {
                 binding, format, ..
             } => {
@@ -127,6 +152,10 @@ fn bindings(kernel: &Kernel) {
         };
         println!("    {:<12} {what}", "output");
     }
+}
+
+const fn in_order(unordered: bool) -> &'static str {
+    if unordered { ", in no order" } else { "" }
 }
 
 fn shape(name: &str, layout: &hankel_dsl::native::describe::Layout) -> String {

@@ -27,10 +27,15 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
             Role::Uniform { binding, layout } => {
                 names.buffer(module, *binding, &param.name, layout, "Uniform", "value")?;
             }
-            Role::Element { binding, layout } | Role::Storage { binding, layout } => {
+            Role::Element { binding, layout }
+            | Role::ElementMut { binding, layout }
+            | Role::Storage { binding, layout }
+            | Role::StorageMut {
+                binding, layout, ..
+            } => {
                 names.buffer(module, *binding, &param.name, layout, "Buffer", "elements")?;
             }
-            Role::Atomic { binding } => {
+            Role::Atomic { binding, .. } => {
                 let plain = Layout {
                     name: "Counter".into(),
                     size: 4,
@@ -61,7 +66,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                     names.set(variable, &param.name);
                 }
             }
-            Role::Index | Role::Group | Role::Phase => {}
+            Role::Index | Role::BuiltIn { .. } | Role::Shared { .. } => {}
         }
     }
     for (index, output) in kernel.outputs.iter().enumerate() {
@@ -89,19 +94,16 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
             }
         }
     }
-    let group = kernel
-        .params
-        .iter()
-        .find(|param| matches!(param.role, Role::Group));
-    let group = group.map_or("group", |param| param.name.as_str());
-    let shared: Vec<Word> = in_class(module, StorageClass::Workgroup).collect();
-    for (index, variable) in shared.iter().enumerate() {
-        let number = if shared.len() == 1 {
-            String::new()
-        } else {
-            format!("_{}", (b'a' + (index % 26) as u8) as char)
-        };
-        names.set(*variable, &format!("{group}{number}"));
+    // In the order of the parameters; what the kernel does not use is gone.
+    let mut shared = kernel.params.iter().filter_map(|param| match &param.role {
+        Role::Shared { length, .. } => Some((&param.name, *length)),
+        _ => None,
+    });
+    for variable in in_class(module, StorageClass::Workgroup) {
+        let length = array_length(module, variable);
+        if let Some((name, _)) = shared.find(|(_, n)| Some(*n) == length) {
+            names.set(variable, name);
+        }
     }
     for (built_in_number, name) in INPUTS {
         if let Some(variable) = built_in(module, built_in_number) {
@@ -217,6 +219,13 @@ fn in_class(module: &Module, class: StorageClass) -> impl Iterator<Item = Word> 
         global(module, *variable).and_then(|it| it.operands.first())
             == Some(&Operand::StorageClass(class))
     })
+}
+
+/// Elements of a variable that is an array.
+fn array_length(module: &Module, variable: Word) -> Option<u32> {
+    let pointer = global(module, global(module, variable)?.result_type?)?;
+    let array = global(module, id(pointer, 1)?)?;
+    literal(global(module, id(array, 1)?)?, 0)
 }
 
 fn built_in(module: &Module, number: u32) -> Option<Word> {

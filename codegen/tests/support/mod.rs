@@ -73,8 +73,9 @@ fn compute(threads: [u32; 3], dimensions: u32) -> Stage {
     Stage::Compute {
         threads,
         dimensions,
-        phases: 0,
+        cooperative: false,
         workgroup_bytes: 0,
+        range: Range::Outputs,
     }
 }
 
@@ -157,7 +158,6 @@ pub fn bound() -> Kernel {
         vec![Output::Buffer {
             binding: 2,
             layout: shadow,
-            per_group: false,
         }],
     );
     bound.precision = Some(Precision::F32);
@@ -192,11 +192,17 @@ pub fn resample() -> Kernel {
 
 pub fn exchange() -> Kernel {
     let number = || plain(Scalar::U32, "u32", 4);
+    let shared = || Role::Shared {
+        layout: number(),
+        length: 64,
+        atomic: false,
+    };
     let stage = Stage::Compute {
         threads: [64, 1, 1],
         dimensions: 1,
-        phases: 3,
+        cooperative: true,
         workgroup_bytes: 512,
+        range: Range::Outputs,
     };
     kernel(
         "exchange",
@@ -209,13 +215,12 @@ pub fn exchange() -> Kernel {
                     layout: number(),
                 },
             ),
-            param("group", Role::Group),
-            param("phase", Role::Phase),
+            param("front", shared()),
+            param("back", shared()),
         ],
         vec![Output::Buffer {
             binding: 1,
             layout: number(),
-            per_group: false,
         }],
     )
 }
@@ -235,7 +240,6 @@ pub fn total() -> Kernel {
         vec![Output::Buffer {
             binding: 1,
             layout: number(),
-            per_group: false,
         }],
     )
 }
@@ -300,7 +304,6 @@ pub fn rounding() -> Kernel {
         vec![Output::Buffer {
             binding: 1,
             layout: floats("Pair", &["x", "w"]),
-            per_group: false,
         }],
     );
     rounding.exact = true;
@@ -322,7 +325,6 @@ pub fn wide() -> Kernel {
         vec![Output::Buffer {
             binding: 1,
             layout: number(),
-            per_group: false,
         }],
     );
     wide.function = "wide".into();

@@ -8,9 +8,10 @@
 //! - [`Device::draw`] rasterises; only the Vulkan device does.
 //!
 //! Every argument is checked against the description before anything is submitted, alike on both
-//! devices. The number of invocations follows from what is written, see [`slots::extent`].
+//! devices. The number of invocations follows from what is written, see [`extent::extent`].
 
 pub mod error;
+pub mod extent;
 pub mod native;
 pub mod slots;
 pub mod vulkan;

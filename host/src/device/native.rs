@@ -1,11 +1,10 @@
 //! This machine's processor as a device: buffers are memory, kernels are called directly.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::{Arg, Call, Mode, Sampler, TextureMut, TextureRef};
 
 use super::error::{DeviceError, Result};
+use super::extent;
 use super::slots::{self, Given, Slot, Use};
 use super::{Backend, Bind, BufferId, Device, Pass, Program, TextureId, TextureShape};
 
@@ -117,7 +116,7 @@ impl NativeDevice {
         }
     }
 
-    fn given(&self, bind: &Bind<'_>) -> Result<Given> {
+    fn given<'a>(&self, bind: &Bind<'a>) -> Result<Given<'a>> {
         Ok(match bind {
             Bind::Buffer(id) => {
                 let index = self.buffer_at(*id)?;
@@ -127,7 +126,7 @@ impl NativeDevice {
                     bytes,
                 }
             }
-            Bind::Bytes(b) => Given::Bytes(b.len()),
+            Bind::Bytes(b) => Given::Bytes(b),
             Bind::Texture(id) => {
                 let index = self.texture_at(*id)?;
                 let Some(texture) = &self.textures[index] else {
@@ -178,7 +177,6 @@ impl NativeDevice {
             let arg = if slot.role.is_written() {
                 match taken.next() {
                     Some(Written::Bytes(memory)) => Arg::BytesMut(memory.get_mut()),
-                    Some(Written::Atomics(counters)) => Arg::Atomics(counters),
                     Some(Written::Texture(shape, format, memory)) => Arg::TextureMut(TextureMut {
                         size: shape.size,
                         format: *format,
@@ -241,7 +239,6 @@ impl NativeDevice {
 /// What a call writes, taken out of the device while it runs.
 enum Written {
     Bytes(Memory),
-    Atomics(Vec<AtomicU32>),
     Texture(TextureShape, TexelFormat, Memory),
 }
 
@@ -332,21 +329,16 @@ impl Device for NativeDevice {
             .map(|b| self.given(b))
             .collect::<Result<Vec<_>>>()?;
         slots::check(kernel, &slots, &given)?;
-        let extent = slots::extent(kernel, &slots, &given)?;
+        let extent = extent::extent(kernel, &slots, &given)?;
         if extent.contains(&0) {
             return Ok(());
         }
         let mut written = Vec::new();
-        for (slot, bind) in slots.iter().zip(args).filter(|(s, _)| s.role.is_written()) {
+        for (_, bind) in slots.iter().zip(args).filter(|(s, _)| s.role.is_written()) {
             written.push(match bind {
                 Bind::Buffer(id) => {
                     let memory = self.buffers[id.index as usize].take().unwrap_or_default();
-                    if slot.role == Use::Atomic {
-                        let counters = bytemuck::cast_slice::<u8, u32>(memory.get());
-                        Written::Atomics(counters.iter().map(|&n| AtomicU32::new(n)).collect())
-                    } else {
-                        Written::Bytes(memory)
-                    }
+                    Written::Bytes(memory)
                 }
                 Bind::Texture(id) => {
                     let Some(t) = self.textures[id.index as usize].take() else {
@@ -358,7 +350,8 @@ impl Device for NativeDevice {
                 Bind::Bytes(_) | Bind::Sampler(_) => continue,
             });
         }
-        let result = self.call(program, &slots, args, extent[0] as usize, &mut written);
+        let count = extent.iter().map(|n| *n as usize).product();
+        let result = self.call(program, &slots, args, count, &mut written);
         // Put back also after a failure: the buffers are still the caller's.
         let binds = slots
             .iter()
@@ -368,14 +361,6 @@ impl Device for NativeDevice {
         for (bind, written) in binds.zip(written) {
             match (bind, written) {
                 (Bind::Buffer(id), Written::Bytes(memory)) => {
-                    self.buffers[id.index as usize] = Some(memory);
-                }
-                (Bind::Buffer(id), Written::Atomics(counters)) => {
-                    let mut memory = self.memory("counters", counters.len() * 4)?;
-                    let values = bytemuck::cast_slice_mut::<u8, u32>(memory.get_mut());
-                    for (value, counter) in values.iter_mut().zip(&counters) {
-                        *value = counter.load(Ordering::Relaxed);
-                    }
                     self.buffers[id.index as usize] = Some(memory);
                 }
                 (Bind::Texture(id), Written::Texture(shape, _, memory)) => {

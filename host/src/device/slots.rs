@@ -5,7 +5,7 @@ use std::fmt;
 
 use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{
-    Kernel, Layout, Output, Role, Scalar, Stage, TexelFormat, TextureKind, Type,
+    Kernel, Layout, Output, Role, Scalar, TexelFormat, TextureKind, Type,
 };
 
 use super::error::{DeviceError, Result};
@@ -20,8 +20,22 @@ pub enum Use<'a> {
     Element(&'a Layout),
     /// A buffer that every invocation reads anywhere.
     Storage(&'a Layout),
-    /// `u32` counters.
-    Atomic,
+    /// A buffer of which each invocation reads and writes its own element.
+    ElementMut(&'a Layout),
+    /// A buffer that every invocation reads and writes anywhere.
+    StorageMut {
+        /// An element's layout.
+        layout: &'a Layout,
+        /// Which element lies where is not compared.
+        unordered: bool,
+    },
+    /// Integers with atomic operations.
+    Atomic {
+        /// Which.
+        scalar: Scalar,
+        /// Which lies where is not compared.
+        unordered: bool,
+    },
     /// A texture that is read.
     Texture(TextureKind),
     /// A sampler.
@@ -30,13 +44,8 @@ pub enum Use<'a> {
     Attribute(u32, &'a Type),
     /// One value for each fragment; an argument on the native device only.
     Varying(u32, &'a Type),
-    /// A buffer that is written, one element for each invocation or each workgroup.
-    Output {
-        /// An element's layout.
-        layout: &'a Layout,
-        /// One for each workgroup.
-        per_group: bool,
-    },
+    /// A buffer that is written, one element for each invocation.
+    Output(&'a Layout),
     /// A texture that is written.
     StorageTexture {
         /// Its format.
@@ -75,7 +84,12 @@ impl Use<'_> {
     pub const fn is_written(&self) -> bool {
         matches!(
             self,
-            Self::Atomic | Self::Output { .. } | Self::StorageTexture { .. } | Self::Interface(_)
+            Self::ElementMut(_)
+                | Self::StorageMut { .. }
+                | Self::Atomic { .. }
+                | Self::Output(_)
+                | Self::StorageTexture { .. }
+                | Self::Interface(_)
         )
     }
 
@@ -83,9 +97,11 @@ impl Use<'_> {
     #[must_use]
     pub fn element_bytes(&self) -> Option<usize> {
         Some(match self {
-            Self::Uniform(l) | Self::Element(l) | Self::Storage(l) => l.size as usize,
-            Self::Output { layout, .. } => layout.size as usize,
-            Self::Atomic => 4,
+            Self::Uniform(l) | Self::Element(l) | Self::ElementMut(l) | Self::Storage(l) => {
+                l.size as usize
+            }
+            Self::StorageMut { layout, .. } | Self::Output(layout) => layout.size as usize,
+            Self::Atomic { .. } => 4,
             Self::Attribute(_, ty) | Self::Varying(_, ty) | Self::Interface(ty) => type_bytes(ty),
             Self::Texture(_) | Self::Sampler | Self::StorageTexture { .. } => return None,
         })
@@ -102,7 +118,11 @@ impl Use<'_> {
             | Self::Storage(_)
             | Self::Attribute(..)
             | Self::Varying(..) => "a buffer or bytes",
-            Self::Atomic | Self::Output { .. } | Self::Interface(_) => "a buffer",
+            Self::ElementMut(_)
+            | Self::StorageMut { .. }
+            | Self::Atomic { .. }
+            | Self::Output(_)
+            | Self::Interface(_) => "a buffer",
         }
     }
 }
@@ -143,12 +163,36 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
             Role::Uniform { binding, layout } => (Some(*binding), Use::Uniform(layout)),
             Role::Element { binding, layout } => (Some(*binding), Use::Element(layout)),
             Role::Storage { binding, layout } => (Some(*binding), Use::Storage(layout)),
-            Role::Atomic { binding } => (Some(*binding), Use::Atomic),
+            Role::ElementMut { binding, layout } => (Some(*binding), Use::ElementMut(layout)),
+            Role::StorageMut {
+                binding,
+                layout,
+                unordered,
+            } => (
+                Some(*binding),
+                Use::StorageMut {
+                    layout,
+                    unordered: *unordered,
+                },
+            ),
+            Role::Atomic {
+                binding,
+                scalar,
+                unordered,
+            } => (
+                Some(*binding),
+                Use::Atomic {
+                    scalar: *scalar,
+                    unordered: *unordered,
+                },
+            ),
             Role::Texture { binding, texture } => (Some(*binding), Use::Texture(*texture)),
             Role::Sampler { binding } => (Some(*binding), Use::Sampler),
             Role::Attribute { location, ty } => (None, Use::Attribute(*location, ty)),
             Role::Varying { location, ty } => (None, Use::Varying(*location, ty)),
-            Role::Constant { .. } | Role::Index | Role::Group | Role::Phase => continue,
+            Role::Constant { .. } | Role::Index | Role::BuiltIn { .. } | Role::Shared { .. } => {
+                continue;
+            }
         };
         all.push(Slot {
             name: param.name.clone(),
@@ -158,17 +202,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
     }
     for (i, output) in kernel.outputs.iter().enumerate() {
         let (binding, role) = match output {
-            Output::Buffer {
-                binding,
-                layout,
-                per_group,
-            } => (
-                Some(*binding),
-                Use::Output {
-                    layout,
-                    per_group: *per_group,
-                },
-            ),
+            Output::Buffer { binding, layout } => (Some(*binding), Use::Output(layout)),
             Output::Texture {
                 binding,
                 format,
@@ -237,7 +271,7 @@ pub fn constants(kernel: &Kernel, given: &[u32]) -> Result<Vec<u32>> {
 
 /// What was given for an argument, as far as the checks look at it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Given {
+pub enum Given<'a> {
     /// A buffer of so many bytes. The number tells buffers apart.
     Buffer {
         /// Its number.
@@ -246,7 +280,7 @@ pub enum Given {
         bytes: usize,
     },
     /// Bytes.
-    Bytes(usize),
+    Bytes(&'a [u8]),
     /// A texture.
     Texture {
         /// Its number.
@@ -263,7 +297,7 @@ pub enum Given {
 ///
 /// # Errors
 /// [`DeviceError::Count`] and [`DeviceError::Argument`].
-pub fn check(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given]) -> Result<()> {
+pub fn check(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given<'_>]) -> Result<()> {
     if slots.len() != given.len() {
         return Err(DeviceError::Count {
             kernel: kernel.name.clone(),
@@ -312,11 +346,11 @@ pub(crate) fn refuse(kernel: &Kernel, slot: &Slot<'_>, problem: String) -> Devic
     }
 }
 
-fn check_one(slot: &Slot<'_>, given: &Given) -> std::result::Result<(), String> {
+fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), String> {
     let wanted = || Err(format!("it must be {}", slot.role.wanted()));
     let bytes = match given {
         Given::Buffer { bytes, .. } => Some(*bytes),
-        Given::Bytes(n) if !slot.role.is_written() => Some(*n),
+        Given::Bytes(b) if !slot.role.is_written() => Some(b.len()),
         _ => None,
     };
     if let Some(size) = slot.role.element_bytes() {
@@ -336,7 +370,12 @@ fn check_one(slot: &Slot<'_>, given: &Given) -> std::result::Result<(), String> 
                 "{bytes} bytes are no whole number of elements of {size} bytes"
             ));
         }
-        if bytes == 0 && matches!(slot.role, Use::Storage(_) | Use::Atomic) {
+        if bytes == 0
+            && matches!(
+                slot.role,
+                Use::Storage(_) | Use::StorageMut { .. } | Use::Atomic { .. }
+            )
+        {
             return Err("it is empty: give at least one element".into());
         }
         return Ok(());
@@ -392,108 +431,4 @@ fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result
         ));
     }
     Ok(())
-}
-
-/// How many invocations run along x, y, z: as many as the first output has elements or texels
-/// (times the workgroup where it gets one element for each group); without outputs, as many as
-/// the first buffer that is read has. Element buffers must have at least as many elements, except
-/// in kernels with phases, and every other output the same size.
-///
-/// # Errors
-/// [`DeviceError::Argument`] for a buffer that is too short or an output of another size;
-/// [`DeviceError::Stage`] for a kernel that nothing tells the number of invocations.
-pub fn extent(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given]) -> Result<[u32; 3]> {
-    let threads = match kernel.stage {
-        Stage::Compute { threads, .. } => threads,
-        Stage::Vertex | Stage::Fragment => [1; 3],
-    };
-    let elements = |i: usize| -> Result<u32> {
-        let bytes = match given[i] {
-            Given::Buffer { bytes, .. } | Given::Bytes(bytes) => bytes,
-            Given::Texture { .. } | Given::Sampler(_) => 0,
-        };
-        let n = bytes / slots[i].role.element_bytes().unwrap_or(1).max(1);
-        u32::try_from(n).map_err(|_| {
-            refuse(
-                kernel,
-                &slots[i],
-                format!("{n} elements are more than 32 bits can count"),
-            )
-        })
-    };
-    let size_of = |i: usize| -> Result<Option<[u32; 3]>> {
-        Ok(match (slots[i].role, given[i]) {
-            (
-                Use::Output {
-                    per_group: true, ..
-                },
-                _,
-            ) => Some([elements(i)?.saturating_mul(threads[0]), 1, 1]),
-            (
-                Use::Output {
-                    per_group: false, ..
-                }
-                | Use::Interface(_),
-                _,
-            ) => Some([elements(i)?, 1, 1]),
-            (Use::StorageTexture { .. }, Given::Texture { shape, .. }) => Some(shape.size),
-            _ => None,
-        })
-    };
-    let mut extent: Option<([u32; 3], usize)> = None;
-    for i in 0..slots.len() {
-        let Some(size) = size_of(i)? else { continue };
-        match extent {
-            None => extent = Some((size, i)),
-            Some((first, _)) if first == size => {}
-            Some((first, j)) => {
-                return Err(refuse(
-                    kernel,
-                    &slots[i],
-                    format!(
-                        "{size:?} invocations would write it, but `{}` needs {first:?}",
-                        slots[j].name
-                    ),
-                ));
-            }
-        }
-    }
-    let extent = match extent {
-        Some((size, _)) => size,
-        None => {
-            let counted = |s: &Slot<'_>| matches!(s.role, Use::Element(_) | Use::Storage(_));
-            let Some(i) = slots.iter().position(counted) else {
-                return Err(DeviceError::Stage {
-                    kernel: kernel.name.clone(),
-                    stage: "compute",
-                    problem: "nothing says how many invocations it runs: give it an output, or a \
-                              parameter that is a buffer"
-                        .into(),
-                });
-            };
-            [elements(i)?, 1, 1]
-        }
-    };
-    if matches!(kernel.stage, Stage::Compute { phases: 1.., .. }) {
-        // A workgroup's last invocations may have no element of their own; they are told so.
-        return Ok(extent);
-    }
-    let invocations = extent[0];
-    for (i, slot) in slots.iter().enumerate() {
-        let own = matches!(
-            slot.role,
-            Use::Element(_) | Use::Attribute(..) | Use::Varying(..)
-        );
-        if own && elements(i)? < invocations {
-            return Err(refuse(
-                kernel,
-                slot,
-                format!(
-                    "it has {} elements, but {invocations} invocations run",
-                    elements(i)?
-                ),
-            ));
-        }
-    }
-    Ok(extent)
 }

@@ -15,7 +15,9 @@ pub mod values;
 use std::fmt;
 
 use fastrand::Rng;
-use hankel_dsl::native::describe::{Kernel, Layout, Output, Role, Stage, TexelFormat, TextureKind};
+use hankel_dsl::native::describe::{
+    Kernel, Layout, Output, Range, Role, Stage, TexelFormat, TextureKind,
+};
 use hankel_dsl::native::{Address, Filter, Sampler};
 use serde::{Deserialize, Serialize};
 
@@ -160,28 +162,42 @@ fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
     };
     let slots = slots::slots(kernel);
     let size = texels(kernel);
-    let elements = match kernel.stage {
-        Stage::Compute { .. } => ELEMENTS,
-        Stage::Vertex | Stage::Fragment => STAGE_ELEMENTS,
+    let elements = match (&kernel.stage, size) {
+        (Stage::Compute { .. }, Some(size)) => size.iter().map(|&n| n as usize).product(),
+        (Stage::Compute { .. }, None) => ELEMENTS,
+        (Stage::Vertex | Stage::Fragment, _) => STAGE_ELEMENTS,
     };
     // What is read beside texels, vertices or fragments is a short table that each of them may
-    // walk through; over rows it has a row for each.
+    // walk through; over rows it has a row for each. What is written has room for them all.
+    let over_texels = matches!(kernel.outputs.first(), Some(Output::Texture { .. }));
+    let writes = slots
+        .iter()
+        .any(|s| matches!(s.role, Use::StorageMut { .. }));
     let table = match kernel.stage {
-        Stage::Compute { dimensions: 1, .. } => ELEMENTS,
+        Stage::Compute { .. } if writes || !over_texels => ELEMENTS.max(elements),
         _ => TABLE,
     };
-    let threads = match kernel.stage {
-        Stage::Compute { threads, .. } => threads[0].max(1) as usize,
-        Stage::Vertex | Stage::Fragment => 1,
-    };
-    let args: Vec<Input> = slots
+    let size = size.unwrap_or(FLAT);
+    let mut args: Vec<Input> = slots
         .iter()
-        .map(|s| input(s, &mut values, elements, table, threads, size))
+        .map(|s| input(s, &mut values, elements, table, size))
         .collect();
-    let invocations = match kernel.outputs.first() {
-        Some(Output::Texture { .. }) => size.iter().map(|&n| n as usize).product(),
-        _ => elements,
-    };
+    if let Stage::Compute {
+        range: Range::Uniform { param, offset },
+        dimensions,
+        ..
+    } = &kernel.stage
+    {
+        let said = slots.iter().position(|s| s.name == *param);
+        if let Some(Input::Bytes(bytes)) = said.map(|i| &mut args[i]) {
+            let words = bytes.get_mut(*offset as usize..).unwrap_or_default();
+            let words = words.chunks_exact_mut(4).take(*dimensions as usize);
+            for (word, n) in words.zip(size_of_range(*dimensions)) {
+                word.copy_from_slice(&n.to_le_bytes());
+            }
+        }
+    }
+    let invocations = elements;
     Case {
         class,
         args,
@@ -189,11 +205,29 @@ fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
     }
 }
 
-/// Texels of what the kernel writes; of the textures it reads where it writes none.
-fn texels(kernel: &Kernel) -> [u32; 3] {
-    match kernel.outputs.first() {
-        Some(Output::Texture { dimensions: 3, .. }) => VOLUME,
-        _ => FLAT,
+/// How far a kernel of so many dimensions runs where nothing fixes it.
+const fn size_of_range(dimensions: u32) -> [u32; 3] {
+    match dimensions {
+        1 => [ELEMENTS as u32, 1, 1],
+        2 => FLAT,
+        _ => VOLUME,
+    }
+}
+
+/// How far the kernel runs; none for a map over the elements of a buffer.
+fn texels(kernel: &Kernel) -> Option<[u32; 3]> {
+    let Stage::Compute {
+        range, dimensions, ..
+    } = &kernel.stage
+    else {
+        return None;
+    };
+    match (range, kernel.outputs.first()) {
+        (Range::Fixed { size }, _) => Some(*size),
+        (Range::Uniform { .. }, _) | (Range::Outputs, Some(Output::Texture { .. })) => {
+            Some(size_of_range(*dimensions))
+        }
+        (Range::Outputs | Range::Elements { .. }, _) => None,
     }
 }
 
@@ -202,27 +236,26 @@ fn input(
     values: &mut Values,
     elements: usize,
     table: usize,
-    threads: usize,
     size: [u32; 3],
 ) -> Input {
     let zeros =
         |count: usize| Input::Bytes(vec![0; count * slot.role.element_bytes().unwrap_or(0)]);
     match slot.role {
         Use::Uniform(layout) => Input::Bytes(filled(values, &slot.name, layout, 1, true)),
-        Use::Element(layout) => Input::Bytes(filled(values, &slot.name, layout, elements, false)),
-        Use::Storage(layout) => Input::Bytes(filled(values, &slot.name, layout, table, false)),
+        Use::Element(layout) | Use::ElementMut(layout) => {
+            Input::Bytes(filled(values, &slot.name, layout, elements, false))
+        }
+        Use::Storage(layout) | Use::StorageMut { layout, .. } => {
+            Input::Bytes(filled(values, &slot.name, layout, table, false))
+        }
         Use::Attribute(_, ty) | Use::Varying(_, ty) => {
             let leaves = flat::type_leaves(ty);
             let stride = slots::type_bytes(ty);
             Input::Bytes(values.elements(&slot.name, &leaves, stride, elements, false))
         }
-        Use::Atomic => zeros(COUNTERS),
+        Use::Atomic { .. } => zeros(COUNTERS),
         Use::Interface(_) => zeros(elements),
-        Use::Output { per_group, .. } => zeros(if per_group {
-            elements.div_ceil(threads)
-        } else {
-            elements
-        }),
+        Use::Output(_) => zeros(elements),
         Use::StorageTexture { format, dimensions } => {
             let shape = if dimensions == 3 {
                 TextureShape::d3(size, format)
@@ -281,7 +314,7 @@ pub fn of_invocation(kernel: &Kernel, case: &Case, invocation: usize) -> Vec<(St
     for (slot, arg) in slots::slots(kernel).iter().zip(&case.args) {
         let (leaves, stride, index) = match slot.role {
             Use::Uniform(l) => (flat::leaves(l), l.size as usize, 0),
-            Use::Element(l) => (flat::leaves(l), l.size as usize, invocation),
+            Use::Element(l) | Use::ElementMut(l) => (flat::leaves(l), l.size as usize, invocation),
             Use::Attribute(_, ty) | Use::Varying(_, ty) => {
                 (flat::type_leaves(ty), slots::type_bytes(ty), invocation)
             }

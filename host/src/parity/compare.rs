@@ -1,5 +1,7 @@
 //! How far apart two numbers are.
 
+use std::cmp::Ordering;
+
 use hankel_dsl::native::describe::{Scalar, TexelFormat};
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +93,24 @@ impl Kind {
             Self::Scalar(s) => crate::device::slots::scalar_bytes(s),
             Self::Half | Self::Unorm16 => 2,
             Self::Unorm8 => 1,
+        }
+    }
+
+    /// Which of the values at the start of two byte slices comes first.
+    #[must_use]
+    pub fn order(self, a: &[u8], b: &[u8]) -> Ordering {
+        match self {
+            Self::Scalar(scalar) => {
+                let read = |bytes: &[u8]| Number::read(scalar, bytes);
+                match (read(a), read(b)) {
+                    (Number::F32(a), Number::F32(b)) => a.total_cmp(&b),
+                    (Number::F64(a), Number::F64(b)) => a.total_cmp(&b),
+                    (Number::U32(a), Number::U32(b)) => a.cmp(&b),
+                    (Number::I32(a), Number::I32(b)) => a.cmp(&b),
+                    _ => Ordering::Equal,
+                }
+            }
+            Self::Half | Self::Unorm16 | Self::Unorm8 => a[..self.bytes()].cmp(&b[..self.bytes()]),
         }
     }
 

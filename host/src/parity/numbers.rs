@@ -1,6 +1,9 @@
 //! The numbers that a kernel writes, and how far two runs of it are apart.
 
-use hankel_dsl::native::describe::{Kernel, Scalar, Tolerance, Type};
+use std::borrow::Cow;
+use std::cmp::Ordering;
+
+use hankel_dsl::native::describe::{Kernel, Tolerance, Type};
 use serde::{Deserialize, Serialize};
 
 use super::compare::{Distance, Kind};
@@ -168,6 +171,11 @@ impl<'a> Numbers<'a> {
         mut f: impl FnMut(usize, &str, Distance),
     ) {
         for ((out, a), b) in self.outputs.iter().zip(reference).zip(written) {
+            let (a, b) = if out.unordered {
+                (out.sorted(a), out.sorted(b))
+            } else {
+                (Cow::Borrowed(&a[..]), Cow::Borrowed(&b[..]))
+            };
             let elements = a.chunks_exact(out.stride).zip(b.chunks_exact(out.stride));
             for (i, (a, b)) in elements.enumerate() {
                 for (name, kind, offset) in &out.values {
@@ -197,6 +205,23 @@ struct Out {
     stride: usize,
     /// Name, type and place of each number of it.
     values: Vec<(String, Kind, usize)>,
+    /// Which element lies where says nothing.
+    unordered: bool,
+}
+
+impl Out {
+    /// The elements in an order that does not depend on where they lay: by their numbers.
+    fn sorted(&self, bytes: &[u8]) -> Cow<'static, [u8]> {
+        let mut elements: Vec<&[u8]> = bytes.chunks_exact(self.stride).collect();
+        elements.sort_by(|a, b| {
+            self.values
+                .iter()
+                .map(|(_, kind, offset)| kind.order(&a[*offset..], &b[*offset..]))
+                .find(|order| order.is_ne())
+                .unwrap_or(Ordering::Equal)
+        });
+        Cow::Owned(elements.concat())
+    }
 }
 
 /// What a kernel writes, in the order of its slots.
@@ -207,14 +232,11 @@ fn outputs(kernel: &Kernel) -> Vec<Out> {
         .filter(|s| s.role.is_written())
     {
         let leaves = match slot.role {
-            Use::Output { layout, .. } => flat::leaves(layout),
-            Use::Interface(ty) => flat::type_leaves(ty),
-            Use::Atomic => {
-                let ty = Type::Scalar {
-                    scalar: Scalar::U32,
-                };
-                flat::type_leaves(&ty)
+            Use::ElementMut(layout) | Use::StorageMut { layout, .. } | Use::Output(layout) => {
+                flat::leaves(layout)
             }
+            Use::Interface(ty) => flat::type_leaves(ty),
+            Use::Atomic { scalar, .. } => flat::type_leaves(&Type::Scalar { scalar }),
             Use::StorageTexture { format, .. } => {
                 let kind = Kind::of(format);
                 let values = ["r", "g", "b", "a"]
@@ -226,6 +248,7 @@ fn outputs(kernel: &Kernel) -> Vec<Out> {
                 all.push(Out {
                     stride: format.bytes(),
                     values,
+                    unordered: false,
                 });
                 continue;
             }
@@ -244,6 +267,16 @@ fn outputs(kernel: &Kernel) -> Vec<Out> {
         all.push(Out {
             stride: slot.role.element_bytes().unwrap_or(1),
             values,
+            unordered: matches!(
+                slot.role,
+                Use::StorageMut {
+                    unordered: true,
+                    ..
+                } | Use::Atomic {
+                    unordered: true,
+                    ..
+                }
+            ),
         });
     }
     all

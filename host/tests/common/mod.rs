@@ -2,8 +2,6 @@
 //! neither a compiler nor the built-in kernels.
 #![allow(dead_code, reason = "each test file uses some of them")]
 
-use std::sync::atomic::Ordering;
-
 use hankel_dsl::Texture3d;
 use hankel_dsl::glam::Vec3;
 use hankel_dsl::native::describe::*;
@@ -74,12 +72,13 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
     }
 }
 
-pub fn compute(threads: [u32; 3], dimensions: u32, phases: u32) -> Stage {
+pub fn compute(threads: [u32; 3], dimensions: u32) -> Stage {
     Stage::Compute {
         threads,
         dimensions,
-        phases,
+        cooperative: false,
         workgroup_bytes: 0,
+        range: Range::Outputs,
     }
 }
 
@@ -184,7 +183,7 @@ pub fn affine() -> Sample {
     let pair = structure("Pair", &[("x", Scalar::F32), ("y", Scalar::F32)]);
     let kernel = kernel(
         "affine",
-        compute([64, 1, 1], 1, 0),
+        compute([64, 1, 1], 1),
         vec![
             param(
                 "settings",
@@ -205,7 +204,6 @@ pub fn affine() -> Sample {
         vec![Output::Buffer {
             binding: 2,
             layout: plain("f32", Scalar::F32),
-            per_group: false,
         }],
     );
     fn run(call: &mut Call<'_>) -> Result<(), CallError> {
@@ -246,7 +244,7 @@ pub fn affine() -> Sample {
 pub fn double() -> Sample {
     let mut kernel = kernel(
         "double_f64",
-        compute([64, 1, 1], 1, 0),
+        compute([64, 1, 1], 1),
         vec![
             param(
                 "x",
@@ -267,7 +265,6 @@ pub fn double() -> Sample {
         vec![Output::Buffer {
             binding: 2,
             layout: plain("f64", Scalar::F64),
-            per_group: false,
         }],
     );
     kernel.precision = Some(Precision::F64);
@@ -305,7 +302,7 @@ pub fn double() -> Sample {
 pub fn histogram() -> Sample {
     let kernel = kernel(
         "histogram",
-        compute([64, 1, 1], 1, 0),
+        compute([64, 1, 1], 1),
         vec![
             param(
                 "value",
@@ -314,19 +311,28 @@ pub fn histogram() -> Sample {
                     layout: plain("u32", Scalar::U32),
                 },
             ),
-            param("bins", Role::Atomic { binding: 1 }),
+            param(
+                "bins",
+                Role::Atomic {
+                    binding: 1,
+                    scalar: Scalar::U32,
+                    unordered: false,
+                },
+            ),
         ],
         vec![],
     );
     fn run(call: &mut Call<'_>) -> Result<(), CallError> {
-        let [Arg::Bytes(values), Arg::Atomics(bins)] = &call.args[..] else {
+        let [Arg::Bytes(values), Arg::BytesMut(bins)] = &mut call.args[..] else {
             return Err(CallError::Count {
                 expected: 2,
                 got: call.args.len(),
             });
         };
+        let bins = bytemuck::cast_slice_mut::<u8, u32>(bins);
         for &v in bytemuck::cast_slice::<u8, u32>(values) {
-            bins[v as usize % bins.len()].fetch_add(1, Ordering::Relaxed);
+            let i = v as usize % bins.len();
+            bins[i] = bins[i].wrapping_add(1);
         }
         Ok(())
     }
@@ -348,7 +354,15 @@ pub fn sums() -> Sample {
     let u = || plain("u32", Scalar::U32);
     let kernel = kernel(
         "sums",
-        compute([64, 1, 1], 1, 1),
+        Stage::Compute {
+            threads: [64, 1, 1],
+            dimensions: 1,
+            cooperative: true,
+            workgroup_bytes: 256,
+            range: Range::Elements {
+                param: "value".into(),
+            },
+        },
         vec![
             param(
                 "value",
@@ -358,14 +372,24 @@ pub fn sums() -> Sample {
                 },
             ),
             param("index", Role::Index),
-            param("group", Role::Group),
-            param("phase", Role::Phase),
+            param(
+                "part",
+                Role::Shared {
+                    layout: u(),
+                    length: 64,
+                    atomic: false,
+                },
+            ),
+            param(
+                "out",
+                Role::StorageMut {
+                    binding: 1,
+                    layout: u(),
+                    unordered: false,
+                },
+            ),
         ],
-        vec![Output::Buffer {
-            binding: 1,
-            layout: u(),
-            per_group: true,
-        }],
+        vec![],
     );
     fn run(call: &mut Call<'_>) -> Result<(), CallError> {
         let [Arg::Bytes(values), Arg::BytesMut(out)] = &mut call.args[..] else {
@@ -411,7 +435,7 @@ pub fn sums() -> Sample {
 pub fn image() -> Sample {
     let kernel = kernel(
         "image",
-        compute([8, 8, 1], 2, 0),
+        compute([8, 8, 1], 2),
         vec![
             param(
                 "samples",
@@ -634,7 +658,7 @@ pub fn mixed() -> Sample {
     );
     let mut kernel = kernel(
         "mixed_f64",
-        compute([64, 1, 1], 1, 0),
+        compute([64, 1, 1], 1),
         vec![
             param(
                 "settings",
@@ -655,7 +679,6 @@ pub fn mixed() -> Sample {
         vec![Output::Buffer {
             binding: 2,
             layout: result,
-            per_group: false,
         }],
     );
     kernel.function = "mixed".into();

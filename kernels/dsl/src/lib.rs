@@ -38,7 +38,8 @@
 //!
 //! # What is refused
 //! - `unsafe`, `cfg(target_arch)` and a second version for the processor: the DSL owns them.
-//! - Writing anywhere but to one's own element: a kernel *returns* what it computes.
+//! - In a map, writing anywhere but to one's own element: it *returns* what it computes. Who
+//!   writes elsewhere takes a [`StorageMut`] or [`Atomics`] and says so by it.
 //! - `core`'s `min`, `max`, `clamp` and slice indexing in kernels: they compile, but carry NaN and
 //!   bounds tests into the shader; [`Real`] and [`Buffer`] do not.
 //!
@@ -54,21 +55,27 @@ extern crate std;
 // So that the macros' `::hankel_dsl` paths also work in this crate's own tests.
 extern crate self as hankel_dsl;
 
+mod atomics;
 mod memory;
 #[cfg(not(target_arch = "spirv"))]
 pub mod native;
 mod real;
+mod storage;
 mod texture;
 mod unroll;
+mod workgroup;
 
+pub use atomics::{AtomicInteger, Atomics};
 pub use glam;
-pub use hankel_macros::{Element, kernel, kernels};
-pub use memory::{Atomics, Buffer, Group};
+pub use hankel_macros::{Element, cooperative, kernel, kernels};
+pub use memory::Buffer;
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]
 pub use spirv_std;
+pub use storage::{StorageMut, Stored};
 pub use texture::{Sampler, Texel, Texture2d, Texture2dMultisampled, Texture3d};
+pub use workgroup::{Shared, SharedAtomics, barrier, storage_barrier};
 
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]

@@ -88,7 +88,7 @@ fn the_description_follows_the_signature() {
         Stage::Compute {
             threads: [64, 1, 1],
             dimensions: 1,
-            phases: 0,
+            cooperative: false,
             ..
         }
     ));
@@ -104,14 +104,7 @@ fn the_description_follows_the_signature() {
         ("b", 8)
     );
     assert_eq!(layout.fields[1].summary, "Another.");
-    assert!(matches!(
-        k.outputs[0],
-        Output::Buffer {
-            binding: 2,
-            per_group: false,
-            ..
-        }
-    ));
+    assert!(matches!(k.outputs[0], Output::Buffer { binding: 2, .. }));
 }
 
 #[test]

@@ -4,8 +4,10 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 
-use crate::kernel::{Compute, Kernel, Role, Stage, Texture, Variant};
+use crate::general::{Form, own};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Texture, Variant};
 use crate::shader::{output_name, texture_type};
+use crate::twin;
 
 impl Kernel {
     pub fn expand_host(&self) -> TokenStream {
@@ -26,12 +28,23 @@ impl Kernel {
             }
         });
         let uniforms = self.uniform_checks();
+        let twin = (self.form() == Form::Cooperative).then(|| {
+            let twin = twin::twin(&self.item, &format_ident!("twin"), &self.helpers);
+            // As the native code that calls it.
+            let entries = self.variants.iter().map(|v| &v.entry);
+            quote! {
+                #[cfg(any(not(hankel_select), #(hankel_native = #entries),*))]
+                #twin
+            }
+        });
         quote! {
             ::hankel_dsl::on_host! {
                 /// The entry points that come from the function.
                 #[allow(
                     clippy::all,
                     unexpected_cfgs,
+                    unused_braces,
+                    unused_parens,
                     unused_imports,
                     unused_mut,
                     unused_variables,
@@ -39,8 +52,9 @@ impl Kernel {
                 )]
                 #[must_use]
                 pub fn entries() -> ::hankel_dsl::native::Entries {
-                    use ::hankel_dsl::native::{self, describe, exec, layout};
+                    use ::hankel_dsl::native::{self, describe, exec, layout, workgroup};
                     #uniforms
+                    #twin
                     let mut all = native::Entries::new();
                     #(#entries)*
                     all
@@ -75,26 +89,24 @@ impl Kernel {
             Stage::Vertex => quote!(describe::Stage::Vertex),
             Stage::Fragment => quote!(describe::Stage::Fragment),
             Stage::Compute(c) => {
-                let mut threads = c.threads.clone();
-                threads.resize(3, 1);
+                let threads = c.all_threads();
                 let dimensions = c.threads.len() as u32;
-                let phases = c.phases.unwrap_or(0);
-                let bytes = self
-                    .params
-                    .iter()
-                    .find_map(|p| match &p.role {
-                        Role::Group { slot, size } => {
-                            Some(quote!(2 * #size * size_of::<#slot>() as u32))
-                        }
-                        _ => None,
-                    })
-                    .unwrap_or(quote!(0));
+                let cooperative = c.cooperative;
+                let bytes = self.params.iter().filter_map(|p| match &p.role {
+                    Role::Shared { ty, length, .. } => {
+                        Some(quote!(((#length) * size_of::<#ty>()) as u32))
+                    }
+                    _ => None,
+                });
+                let bytes = quote!(0 #(+ #bytes)*);
+                let range = self.describe_range();
                 quote! {
                     describe::Stage::Compute {
                         threads: [#(#threads),*],
                         dimensions: #dimensions,
-                        phases: #phases,
+                        cooperative: #cooperative,
                         workgroup_bytes: #bytes,
+                        range: #range,
                     }
                 }
             }
@@ -156,7 +168,19 @@ impl Kernel {
                         let layout = layout(ty);
                         quote!(Storage { binding: #b, layout: #layout })
                     }
-                    Role::Atomic => quote!(Atomic { binding: #b }),
+                    Role::ElementMut(ty) => {
+                        let layout = layout(ty);
+                        quote!(ElementMut { binding: #b, layout: #layout })
+                    }
+                    Role::StorageMut { ty, unordered } => {
+                        let layout = layout(ty);
+                        quote!(StorageMut { binding: #b, layout: #layout, unordered: #unordered })
+                    }
+                    Role::Atomic { scalar, unordered } => quote!(Atomic {
+                        binding: #b,
+                        scalar: <#scalar as layout::AtomicScalar>::SCALAR,
+                        unordered: #unordered,
+                    }),
                     Role::Texture(t) => {
                         let kind = match t {
                             Texture::Flat => quote!(Texture2d),
@@ -170,8 +194,15 @@ impl Kernel {
                         quote!(Constant { id: #id, default: #default })
                     }
                     Role::Index => quote!(Index),
-                    Role::Group { .. } => quote!(Group),
-                    Role::Phase => quote!(Phase),
+                    Role::BuiltIn(built_in) => {
+                        let built_in = built_in.variant();
+                        quote!(BuiltIn { built_in: describe::BuiltIn::#built_in })
+                    }
+                    Role::Shared { ty, length, atomic } => quote!(Shared {
+                        layout: <#ty as layout::Element>::layout(),
+                        length: (#length) as u32,
+                        atomic: #atomic,
+                    }),
                     Role::Attribute(ty) => {
                         quote!(Attribute { location: #l, ty: <#ty as layout::Element>::ty() })
                     }
@@ -204,26 +235,27 @@ impl Kernel {
                         location: #i,
                         ty: <#ty as layout::Element>::ty(),
                     }),
-                    Stage::Compute(c) => match variant.format {
-                        Some(format) => {
-                            let format = format_ident!("{}", format.variant);
-                            let dimensions = self.dimensions() as u32;
-                            quote!(describe::Output::Texture {
-                                binding: #binding,
-                                format: describe::TexelFormat::#format,
-                                dimensions: #dimensions,
-                            })
+                    Stage::Compute(_) => {
+                        let binding = binding + i;
+                        match self.output_format(i as usize, variant) {
+                            Some(format) => {
+                                let format = format_ident!("{}", format.variant);
+                                let dimensions = self.dimensions() as u32;
+                                quote!(describe::Output::Texture {
+                                    binding: #binding,
+                                    format: describe::TexelFormat::#format,
+                                    dimensions: #dimensions,
+                                })
+                            }
+                            None => {
+                                let ty = self.concrete(ty, variant);
+                                quote!(describe::Output::Buffer {
+                                    binding: #binding,
+                                    layout: <#ty as layout::Element>::layout(),
+                                })
+                            }
                         }
-                        None => {
-                            let ty = self.concrete(ty, variant);
-                            let per_group = c.per_group;
-                            quote!(describe::Output::Buffer {
-                                binding: #binding,
-                                layout: <#ty as layout::Element>::layout(),
-                                per_group: #per_group,
-                            })
-                        }
-                    },
+                    }
                 }
             })
             .collect()
@@ -258,14 +290,24 @@ impl Kernel {
                 Role::Attribute(ty) | Role::Varying(ty) => {
                     quote!(let #name = args.slice::<#ty>(#text)?;)
                 }
-                Role::Atomic => quote!(let #name = args.atomics(#text)?;),
+                Role::ElementMut(ty) | Role::StorageMut { ty, .. } => {
+                    let ty = self.concrete(ty, variant);
+                    quote! {
+                        let #name = ::hankel_dsl::StorageMut::<#ty>::new(
+                            args.words(#text, size_of::<#ty>())?,
+                        );
+                    }
+                }
+                Role::Atomic { scalar, .. } => quote! {
+                    let #name = ::hankel_dsl::Atomics::<#scalar>::new(args.words(#text, 4)?);
+                },
                 Role::Texture(t) => {
                     let (multisampled, flat) = (*t == Texture::Multisampled, *t != Texture::Volume);
                     quote!(let #name = args.texture(#text, #multisampled, #flat)?;)
                 }
                 Role::Sampler => quote!(let #name = args.sampler(#text)?;),
                 Role::Constant { .. } => quote!(let #name = args.constant();),
-                Role::Index | Role::Group { .. } | Role::Phase => TokenStream::new(),
+                Role::Index | Role::BuiltIn(_) | Role::Shared { .. } => TokenStream::new(),
             }
         });
         let body = match &self.stage {
@@ -284,29 +326,55 @@ impl Kernel {
 
     /// The call of the kernel for invocation `i`.
     fn host_call(&self, variant: &Variant) -> TokenStream {
-        let phased = matches!(&self.stage, Stage::Compute(c) if c.phases.is_some());
+        let form = self.form();
         let name = &self.name;
         let generics = variant.scalar.as_ref().map(|s| quote!(::<#s>));
         let args = self.params.iter().map(|p| {
             let name = &p.name;
             match &p.role {
-                Role::Element(_) if phased => quote!(#name.get(i).copied()),
+                Role::Element(_) if form == Form::Cooperative => {
+                    quote!(__it.number.and_then(|n| #name.get(n as usize)).copied())
+                }
+                Role::Element(_) if form == Form::General => quote!(#name[__number as usize]),
                 Role::Element(_) | Role::Attribute(_) | Role::Varying(_) => quote!(#name[i]),
                 Role::Uniform(_) | Role::Constant { .. } => quote!(#name),
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
-                Role::Atomic => quote!(::hankel_dsl::Atomics::new(#name)),
+                Role::ElementMut(_) => {
+                    let own = own(p);
+                    quote!(&mut #own)
+                }
+                Role::StorageMut { .. } | Role::Atomic { .. } => quote!(#name),
                 Role::Texture(t) => {
                     let ty = texture_type(*t);
                     quote!(#ty::new(#name))
                 }
                 Role::Sampler => quote!(::hankel_dsl::Sampler::new(#name)),
-                Role::Index if self.dimensions() == 1 => quote!(i as u32),
-                Role::Index => quote!(i),
-                Role::Group { .. } => quote!(group),
-                Role::Phase => quote!(phase),
+                Role::Index => match form {
+                    Form::Cooperative => self.host_place(&quote!(__it.at)),
+                    Form::General => self.host_place(&quote!(__at)),
+                    Form::Plain if self.dimensions() == 1 => quote!(i as u32),
+                    Form::Plain => quote!(i),
+                },
+                Role::BuiltIn(BuiltIn::LocalIndex) => quote!(__it.local_index),
+                Role::BuiltIn(BuiltIn::LocalId) => self.host_place(&quote!(__it.local)),
+                Role::BuiltIn(BuiltIn::GroupId) => self.host_place(&quote!(__it.group)),
+                Role::BuiltIn(BuiltIn::GroupCount) => self.host_place(&quote!(__it.groups)),
+                Role::Shared { .. } => quote!(#name),
             }
         });
-        quote!(super::#name #generics (#(#args),*))
+        match form {
+            Form::Cooperative => quote!(twin(#(#args),*).await),
+            _ => quote!(super::#name #generics (#(#args),*)),
+        }
+    }
+
+    /// As much of a `UVec3` as the kernel has dimensions.
+    fn host_place(&self, of: &TokenStream) -> TokenStream {
+        match self.dimensions() {
+            1 => quote!(#of.x),
+            2 => quote!(#of.truncate()),
+            _ => quote!(#of),
+        }
     }
 
     fn elements(&self) -> impl Iterator<Item = &crate::kernel::Param> {
@@ -329,16 +397,13 @@ impl Kernel {
 
     fn run_compute(&self, c: &Compute, variant: &Variant) -> TokenStream {
         let call = self.host_call(variant);
+        match self.form() {
+            Form::General => return self.run_general(c, &call, variant),
+            Form::Cooperative => return self.run_cooperative(c, &call, variant),
+            Form::Plain => {}
+        }
         let checks = self.length_checks();
-        let Some(out) = self.outputs.first() else {
-            let extent = self.extent_param().map(|p| &p.name);
-            return quote! {
-                let count = #extent.len();
-                #checks
-                exec::for_each(mode, count, |i| #call)
-            };
-        };
-        let out = self.concrete(out, variant);
+        let out = self.concrete(&self.outputs[0], variant);
         if let Some(format) = variant.format {
             let format = format_ident!("{}", format.variant);
             let (map, index) = if self.dimensions() == 2 {
@@ -349,13 +414,6 @@ impl Kernel {
             return quote! {
                 let output = args.texture_mut("output", describe::TexelFormat::#format)?;
                 exec::#map(mode, output, |i: #index| #call)
-            };
-        }
-        if let Some(phases) = c.phases {
-            let per_group = c.per_group;
-            return quote! {
-                let output = args.slice_mut::<#out>("output")?;
-                exec::phases(mode, output, #per_group, #phases, |phase, i, group| #call)
             };
         }
         let map = if self.real.is_some() {

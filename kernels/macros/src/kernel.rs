@@ -6,9 +6,14 @@ use syn::ext::IdentExt;
 use syn::parse::{Parse, ParseStream, Parser};
 use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
-use syn::{Attribute, FnArg, GenericParam, ItemFn, LitFloat, LitInt, LitStr, Pat, Token, Type};
+use syn::{
+    Attribute, Expr, FnArg, GenericParam, ItemFn, LitFloat, LitInt, LitStr, Pat, Token, Type,
+};
 
 use crate::element::{replace, summary};
+use crate::general::Form;
+use crate::range::Range;
+use crate::twin;
 
 /// A kernel function.
 pub struct Kernel {
@@ -21,6 +26,8 @@ pub struct Kernel {
     pub params: Vec<Param>,
     /// Types of the outputs, in order.
     pub outputs: Vec<Type>,
+    /// Formats of the outputs that are texels, where each has its own: `outputs(…)`.
+    pub output_formats: Vec<Option<Format>>,
     /// Entry points to make.
     pub variants: Vec<Variant>,
     pub tolerance: Tolerance,
@@ -28,6 +35,8 @@ pub struct Kernel {
     pub exact: bool,
     /// In SPIR-V it is.
     pub pinned: bool,
+    /// Cooperative functions that it calls.
+    pub helpers: Vec<Ident>,
 }
 
 pub enum Stage {
@@ -38,8 +47,18 @@ pub enum Stage {
 
 pub struct Compute {
     pub threads: Vec<u32>,
-    pub phases: Option<u32>,
-    pub per_group: bool,
+    /// Its invocations share memory or wait for one another.
+    pub cooperative: bool,
+    pub range: Range,
+}
+
+impl Compute {
+    /// Invocations of a workgroup along x, y, z.
+    pub fn all_threads(&self) -> Vec<u32> {
+        let mut threads = self.threads.clone();
+        threads.resize(3, 1);
+        threads
+    }
 }
 
 /// One entry point of the function.
@@ -125,16 +144,63 @@ pub struct Param {
 pub enum Role {
     Uniform(Type),
     Element(Type),
+    ElementMut(Type),
     Storage(Type),
-    Atomic,
+    StorageMut {
+        ty: Type,
+        unordered: bool,
+    },
+    Atomic {
+        scalar: Type,
+        unordered: bool,
+    },
     Texture(Texture),
     Sampler,
-    Constant { id: u32, default: u32 },
+    Constant {
+        id: u32,
+        default: u32,
+    },
     Index,
-    Group { slot: Type, size: u32 },
-    Phase,
+    BuiltIn(BuiltIn),
+    Shared {
+        ty: Type,
+        length: TokenStream,
+        atomic: bool,
+    },
     Attribute(Type),
     Varying(Type),
+}
+
+/// What the device knows of an invocation.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum BuiltIn {
+    LocalId,
+    LocalIndex,
+    GroupId,
+    GroupCount,
+}
+
+/// Each by the word of its attribute.
+const BUILT_INS: [(&str, BuiltIn); 4] = [
+    ("local_id", BuiltIn::LocalId),
+    ("local_index", BuiltIn::LocalIndex),
+    ("group_id", BuiltIn::GroupId),
+    ("group_count", BuiltIn::GroupCount),
+];
+
+impl BuiltIn {
+    /// The variant of `describe::BuiltIn`.
+    pub fn variant(self) -> Ident {
+        format_ident!(
+            "{}",
+            match self {
+                Self::LocalId => "LocalId",
+                Self::LocalIndex => "LocalIndex",
+                Self::GroupId => "GroupId",
+                Self::GroupCount => "GroupCount",
+            }
+        )
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -151,15 +217,20 @@ impl Role {
             self,
             Self::Uniform(_)
                 | Self::Element(_)
+                | Self::ElementMut(_)
                 | Self::Storage(_)
-                | Self::Atomic
+                | Self::StorageMut { .. }
+                | Self::Atomic { .. }
                 | Self::Texture(_)
                 | Self::Sampler
         )
     }
 }
 
-const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, group, phase, attribute, varying";
+/// Variables of the generated code.
+const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
+
+const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, shared, attribute, varying";
 
 impl Kernel {
     pub fn parse(args: TokenStream, mut item: ItemFn) -> syn::Result<Self> {
@@ -174,6 +245,7 @@ impl Kernel {
         }
         reject(&item)?;
         let real = real(&item)?;
+        let elements = element_types(&item);
         let params = item
             .sig
             .inputs
@@ -182,16 +254,21 @@ impl Kernel {
             .collect::<syn::Result<Vec<_>>>()?;
         let outputs = match &item.sig.output {
             syn::ReturnType::Default => Vec::new(),
-            syn::ReturnType::Type(_, ty) => match (&**ty, args.stage()?) {
-                (Type::Tuple(t), Word::Vertex | Word::Fragment) => {
-                    t.elems.iter().cloned().collect()
-                }
-                (ty, _) => vec![ty.clone()],
+            syn::ReturnType::Type(_, ty) => match &**ty {
+                Type::Tuple(t) => t.elems.iter().cloned().collect(),
+                ty => vec![ty.clone()],
             },
         };
         let variants = args.variants(&name, real.as_ref())?;
+        let output_formats = args.output_formats(&outputs)?;
         let (exact, pinned) = (args.exact, args.pinned);
-        let stage = args.into_stage(&params, &outputs, &name)?;
+        let helpers = args.cooperative.clone();
+        let mut stage = args.into_stage(&params, &outputs, &name)?;
+        if let Stage::Compute(c) = &mut stage.0 {
+            c.cooperative = twin::has_barrier(&item, &helpers)
+                || params.iter().any(|p| matches!(p.role, Role::Shared { .. }));
+            options(&elements, c.cooperative)?;
+        }
         let tolerance = stage.1;
         let kernel = Self {
             item,
@@ -201,18 +278,41 @@ impl Kernel {
             real,
             params,
             outputs,
+            output_formats,
             variants,
             tolerance,
             exact,
             pinned,
+            helpers,
         };
         kernel.check()?;
         Ok(kernel)
     }
 
-    /// Whether the output is a texel.
+    /// Whether an output is a texel.
     pub fn writes_texture(&self) -> bool {
-        self.variants.iter().any(|v| v.format.is_some())
+        self.variants
+            .iter()
+            .map(|v| v.format)
+            .chain(self.output_formats.iter().copied())
+            .any(|f| f.is_some())
+    }
+
+    /// The format of an output that is a texel.
+    pub fn output_format(&self, i: usize, variant: &Variant) -> Option<Format> {
+        match self.output_formats.get(i) {
+            Some(format) => *format,
+            None => variant.format,
+        }
+    }
+
+    /// An output's name in messages and as an argument.
+    pub fn output_text(&self, i: usize) -> String {
+        if self.outputs.len() == 1 {
+            "output".into()
+        } else {
+            format!("output[{i}]")
+        }
     }
 
     /// Dimensions of the index.
@@ -241,20 +341,12 @@ impl Kernel {
         }
     }
 
-    /// The parameter whose length is the number of invocations of a kernel without output.
-    pub fn extent_param(&self) -> Option<&Param> {
-        self.params
-            .iter()
-            .find(|p| matches!(p.role, Role::Element(_) | Role::Storage(_)))
-    }
-
     fn check(&self) -> syn::Result<()> {
         let error = |span: Span, text: &str| Err(syn::Error::new(span, text));
         let compute = match &self.stage {
             Stage::Compute(c) => Some(c),
             _ => None,
         };
-        let phases = compute.and_then(|c| c.phases);
         for p in &self.params {
             let span = p.name.span();
             match (&p.role, &self.stage) {
@@ -264,54 +356,40 @@ impl Kernel {
                 }
                 (Role::Varying(_), _) => return error(span, "only a fragment kernel has varyings"),
                 (
-                    Role::Element(_) | Role::Index | Role::Atomic,
+                    Role::Element(_)
+                    | Role::ElementMut(_)
+                    | Role::StorageMut { .. }
+                    | Role::Index
+                    | Role::Atomic { .. },
                     Stage::Vertex | Stage::Fragment,
                 ) => {
                     return error(
                         span,
-                        "elements, indices and atomics belong to compute kernels",
+                        "elements, indices, atomics and buffers that are written belong to compute kernels",
                     );
                 }
-                (Role::Group { size, .. }, Stage::Compute(c)) => {
-                    if c.phases.is_none() {
-                        return error(span, "workgroup memory needs phases: add `phases(N)`");
-                    }
-                    if *size != c.threads.iter().product::<u32>() {
-                        return error(
-                            span,
-                            "`Group` must have as many slots as the workgroup has threads",
-                        );
-                    }
-                }
-                (Role::Group { .. } | Role::Phase, Stage::Vertex | Stage::Fragment) => {
+                (Role::Shared { .. } | Role::BuiltIn(_), Stage::Vertex | Stage::Fragment) => {
                     return error(
                         span,
-                        "workgroup memory and phases belong to compute kernels",
+                        "workgroups and their memory belong to compute kernels",
                     );
-                }
-                (Role::Phase, Stage::Compute(c)) if c.phases.is_none() => {
-                    return error(span, "add `phases(N)` to the kernel");
                 }
                 _ => {}
             }
         }
         let span = self.name.span();
-        if phases.is_some() {
-            if self.dimensions() != 1 {
-                return error(span, "a kernel with phases has one dimension");
-            }
+        if compute.is_some_and(|c| c.cooperative) {
             if self.real.is_some() {
                 return error(
                     span,
-                    "a kernel with phases cannot be generic over `Real`: write it for f32",
+                    "a kernel whose invocations work together cannot be generic over `Real`: write it for f32",
                 );
             }
-            if !self
-                .params
-                .iter()
-                .any(|p| matches!(p.role, Role::Group { .. }))
-            {
-                return error(span, "a kernel with phases needs a `#[group]` parameter");
+            if let Some(p) = self.changed().next() {
+                return error(
+                    p.name.span(),
+                    "the last workgroup may have fewer elements than invocations: take a `StorageMut` and write where there is one",
+                );
             }
         }
         if self.real.is_some()
@@ -322,10 +400,15 @@ impl Kernel {
                 "only a compute map over buffers can be generic over `Real`: write this one for f32",
             );
         }
-        if compute.is_some() && !self.writes_texture() && self.dimensions() != 1 {
+        let by_outputs = compute.is_some_and(|c| matches!(c.range, Range::Outputs));
+        let first_is_texture = self
+            .variants
+            .first()
+            .is_some_and(|v| self.output_format(0, v).is_some());
+        if by_outputs && !first_is_texture && self.dimensions() != 1 {
             return error(
                 span,
-                "a map over 2 or 3 dimensions writes a texture: add `texture(FORMAT)`",
+                "nothing says how far it goes in 2 or 3 dimensions: write a texture, `texture(FORMAT)`, or add `range(…)` with a number for each dimension or a uniform",
             );
         }
         if self.writes_texture() && self.dimensions() == 1 {
@@ -334,22 +417,45 @@ impl Kernel {
                 "a texture has 2 or 3 dimensions: write `threads(8, 8)`",
             );
         }
-        if self.outputs.is_empty() {
-            if !self.params.iter().any(|p| matches!(p.role, Role::Atomic)) {
-                return error(span, "a kernel must return what it computes");
-            }
-            if self.extent_param().is_none() {
+        if compute.is_some() && self.outputs.is_empty() {
+            let writes = self.params.iter().any(|p| {
+                matches!(
+                    p.role,
+                    Role::Atomic { .. } | Role::ElementMut(_) | Role::StorageMut { .. }
+                )
+            });
+            if !writes {
                 return error(
                     span,
-                    "a kernel without a result runs once for each element: give it an `#[element]`",
+                    "a kernel returns what it computes, or writes it: to an `#[element] x: &mut T`, a `#[storage] x: StorageMut<'_, T>`, or `#[atomic]` integers",
+                );
+            }
+            if by_outputs && self.counted().is_none() {
+                return error(
+                    span,
+                    "nothing says how many invocations run: give it an `#[element]`, or add `range(…)` with a number, a uniform or a buffer",
                 );
             }
         }
-        if let Some(Param { name, .. }) = self.params.iter().find(|p| p.name == "output") {
+        if self.real.is_some() && self.form() == Form::General {
             return error(
-                name.span(),
-                "`output` is the result's own name: choose another",
+                span,
+                "only a map from elements to one output can be generic over `Real`: write this one for f32",
             );
+        }
+        for p in &self.params {
+            if p.name == "output" {
+                return error(
+                    p.name.span(),
+                    "`output` is the result's own name: choose another",
+                );
+            }
+            if RESERVED.iter().any(|r| p.name == r) {
+                return error(
+                    p.name.span(),
+                    "the generated code has a variable of this name: choose another",
+                );
+            }
         }
         Ok(())
     }
@@ -359,8 +465,11 @@ impl Kernel {
         let (item, vis, name) = (&self.item, &self.item.vis, &self.name);
         let shader = self.expand_shader();
         let host = self.expand_host();
+        // The host runs the twin in its place.
+        let unused = (self.form() == Form::Cooperative).then(|| quote!(#[allow(dead_code)]));
         quote! {
             #[inline(always)]
+            #unused
             #item
 
             #[doc(hidden)]
@@ -373,6 +482,37 @@ impl Kernel {
             }
         }
     }
+}
+
+/// The types of the elements, as they are written.
+fn element_types(item: &ItemFn) -> Vec<Type> {
+    let elements = item.sig.inputs.iter().filter_map(|arg| match arg {
+        FnArg::Typed(arg) if arg.attrs.iter().any(|a| a.path().is_ident("element")) => {
+            Some((*arg.ty).clone())
+        }
+        _ => None,
+    });
+    elements.collect()
+}
+
+/// Whether elements are `Option<T>` in a cooperative kernel, and only there.
+fn options(elements: &[Type], cooperative: bool) -> syn::Result<()> {
+    for ty in elements {
+        let optional = argument(ty, "Option").is_some();
+        if cooperative && !optional && !matches!(ty, Type::Reference(_)) {
+            return Err(syn::Error::new(
+                ty.span(),
+                "where invocations work together the last workgroup may have fewer elements than invocations: take an `Option<T>`",
+            ));
+        }
+        if !cooperative && optional {
+            return Err(syn::Error::new(
+                ty.span(),
+                "each invocation has an element: take `T`, without `Option`",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// What the generated code could not keep its promises about.
@@ -437,12 +577,55 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
             Type::Reference(r) if r.mutability.is_none() => Role::Uniform((*r.elem).clone()),
             _ => return Err(syn::Error::new(ty.span(), "a uniform is `&T`")),
         },
-        "element" => Role::Element(argument(ty, "Option").unwrap_or_else(|| ty.clone())),
-        "storage" => Role::Storage(
-            argument(ty, "Buffer")
-                .ok_or_else(|| syn::Error::new(ty.span(), "a storage buffer is `Buffer<'_, T>`"))?,
-        ),
-        "atomic" => Role::Atomic,
+        "element" => match ty {
+            Type::Reference(r) if r.mutability.is_some() => Role::ElementMut((*r.elem).clone()),
+            Type::Reference(_) => {
+                return Err(syn::Error::new(
+                    ty.span(),
+                    "an element is `T`, or `&mut T` to change it in place",
+                ));
+            }
+            _ => Role::Element(argument(ty, "Option").unwrap_or_else(|| ty.clone())),
+        },
+        "storage" => {
+            let unordered = unordered(&role)?;
+            match (argument(ty, "Buffer"), argument(ty, "StorageMut")) {
+                (Some(_), _) if unordered => {
+                    return Err(syn::Error::new(
+                        role.span(),
+                        "a buffer that is only read has no order to lose: leave `unordered` out",
+                    ));
+                }
+                (Some(ty), _) => Role::Storage(ty),
+                (None, Some(ty)) => Role::StorageMut { ty, unordered },
+                (None, None) => {
+                    return Err(syn::Error::new(
+                        ty.span(),
+                        "a storage buffer is `Buffer<'_, T>` to be read, `StorageMut<'_, T>` to be read and written anywhere",
+                    ));
+                }
+            }
+        }
+        "atomic" => {
+            if last_segment(ty).is_none_or(|s| s.ident != "Atomics") {
+                return Err(syn::Error::new(
+                    ty.span(),
+                    "integers for atomic operations are `Atomics<'_>` (u32) or `Atomics<'_, i32>`",
+                ));
+            }
+            let scalar = argument(ty, "Atomics").unwrap_or_else(|| syn::parse_quote!(u32));
+            let known = matches!(&scalar, Type::Path(p) if p.path.is_ident("u32") || p.path.is_ident("i32"));
+            if !known {
+                return Err(syn::Error::new(
+                    scalar.span(),
+                    "every shader language has atomic operations for u32 and i32, and for nothing else",
+                ));
+            }
+            Role::Atomic {
+                scalar,
+                unordered: unordered(&role)?,
+            }
+        }
         "texture" => Role::Texture(
             match last_segment(ty).map(|s| s.ident.to_string()).as_deref() {
                 Some("Texture2d") => Texture::Flat,
@@ -479,12 +662,28 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
             }
         }
         "index" => Role::Index,
-        "group" => group(ty)?,
-        "phase" => Role::Phase,
+        "shared" => shared(ty)?,
         "attribute" => Role::Attribute(ty.clone()),
-        _ => Role::Varying(ty.clone()),
+        "varying" => Role::Varying(ty.clone()),
+        word => match BUILT_INS.iter().find(|(name, _)| *name == word) {
+            Some((_, built_in)) => Role::BuiltIn(*built_in),
+            None => return Err(syn::Error::new(role.span(), "this role is not known")),
+        },
     };
     Ok(Param { name, role })
+}
+
+/// Whether a role's attribute says `unordered`.
+fn unordered(role: &Attribute) -> syn::Result<bool> {
+    if matches!(role.meta, syn::Meta::Path(_)) {
+        return Ok(false);
+    }
+    let word: Ident = role.parse_args()?;
+    if word == "unordered" {
+        Ok(true)
+    } else {
+        Err(syn::Error::new(word.span(), "expected `unordered`"))
+    }
 }
 
 fn last_segment(ty: &Type) -> Option<&syn::PathSegment> {
@@ -506,28 +705,35 @@ fn argument(ty: &Type, name: &str) -> Option<Type> {
     })
 }
 
-fn group(ty: &Type) -> syn::Result<Role> {
+fn shared(ty: &Type) -> syn::Result<Role> {
     let error = || {
         syn::Error::new(
             ty.span(),
-            "workgroup memory is `Group<'_, T, N>`, N a number",
+            "workgroup memory is `Shared<'_, T, N>`, or `SharedAtomics<'_, u32, N>` (or i32) for atomic operations; N is how many",
         )
     };
-    let slot = argument(ty, "Group").ok_or_else(error)?;
     let segment = last_segment(ty).ok_or_else(error)?;
+    let atomic = match segment.ident.to_string().as_str() {
+        "Shared" => false,
+        "SharedAtomics" => true,
+        _ => return Err(error()),
+    };
     let syn::PathArguments::AngleBracketed(args) = &segment.arguments else {
         return Err(error());
     };
-    let size = args.args.iter().find_map(|a| match a {
-        syn::GenericArgument::Const(syn::Expr::Lit(l)) => match &l.lit {
-            syn::Lit::Int(i) => i.base10_parse().ok(),
-            _ => None,
-        },
-        _ => None,
-    });
-    Ok(Role::Group {
-        slot,
-        size: size.ok_or_else(error)?,
+    let mut args = args
+        .args
+        .iter()
+        .filter(|a| !matches!(a, syn::GenericArgument::Lifetime(_)));
+    let (Some(syn::GenericArgument::Type(ty)), Some(length), None) =
+        (args.next(), args.next(), args.next())
+    else {
+        return Err(error());
+    };
+    Ok(Role::Shared {
+        ty: ty.clone(),
+        length: quote!(#length),
+        atomic,
     })
 }
 
@@ -546,8 +752,9 @@ struct Args {
     threads: Option<Vec<u32>>,
     precision: Vec<Ident>,
     formats: Vec<Format>,
-    phases: Option<u32>,
-    per_group: bool,
+    cooperative: Vec<Ident>,
+    range: Option<(Span, Punctuated<Expr, Token![,]>)>,
+    outputs: Option<(Span, Vec<Option<Format>>)>,
     tolerance: Option<Tolerance>,
     exact: bool,
     pinned: bool,
@@ -562,7 +769,6 @@ impl Parse for Args {
                 "compute" => args.stage = Some(Word::Compute),
                 "vertex" => args.stage = Some(Word::Vertex),
                 "fragment" => args.stage = Some(Word::Fragment),
-                "per_group" => args.per_group = true,
                 "exact" => args.exact = true,
                 "pinned" => args.pinned = true,
                 "threads" => {
@@ -576,15 +782,7 @@ impl Parse for Args {
                     }
                     args.threads = Some(threads);
                 }
-                "phases" => match numbers(input)?[..] {
-                    [n] if n > 0 && n <= 64 => args.phases = Some(n),
-                    _ => {
-                        return Err(syn::Error::new(
-                            word.span(),
-                            "`phases` takes a number from 1 to 64",
-                        ));
-                    }
-                },
+                "cooperative" => args.cooperative = idents(input)?,
                 "precision" => {
                     args.precision = idents(input)?;
                     for p in &args.precision {
@@ -595,21 +793,32 @@ impl Parse for Args {
                 }
                 "texture" => {
                     for f in idents(input)? {
-                        let format = FORMATS.into_iter().find(|known| f == known.name);
-                        args.formats.push(format.ok_or_else(|| {
-                            let names: Vec<_> = FORMATS.iter().map(|f| f.name).collect();
-                            syn::Error::new(
-                                f.span(),
-                                format!("a format is one of {}", names.join(", ")),
-                            )
-                        })?);
+                        args.formats.push(format(&f)?);
                     }
+                }
+                "outputs" => {
+                    let kinds = idents(input)?
+                        .iter()
+                        .map(|f| {
+                            if f == "buffer" {
+                                Ok(None)
+                            } else {
+                                format(f).map(Some)
+                            }
+                        })
+                        .collect::<syn::Result<_>>()?;
+                    args.outputs = Some((word.span(), kinds));
+                }
+                "range" => {
+                    let content;
+                    syn::parenthesized!(content in input);
+                    args.range = Some((word.span(), Punctuated::parse_terminated(&content)?));
                 }
                 "parity" => args.tolerance = Some(parity(input, word.span())?),
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, phases, per_group, exact, pinned or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, exact, pinned or parity",
                     ));
                 }
             }
@@ -620,6 +829,17 @@ impl Parse for Args {
         }
         Ok(args)
     }
+}
+
+fn format(name: &Ident) -> syn::Result<Format> {
+    let known = FORMATS.into_iter().find(|known| name == known.name);
+    known.ok_or_else(|| {
+        let names: Vec<_> = FORMATS.iter().map(|f| f.name).collect();
+        syn::Error::new(
+            name.span(),
+            format!("a format is one of {}", names.join(", ")),
+        )
+    })
 }
 
 fn numbers(input: ParseStream<'_>) -> syn::Result<Vec<u32>> {
@@ -692,6 +912,40 @@ impl Args {
         })
     }
 
+    /// Formats of several outputs; none where all are buffers, or one format is for the only one.
+    fn output_formats(&self, outputs: &[Type]) -> syn::Result<Vec<Option<Format>>> {
+        let Some((span, kinds)) = &self.outputs else {
+            if outputs.len() > 1 && !self.formats.is_empty() {
+                return Err(syn::Error::new(
+                    Span::call_site(),
+                    "`texture` is for one output: say what each of several is, `outputs(rgba16float, buffer)`",
+                ));
+            }
+            return Ok(if outputs.len() > 1 {
+                vec![None; outputs.len()]
+            } else {
+                Vec::new()
+            });
+        };
+        if !self.formats.is_empty() {
+            return Err(syn::Error::new(
+                *span,
+                "`outputs` says it all: leave `texture` out",
+            ));
+        }
+        if kinds.len() != outputs.len() {
+            return Err(syn::Error::new(
+                *span,
+                format!(
+                    "{} outputs are listed, the function returns {}: list a format or `buffer` for each",
+                    kinds.len(),
+                    outputs.len()
+                ),
+            ));
+        }
+        Ok(kinds.clone())
+    }
+
     fn variants(&self, name: &Ident, real: Option<&Ident>) -> syn::Result<Vec<Variant>> {
         let scalars: Vec<Option<Ident>> = match (real, &self.precision[..]) {
             (None, []) => vec![None],
@@ -738,22 +992,37 @@ impl Args {
         name: &Ident,
     ) -> syn::Result<(Stage, Tolerance)> {
         let stage = match self.stage()? {
-            Word::Compute => Stage::Compute(Compute {
-                threads: self.threads.clone().ok_or_else(|| {
+            Word::Compute => {
+                let threads = self.threads.clone().ok_or_else(|| {
                     syn::Error::new(name.span(), "say the workgroup's size: `threads(64)`")
-                })?,
-                phases: self.phases,
-                per_group: self.per_group,
-            }),
+                })?;
+                let range = match &self.range {
+                    Some((span, args)) if args.is_empty() => {
+                        return Err(syn::Error::new(
+                            *span,
+                            "say how far: `range(64)`, `range(size)` with a uniform, or a buffer",
+                        ));
+                    }
+                    Some((_, args)) => Range::parse(args, params, threads.len())?,
+                    None => Range::Outputs,
+                };
+                Stage::Compute(Compute {
+                    threads,
+                    // To be found in the body.
+                    cooperative: false,
+                    range,
+                })
+            }
             word => {
                 if self.threads.is_some()
-                    || self.phases.is_some()
-                    || self.per_group
+                    || !self.cooperative.is_empty()
+                    || self.range.is_some()
+                    || self.outputs.is_some()
                     || !self.formats.is_empty()
                 {
                     return Err(syn::Error::new(
                         name.span(),
-                        "threads, phases, per_group and texture belong to compute kernels",
+                        "threads, range, outputs, cooperative and texture belong to compute kernels",
                     ));
                 }
                 if outputs.is_empty() {
@@ -769,12 +1038,6 @@ impl Args {
                 }
             }
         };
-        if self.per_group && self.phases.is_none() {
-            return Err(syn::Error::new(
-                name.span(),
-                "`per_group` needs `phases(N)`",
-            ));
-        }
         let samples = params.iter().any(|p| matches!(p.role, Role::Sampler));
         let tolerance = match self.tolerance {
             Some(t) => t,

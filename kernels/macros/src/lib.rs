@@ -2,10 +2,13 @@
 #![allow(missing_docs, reason = "documented where hankel-dsl re-exports them")]
 
 mod element;
+mod general;
 mod host;
 mod kernel;
 mod list;
+mod range;
 mod shader;
+mod twin;
 
 use proc_macro::TokenStream;
 use syn::parse_macro_input;
@@ -17,38 +20,117 @@ use syn::parse_macro_input;
 /// | argument | meaning |
 /// | --- | --- |
 /// | `threads(x[, y[, z]])` | invocations of a workgroup; as many numbers as the index has dimensions |
+/// | `range(…)` | how many invocations run: a number for each dimension, `range(64, 64)`; a uniform that is or has the size, `range(size)`, `range(grid.size)`; or, in one dimension, a buffer. Without it, as many as the first output has elements or texels; without outputs, as many as the first `#[element]` has |
 /// | `precision(f32, f64)` | entry points of a function that is generic over one `R: Real` |
 /// | `texture(FORMAT, …)` | the result is a texel; one entry point for each format |
-/// | `phases(N)` | workgroup memory: the function runs for phase 0 to N with barriers between |
-/// | `per_group` | the first invocation's result is the workgroup's output |
+/// | `outputs(FORMAT or buffer, …)` | what each of several results is; without it, all are elements of buffers |
+/// | `cooperative(name, …)` | functions marked [`#[cooperative]`](macro@cooperative) that the kernel calls |
 /// | `exact` | the result is right only if sums and products are computed as they are written: the error of a rounding, for example. Languages that cannot forbid contraction and reordering do not get the kernel; the manifest says which |
 /// | `pinned` | SPIR-V asks for arithmetic as it is written, so that the bits are the same everywhere even where the result is ill-conditioned; languages that cannot ask for it get the kernel all the same |
 /// | `parity(ulp = N, absolute = X, why = "…")` | how far backends may differ; without it, not at all. `exact(FORMAT, …)` names formats that it does not concern |
 ///
-/// Each parameter says what it is bound to; bindings are numbered in order, the output last.
+/// Each parameter says what it is bound to; bindings are numbered in order, the outputs last.
 ///
 /// | parameter | what |
 /// | --- | --- |
 /// | `#[uniform] x: &T` | a uniform buffer |
-/// | `#[element] x: T` | the invocation's element of a read-only buffer (`Option<T>` in a kernel with phases) |
+/// | `#[element] x: T` | the invocation's element of a read-only buffer (`Option<T>` where invocations work together: the last workgroup may have fewer) |
+/// | `#[element] x: &mut T` | the same, changed in place |
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |
-/// | `#[atomic] x: Atomics<'_>` | counters |
+/// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
+/// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
 /// | `#[texture] x: Texture2d<'_>` | also `Texture2dMultisampled`, `Texture3d` |
 /// | `#[sampler] x: Sampler` | a sampler |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
-/// | `#[group] x: Group<'_, T, N>` | the workgroup's memory |
-/// | `#[phase] x: u32` | the phase |
+/// | `#[local_id]`, `#[group_id]`, `#[group_count]` | the invocation's place in its workgroup, its workgroup, how many workgroups the range needs: types as of the index |
+/// | `#[local_index] x: u32` | the invocation's number in its workgroup |
+/// | `#[shared] x: Shared<'_, T, N>` | memory of the workgroup; `SharedAtomics<'_, u32, N>` (or `i32`) for atomic operations |
 /// | `#[attribute] x: Vec3` | a vertex attribute |
 /// | `#[varying] x: Vec3` | an interpolated value |
 ///
-/// A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a fragment
-/// kernel one colour or a tuple of them.
+/// A compute kernel returns what it computes, or a tuple of it; or nothing, if it writes to its
+/// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
+/// fragment kernel one colour or a tuple of them.
+///
+/// # Kinds of compute kernels
+/// A map reads what it likes and returns its own element: it cannot race.
+/// ```
+/// use hankel_dsl::kernel;
+///
+/// /// Squares.
+/// #[kernel(compute, threads(64))]
+/// fn square(#[element] x: f32) -> f32 {
+///     x * x
+/// }
+/// # fn main() {}
+/// ```
+/// A kernel with a [`StorageMut`](struct@StorageMut) or [`Atomics`](struct@Atomics) writes where it
+/// likes; that its invocations do not race is the author's to see to.
+/// ```
+/// use hankel_dsl::{Atomics, StorageMut, kernel};
+///
+/// /// Keeps the numbers that are not zero; the counter says how many.
+/// #[kernel(compute, threads(64))]
+/// fn compact(
+///     #[element] x: u32,
+///     #[atomic] count: Atomics<'_>,
+///     #[storage(unordered)] kept: StorageMut<'_, u32>,
+/// ) {
+///     if x != 0 {
+///         kept.set(count.add(0, 1), x);
+///     }
+/// }
+/// # fn main() {}
+/// ```
+/// A kernel with [`Shared`](struct@Shared) memory or a [`barrier`](fn@barrier) runs workgroup by
+/// workgroup, those invocations too that are beyond the range, so that all of them come to every
+/// barrier. Natively each invocation is resumable, and barriers in control flow that is not uniform
+/// are reported.
+/// ```
+/// use hankel_dsl::{Shared, StorageMut, barrier, kernel};
+///
+/// /// The sum of each 64 numbers.
+/// #[kernel(compute, threads(64), range(x))]
+/// fn sums(
+///     #[local_index] me: u32,
+///     #[group_id] group: u32,
+///     #[shared] part: Shared<'_, u32, 64>,
+///     #[element] x: Option<u32>,
+///     #[storage] out: StorageMut<'_, u32>,
+/// ) {
+///     part.set(me, x.unwrap_or(0));
+///     let mut half = 32;
+///     while half > 0 {
+///         barrier();
+///         if me < half {
+///             part.set(me, part.get(me) + part.get(me + half));
+///         }
+///         half /= 2;
+///     }
+///     if me == 0 {
+///         out.set(group, part.get(0));
+///     }
+/// }
+/// # fn main() {}
+/// ```
 #[proc_macro_attribute]
 pub fn kernel(args: TokenStream, item: TokenStream) -> TokenStream {
     let item = parse_macro_input!(item as syn::ItemFn);
     kernel::Kernel::parse(args.into(), item)
         .map(|kernel| kernel.expand())
+        .unwrap_or_else(|e| e.to_compile_error())
+        .into()
+}
+
+/// Marks a function that waits at a [`barrier`](fn@barrier) and is called by kernels, which name it
+/// in `cooperative(…)`. One that calls others names those: `#[cooperative(other)]`. Such a function
+/// is called by its name or path, not from a closure.
+#[proc_macro_attribute]
+pub fn cooperative(args: TokenStream, item: TokenStream) -> TokenStream {
+    let args = parse_macro_input!(args as twin::Cooperative);
+    let item = parse_macro_input!(item as syn::ItemFn);
+    args.expand(&item)
         .unwrap_or_else(|e| e.to_compile_error())
         .into()
 }

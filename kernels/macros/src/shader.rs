@@ -3,14 +3,15 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use crate::kernel::{Compute, Kernel, Role, Stage, Texture, Variant};
+use crate::general::{Form, own};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Texture, Variant};
 
 impl Kernel {
     pub fn expand_shader(&self) -> TokenStream {
         let entries = self.variants.iter().map(|v| self.entry_point(v));
         quote! {
             ::hankel_dsl::on_spirv! {
-                #[allow(missing_docs, unused_imports, clippy::all, reason = "generated")]
+                #[allow(missing_docs, unused_braces, unused_imports, clippy::all, reason = "generated")]
                 pub mod shader {
                     use super::*;
                     use ::hankel_dsl::spirv_std::arch::IndexUnchecked;
@@ -30,7 +31,7 @@ impl Kernel {
                 let threads = &c.threads;
                 (
                     quote!(compute(threads(#(#threads),*), entry_point_name = #entry)),
-                    self.compute_builtins(c),
+                    self.compute_builtins(),
                     self.compute_body(c, variant),
                 )
             }
@@ -55,29 +56,49 @@ impl Kernel {
         }
     }
 
-    fn compute_builtins(&self, c: &Compute) -> TokenStream {
-        let group = self.group().map(|(slot, size)| {
-            quote! {
-                #[spirv(local_invocation_index)] local_index: u32,
-                #[spirv(workgroup)] group_front: &mut [#slot; #size],
-                #[spirv(workgroup)] group_back: &mut [#slot; #size],
-            }
-        });
-        let id = c
-            .per_group
-            .then(|| quote!(#[spirv(workgroup_id)] workgroup_id: UVec3,));
+    fn compute_builtins(&self) -> TokenStream {
+        let asked = [
+            (
+                BuiltIn::LocalId,
+                quote!(#[spirv(local_invocation_id)] __local_id: UVec3,),
+            ),
+            (
+                BuiltIn::LocalIndex,
+                quote!(#[spirv(local_invocation_index)] __local_index: u32,),
+            ),
+            (
+                BuiltIn::GroupId,
+                quote!(#[spirv(workgroup_id)] __group_id: UVec3,),
+            ),
+        ];
+        let asked = asked
+            .into_iter()
+            .filter(|(built_in, _)| self.asks_for(*built_in))
+            .map(|(_, tokens)| tokens);
         quote! {
             #[spirv(global_invocation_id)] invocation: UVec3,
-            #id
-            #group
+            #(#asked)*
         }
     }
 
-    fn group(&self) -> Option<(&syn::Type, usize)> {
-        self.params.iter().find_map(|p| match &p.role {
-            Role::Group { slot, size } => Some((slot, *size as usize)),
-            _ => None,
-        })
+    fn asks_for(&self, built_in: BuiltIn) -> bool {
+        self.params
+            .iter()
+            .any(|p| matches!(p.role, Role::BuiltIn(b) if b == built_in))
+    }
+
+    /// Whether the kernel wants to know how many workgroups there are.
+    pub fn asks_for_groups(&self) -> bool {
+        self.asks_for(BuiltIn::GroupCount)
+    }
+
+    /// As much of a `UVec3` as the kernel has dimensions.
+    fn of_dimensions(&self, of: &TokenStream) -> TokenStream {
+        match self.dimensions() {
+            1 => quote!(#of.x),
+            2 => quote!(UVec2::new(#of.x, #of.y)),
+            _ => quote!(#of),
+        }
     }
 
     fn shader_params(&self, variant: &Variant) -> TokenStream {
@@ -96,8 +117,11 @@ impl Kernel {
                     quote!(#[spirv(storage_buffer, descriptor_set = 0, binding = #here)] #name: &[#ty],)
                 }
                 // `&mut`: a shared slice would be decorated NonWritable.
-                Role::Atomic => {
-                    quote!(#[spirv(storage_buffer, descriptor_set = 0, binding = #here)] #name: &mut [u32],)
+                Role::ElementMut(ty)
+                | Role::StorageMut { ty, .. }
+                | Role::Atomic { scalar: ty, .. } => {
+                    let ty = self.concrete(ty, variant);
+                    quote!(#[spirv(storage_buffer, descriptor_set = 0, binding = #here)] #name: &mut [#ty],)
                 }
                 Role::Texture(t) => {
                     let ty = match t {
@@ -114,7 +138,10 @@ impl Kernel {
                     quote!(#[spirv(spec_constant(id = #id, default = #default))] #name: u32,)
                 }
                 Role::Attribute(ty) | Role::Varying(ty) => quote!(#name: #ty,),
-                Role::Index | Role::Group { .. } | Role::Phase => TokenStream::new(),
+                Role::Shared { ty, length, .. } => {
+                    quote!(#[spirv(workgroup)] #name: &mut [#ty; #length],)
+                }
+                Role::Index | Role::BuiltIn(_) => TokenStream::new(),
             }
         });
         params.collect()
@@ -124,18 +151,18 @@ impl Kernel {
         let binding = self.params.iter().filter(|p| p.role.is_bound()).count() as u32;
         match &self.stage {
             Stage::Compute(_) => {
-                let Some(ty) = self.outputs.first() else {
-                    return TokenStream::new();
-                };
-                if let Some(format) = variant.format {
-                    let dimensions = self.dimensions();
-                    let image = format_ident!("Storage{}d{}", dimensions, format.variant);
-                    return quote! {
-                        #[spirv(descriptor_set = 0, binding = #binding)] output: &::hankel_dsl::image::#image,
-                    };
-                }
-                let ty = self.concrete(ty, variant);
-                quote!(#[spirv(storage_buffer, descriptor_set = 0, binding = #binding)] output: &mut [#ty],)
+                self.outputs.iter().enumerate().map(|(i, ty)| {
+                    let (binding, output) = (binding + i as u32, self.output_ident(i));
+                    if let Some(format) = self.output_format(i, variant) {
+                        let dimensions = self.dimensions();
+                        let image = format_ident!("Storage{}d{}", dimensions, format.variant);
+                        return quote! {
+                            #[spirv(descriptor_set = 0, binding = #binding)] #output: &::hankel_dsl::image::#image,
+                        };
+                    }
+                    let ty = self.concrete(ty, variant);
+                    quote!(#[spirv(storage_buffer, descriptor_set = 0, binding = #binding)] #output: &mut [#ty],)
+                }).collect()
             }
             stage => self
                 .outputs
@@ -154,22 +181,30 @@ impl Kernel {
     }
 
     /// The call of the kernel; `at` is the index.
-    fn call(&self, variant: &Variant, phase: Option<&TokenStream>) -> TokenStream {
+    fn call(&self, variant: &Variant) -> TokenStream {
+        let form = self.form();
         let name = &self.name;
         let generics = variant.scalar.as_ref().map(|s| quote!(::<#s>));
         let args = self.params.iter().map(|p| {
             let name = &p.name;
             match &p.role {
                 // SAFETY (of the loads): the guard, and as many elements as the output has.
-                Role::Element(_) if phase.is_some() => quote! {
-                    if (invocation.x as usize) < #name.len() {
-                        Some(unsafe { *#name.index_unchecked(invocation.x as usize) })
+                Role::Element(_) if form == Form::Cooperative => quote! {
+                    if __inside & (__number < #name.len()) {
+                        Some(unsafe { *#name.index_unchecked(__number) })
                     } else {
                         None
                     }
                 },
+                Role::Element(_) if form == Form::General => {
+                    quote!(unsafe { *#name.index_unchecked(__number) })
+                }
                 Role::Element(_) => {
                     quote!(unsafe { *#name.index_unchecked(invocation.x as usize) })
+                }
+                Role::ElementMut(_) => {
+                    let own = own(p);
+                    quote!(&mut #own)
                 }
                 Role::Uniform(_)
                 | Role::Constant { .. }
@@ -178,36 +213,33 @@ impl Kernel {
                     quote!(#name)
                 }
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
-                Role::Atomic => quote!(::hankel_dsl::Atomics::new(&*#name)),
+                Role::StorageMut { .. } => quote!(::hankel_dsl::StorageMut::new(&*#name)),
+                Role::Atomic { .. } => quote!(::hankel_dsl::Atomics::new(&*#name)),
                 Role::Texture(t) => {
                     let ty = texture_type(*t);
                     quote!(#ty::new(#name))
                 }
                 Role::Sampler => quote!(::hankel_dsl::Sampler::new(#name)),
-                Role::Index => match self.dimensions() {
-                    1 => quote!(invocation.x),
-                    2 => quote!(UVec2::new(invocation.x, invocation.y)),
-                    _ => quote!(invocation),
-                },
-                Role::Group { .. } => quote!(::hankel_dsl::Group::new(&*group_now, local_index)),
-                Role::Phase => quote!(#phase),
+                Role::Index => self.of_dimensions(&quote!(invocation)),
+                Role::Shared { atomic: false, .. } => quote!(::hankel_dsl::Shared::new(&*#name)),
+                Role::Shared { atomic: true, .. } => {
+                    quote!(::hankel_dsl::SharedAtomics::new(&*#name))
+                }
+                Role::BuiltIn(BuiltIn::LocalIndex) => quote!(__local_index),
+                Role::BuiltIn(BuiltIn::LocalId) => self.of_dimensions(&quote!(__local_id)),
+                Role::BuiltIn(BuiltIn::GroupId) => self.of_dimensions(&quote!(__group_id)),
+                Role::BuiltIn(BuiltIn::GroupCount) => quote!(__groups),
             }
         });
         quote!(super::super::#name #generics (#(#args),*))
     }
 
     fn compute_body(&self, c: &Compute, variant: &Variant) -> TokenStream {
-        if let Some(phases) = c.phases {
-            return self.phased_body(phases, c.per_group, variant);
-        }
-        let call = self.call(variant, None);
-        if self.outputs.is_empty() {
-            let extent = self.extent_param().map(|p| &p.name);
-            return quote! {
-                if (invocation.x as usize) < #extent.len() {
-                    #call;
-                }
-            };
+        let call = self.call(variant);
+        match self.form() {
+            Form::General => return self.general_body(c, &call, variant),
+            Form::Cooperative => return self.cooperative_body(c, &call, variant),
+            Form::Plain => {}
         }
         match (variant.format.is_some(), self.dimensions()) {
             (false, _) => quote! {
@@ -234,44 +266,8 @@ impl Kernel {
         }
     }
 
-    /// Phases alternate between two arrays, so that one barrier between them is enough.
-    fn phased_body(&self, phases: u32, per_group: bool, variant: &Variant) -> TokenStream {
-        let steps = (0..=phases).map(|phase| {
-            let (now, next) = if phase % 2 == 0 {
-                (quote!(group_back), quote!(group_front))
-            } else {
-                (quote!(group_front), quote!(group_back))
-            };
-            let call = self.call(variant, Some(&quote!(#phase)));
-            if phase == phases {
-                return quote! {
-                    let value = { let group_now = &*#now; #call };
-                };
-            }
-            quote! {
-                let value = { let group_now = &*#now; #call };
-                unsafe { *#next.index_unchecked_mut(local_index as usize) = value };
-                ::hankel_dsl::spirv_std::arch::workgroup_memory_barrier_with_group_sync();
-            }
-        });
-        let store = if per_group {
-            quote! {
-                if (local_index == 0) & ((workgroup_id.x as usize) < output.len()) {
-                    unsafe { *output.index_unchecked_mut(workgroup_id.x as usize) = value };
-                }
-            }
-        } else {
-            quote! {
-                if (invocation.x as usize) < output.len() {
-                    unsafe { *output.index_unchecked_mut(invocation.x as usize) = value };
-                }
-            }
-        };
-        quote!(#(#steps)* #store)
-    }
-
     fn interface_body(&self, variant: &Variant) -> TokenStream {
-        let call = self.call(variant, None);
+        let call = self.call(variant);
         let names: Vec<Ident> = (0..self.outputs.len())
             .map(|i| output_name(&self.stage, i))
             .collect();

@@ -6,9 +6,12 @@
 
 use hankel_dsl::glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, Texture2dMultisampled, Texture3d,
-    kernel, lit,
+    Atomics, Buffer, Element, Real, Sampler, Texture2d, Texture2dMultisampled, Texture3d, kernel,
+    lit,
 };
+
+pub mod general;
+pub mod workgroup;
 
 hankel_dsl::kernels![
     affine,
@@ -16,8 +19,12 @@ hankel_dsl::kernels![
     constants,
     gather,
     histogram,
-    scan,
-    maximum,
+    workgroup::scan,
+    workgroup::maximum,
+    workgroup::product,
+    workgroup::group_histogram,
+    workgroup::places,
+    workgroup::neighbours,
     checker,
     gradient,
     downsample,
@@ -27,6 +34,18 @@ hankel_dsl::kernels![
     slice,
     corner,
     tint,
+    general::scatter,
+    general::step,
+    general::halve,
+    general::compact,
+    general::signed,
+    general::extremes,
+    general::firsts,
+    general::float_sum,
+    general::blur_grid,
+    general::cells,
+    general::counted,
+    general::several,
 ];
 
 /// A point and its weight.
@@ -115,39 +134,6 @@ pub fn gather(
 pub fn histogram(#[element] x: u32, #[atomic] bins: Atomics<'_>) {
     bins.add(x & 3, 1);
     bins.max(4, x);
-}
-
-/// Inclusive prefix sums within each workgroup (Hillis and Steele).
-#[kernel(compute, threads(64), phases(6))]
-pub fn scan(
-    #[phase] phase: u32,
-    #[group] sums: Group<'_, u32, 64>,
-    #[element] x: Option<u32>,
-) -> u32 {
-    if phase == 0 {
-        return x.unwrap_or(0);
-    }
-    let reach = 1 << (phase - 1);
-    if sums.me() < reach {
-        sums.own()
-    } else {
-        sums.own().wrapping_add(sums.get(sums.me() - reach))
-    }
-}
-
-/// The largest number of each workgroup.
-#[kernel(compute, threads(64), phases(6), per_group)]
-pub fn maximum(
-    #[phase] phase: u32,
-    #[group] largest: Group<'_, f32, 64>,
-    #[element] x: Option<f32>,
-) -> f32 {
-    if phase == 0 {
-        return x.unwrap_or(-3.0e38);
-    }
-    let reach = 32 >> (phase - 1);
-    let other = (largest.me() + reach) & 63;
-    Real::max(largest.own(), largest.get(other))
 }
 
 /// A checkerboard of two values.

@@ -302,7 +302,6 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         None => Output::Buffer {
             binding: 1,
             layout: layout.clone(),
-            per_group: false,
         },
         Some(format) => Output::Texture {
             binding: 1,
@@ -319,8 +318,9 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         stage: describe::Stage::Compute {
             threads: [1; 3],
             dimensions: if texel.is_some() { 2 } else { 1 },
-            phases: 0,
+            cooperative: false,
             workgroup_bytes: 0,
+            range: describe::Range::Outputs,
         },
         precision: None,
         params: vec![Param {

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use hankel_dsl::native::Sampler;
 
 use super::error::{DeviceError, Result};
+use super::extent;
 use super::slots::{self, Given, Slot};
 use super::{Backend, Bind, BufferId, Device, Pass, Program, TextureId, TextureShape};
 use pipelines::Pipelines;
@@ -269,13 +270,13 @@ impl VulkanDevice {
             .ok_or_else(|| self.stale(format!("texture {}", id.index)))
     }
 
-    fn given(&self, bind: &Bind<'_>) -> Result<Given> {
+    fn given<'a>(&self, bind: &Bind<'a>) -> Result<Given<'a>> {
         Ok(match bind {
             Bind::Buffer(id) => Given::Buffer {
                 id: id.index,
                 bytes: self.memory(*id)?.bytes,
             },
-            Bind::Bytes(b) => Given::Bytes(b.len()),
+            Bind::Bytes(b) => Given::Bytes(b),
             Bind::Texture(id) => Given::Texture {
                 id: id.index,
                 shape: self.image(*id)?.shape,
@@ -285,12 +286,12 @@ impl VulkanDevice {
     }
 
     /// Looks up and checks the arguments of a kernel.
-    fn checked<'k>(
+    fn checked<'k, 'a>(
         &self,
         program: &Program<'k>,
         slots: Vec<Slot<'k>>,
-        args: &[Bind<'_>],
-    ) -> Result<(Vec<Slot<'k>>, Vec<Given>)> {
+        args: &[Bind<'a>],
+    ) -> Result<(Vec<Slot<'k>>, Vec<Given<'a>>)> {
         let given = args
             .iter()
             .map(|b| self.given(b))
@@ -382,7 +383,7 @@ impl Device for VulkanDevice {
         let slots = slots::slots(kernel);
         let threads = pipelines::threads(kernel)?;
         let (slots, given) = self.checked(program, slots, args)?;
-        let extent = slots::extent(kernel, &slots, &given)?;
+        let extent = extent::extent(kernel, &slots, &given)?;
         if extent.contains(&0) {
             return Ok(());
         }

@@ -387,7 +387,12 @@ impl VulkanDevice {
                     Resource::Buffer(buffer_id, bytes.next_multiple_of(16)),
                 )
             }
-            Use::Element(_) | Use::Storage(_) | Use::Atomic | Use::Output { .. } => {
+            Use::Element(_)
+            | Use::ElementMut(_)
+            | Use::Storage(_)
+            | Use::StorageMut { .. }
+            | Use::Atomic { .. }
+            | Use::Output(_) => {
                 let (buffer_id, bytes) = self.buffer_of(bind)?;
                 self.limit(
                     format!("kernel `{}`, {slot}: its size in bytes", kernel.name),
@@ -740,7 +745,8 @@ impl VulkanDevice {
                 )
             })?;
             let bytes = match given {
-                Given::Buffer { bytes, .. } | Given::Bytes(bytes) => *bytes,
+                Given::Buffer { bytes, .. } => *bytes,
+                Given::Bytes(bytes) => bytes.len(),
                 Given::Texture { .. } | Given::Sampler(_) => 0,
             };
             let elements = bytes / slots::type_bytes(ty);

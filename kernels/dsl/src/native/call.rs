@@ -2,13 +2,12 @@
 //! kernel's description, and how to run it.
 
 use std::string::String;
-use std::sync::atomic::AtomicU32;
 use std::vec::Vec;
 
 use super::describe::TexelFormat;
 
 /// An argument: first those of the parameters that are bound to something, in their order
-/// (constants, index, group and phase take none), then one for each output.
+/// (constants, built-ins and workgroup memory take none), then one for each output.
 ///
 /// Byte slices must be aligned to the layout's alignment; 16 always is.
 #[derive(Debug)]
@@ -17,8 +16,6 @@ pub enum Arg<'a> {
     Bytes(&'a [u8]),
     /// What is written.
     BytesMut(&'a mut [u8]),
-    /// Counters.
-    Atomics(&'a [AtomicU32]),
     /// A texture that is read.
     Texture(TextureRef<'a>),
     /// A texture that is written.
@@ -162,6 +159,12 @@ pub enum CallError {
         expected: usize,
         /// Elements.
         got: usize,
+    },
+    /// More invocations than 32 bits can count.
+    #[error("{} x {} x {} invocations are more than 32 bits can count", extent[0], extent[1], extent[2])]
+    Range {
+        /// Along each axis.
+        extent: [u32; 3],
     },
     /// A texture of another format than the kernel's, or bytes that do not fit its size.
     #[error("argument `{name}`: {problem}")]

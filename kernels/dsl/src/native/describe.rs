@@ -29,7 +29,7 @@ pub struct Kernel {
     pub precision: Option<Precision>,
     /// The function's parameters, in order.
     pub params: Vec<Param>,
-    /// What the function returns, in order; empty for a kernel that only adds to atomics.
+    /// What the function returns, in order; empty for a kernel that only writes to its parameters.
     pub outputs: Vec<Output>,
     /// How closely every backend must agree with the native scalar run.
     pub tolerance: Tolerance,
@@ -53,15 +53,45 @@ pub enum Stage {
         threads: [u32; 3],
         /// How many of the dimensions index the output: 1, 2 or 3.
         dimensions: u32,
-        /// 0 for a map; else the number of phases that barriers separate.
-        phases: u32,
+        /// Whether the invocations of a workgroup share memory or wait for one another.
+        cooperative: bool,
         /// Bytes of workgroup memory.
         workgroup_bytes: u32,
+        /// How many invocations run.
+        range: Range,
     },
     /// A vertex shader: one invocation for each vertex.
     Vertex,
     /// A fragment shader: one invocation for each covered fragment.
     Fragment,
+}
+
+/// How many invocations of a compute kernel run; those that the last workgroups have beyond it do
+/// nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Range {
+    /// As many as the first output has elements or texels; without outputs, as many as the first
+    /// buffer that is read has.
+    #[default]
+    Outputs,
+    /// As many as a buffer has elements.
+    Elements {
+        /// The buffer's parameter.
+        param: String,
+    },
+    /// A fixed number along x, y, z.
+    Fixed {
+        /// It.
+        size: [u32; 3],
+    },
+    /// What a uniform says: as many `u32` in a row as the kernel has dimensions.
+    Uniform {
+        /// The uniform's parameter.
+        param: String,
+        /// Where they begin, in bytes.
+        offset: u32,
+    },
 }
 
 /// A floating-point type.
@@ -109,10 +139,33 @@ pub enum Role {
         /// Layout of an element.
         layout: Layout,
     },
-    /// A storage buffer of `u32` on which only commutative atomics work.
+    /// A storage buffer of which the invocation reads its own element and writes it back.
+    ElementMut {
+        /// Number in set 0.
+        binding: u32,
+        /// Layout of an element.
+        layout: Layout,
+    },
+    /// A storage buffer that any invocation may read and write anywhere.
+    StorageMut {
+        /// Number in set 0.
+        binding: u32,
+        /// Layout of an element.
+        layout: Layout,
+        /// Which element lies where depends on the order in which invocations run: what is in it
+        /// is the same each time, in another order.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        unordered: bool,
+    },
+    /// A storage buffer of integers on which only atomic operations work.
     Atomic {
         /// Number in set 0.
         binding: u32,
+        /// `u32` or `i32`.
+        scalar: Scalar,
+        /// As for [`Role::StorageMut`].
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        unordered: bool,
     },
     /// A texture that is read by coordinates or through a sampler.
     Texture {
@@ -135,10 +188,20 @@ pub enum Role {
     },
     /// The invocation's own index; bound to nothing.
     Index,
-    /// The invocation's workgroup memory; bound to nothing.
-    Group,
-    /// The phase's number; bound to nothing.
-    Phase,
+    /// What the device knows of the invocation; bound to nothing.
+    BuiltIn {
+        /// Which.
+        built_in: BuiltIn,
+    },
+    /// Memory of the workgroup; bound to nothing.
+    Shared {
+        /// Layout of an element.
+        layout: Layout,
+        /// Number of elements.
+        length: u32,
+        /// Integers on which only atomic operations work.
+        atomic: bool,
+    },
     /// A vertex attribute (vertex stage).
     Attribute {
         /// Input location.
@@ -153,6 +216,20 @@ pub enum Role {
         /// Its type.
         ty: Type,
     },
+}
+
+/// What the device knows of an invocation. Ids and counts have as many dimensions as the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BuiltIn {
+    /// Its place in its workgroup.
+    LocalId,
+    /// Its number in its workgroup, counted along x, then y, then z.
+    LocalIndex,
+    /// Its workgroup.
+    GroupId,
+    /// How many workgroups the range needs.
+    GroupCount,
 }
 
 /// Shape of a sampled texture.
@@ -171,15 +248,12 @@ pub enum TextureKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Output {
-    /// A storage buffer: element `i` is written by invocation `i`, and by no other; with
-    /// `per_group`, element `g` by workgroup `g`.
+    /// A storage buffer: element `i` is written by invocation `i`, and by no other.
     Buffer {
         /// Number in set 0.
         binding: u32,
         /// Layout of an element.
         layout: Layout,
-        /// One element for each workgroup, not for each invocation.
-        per_group: bool,
     },
     /// A storage texture: its texel at the invocation's index.
     Texture {

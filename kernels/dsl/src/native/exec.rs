@@ -2,6 +2,7 @@
 //! invocations.
 
 use core::any::Any;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::string::{String, ToString};
 use std::{format, vec};
@@ -15,7 +16,7 @@ use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef};
 use super::describe::TexelFormat;
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
-use crate::{Group, Real, Texel};
+use crate::{Real, Texel};
 
 /// Invocations that a thread takes at once.
 const CHUNK: usize = 4096;
@@ -92,18 +93,45 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// Counters.
-    pub fn atomics(
+    /// The words of a buffer that invocations write where they like. Its elements have `size`
+    /// bytes.
+    pub fn words(&mut self, name: &'static str, size: usize) -> Result<&'a [AtomicU32], CallError> {
+        let words = match self.args.next() {
+            Some(Arg::BytesMut(bytes)) => shared_words(name, bytes, size)?,
+            _ => {
+                return Err(CallError::Kind {
+                    name,
+                    expected: "a buffer that can be written",
+                });
+            }
+        };
+        if size_of_val(words).is_multiple_of(size) {
+            Ok(words)
+        } else {
+            Err(CallError::Size {
+                name,
+                bytes: size_of_val(words),
+                size,
+            })
+        }
+    }
+
+    /// The texels of a texture that is written among other things.
+    pub fn texels(
         &mut self,
         name: &'static str,
-    ) -> Result<&'a [core::sync::atomic::AtomicU32], CallError> {
-        match self.args.next() {
-            Some(Arg::Atomics(counters)) => Ok(counters),
-            _ => Err(CallError::Kind {
-                name,
-                expected: "counters",
-            }),
-        }
+        format: TexelFormat,
+    ) -> Result<Texels<'a>, CallError> {
+        let TextureMut {
+            size,
+            format,
+            bytes,
+        } = self.texture_mut(name, format)?;
+        Ok(Texels {
+            size,
+            format,
+            words: shared_words(name, bytes, format.bytes())?,
+        })
     }
 
     /// A texture to be read.
@@ -166,6 +194,53 @@ impl<'a> Args<'a> {
     }
 }
 
+/// Exclusive bytes as words that threads share.
+fn shared_words<'a>(
+    name: &'static str,
+    bytes: &'a mut [u8],
+    size: usize,
+) -> Result<&'a [AtomicU32], CallError> {
+    let len = bytes.len();
+    let words: &mut [u32] = bytemuck::try_cast_slice_mut(bytes).map_err(|_| CallError::Size {
+        name,
+        bytes: len,
+        size,
+    })?;
+    // SAFETY: an `AtomicU32` has size and alignment of a `u32`, and the words are borrowed
+    // exclusively for as long as they are shared.
+    Ok(unsafe { core::slice::from_raw_parts(words.as_mut_ptr().cast::<AtomicU32>(), words.len()) })
+}
+
+/// A texture of which any texel may be written at any time.
+#[derive(Clone, Copy)]
+pub struct Texels<'a> {
+    size: [u32; 3],
+    format: TexelFormat,
+    words: &'a [AtomicU32],
+}
+
+impl Texels<'_> {
+    /// Width, height, depth.
+    pub fn size(self) -> [u32; 3] {
+        self.size
+    }
+
+    /// Writes the texel at `at`, which lies inside.
+    #[inline]
+    pub fn store<T: Texel<Channels: Channels>>(self, at: UVec3, texel: T) {
+        let [width, height, _] = self.size.map(|n| n as usize);
+        let i = (at.z as usize * height + at.y as usize) * width + at.x as usize;
+        let count = self.format.bytes() / 4;
+        let mut texel_words = [0_u32; 4];
+        texel
+            .channels()
+            .store(self.format, bytemuck::cast_slice_mut(&mut texel_words));
+        for (word, slot) in texel_words.iter().zip(&self.words[i * count..][..count]) {
+            slot.store(*word, Relaxed);
+        }
+    }
+}
+
 fn cast<'a, T: Pod>(name: &'static str, bytes: &'a [u8]) -> Result<&'a [T], CallError> {
     bytemuck::try_cast_slice(bytes).map_err(|_| CallError::Size {
         name,
@@ -203,8 +278,26 @@ pub fn enough(name: &'static str, got: usize, expected: usize) -> Result<(), Cal
     }
 }
 
+/// Fails unless a texture has the size of the range that is written to it.
+pub fn covers(name: &'static str, size: [u32; 3], extent: [u32; 3]) -> Result<(), CallError> {
+    if size == extent {
+        return Ok(());
+    }
+    let [size, extent] = [size, extent].map(|[x, y, z]| format!("{x}x{y}x{z}"));
+    let problem = format!("it has {size} texels, but {extent} invocations run");
+    Err(CallError::Texture { name, problem })
+}
+
+/// How many invocations a range has.
+pub fn count(extent: [u32; 3]) -> Result<usize, CallError> {
+    let count = extent.iter().map(|n| u128::from(*n)).product::<u128>();
+    u32::try_from(count)
+        .map(|n| n as usize)
+        .map_err(|_| CallError::Range { extent })
+}
+
 /// Runs the loops; a kernel's panic becomes an error.
-fn guard(f: impl FnOnce()) -> Result<(), CallError> {
+pub(super) fn guard(f: impl FnOnce()) -> Result<(), CallError> {
     catch_unwind(AssertUnwindSafe(f)).map_err(|payload| CallError::Panic {
         message: message(payload.as_ref()),
     })
@@ -246,13 +339,34 @@ pub fn map1<T: Send>(
     })
 }
 
-/// A call that returns nothing, for `count` invocations.
-pub fn for_each(mode: Mode, count: usize, f: impl Fn(usize) + Sync) -> Result<(), CallError> {
+/// Calls `f` for each invocation of `extent`: where it is, and its number, counted along x, then
+/// y, then z.
+pub fn for_each(
+    mode: Mode,
+    extent: [u32; 3],
+    f: impl Fn(UVec3, u32) + Sync,
+) -> Result<(), CallError> {
+    let [width, height, depth] = extent.map(|n| n as usize);
+    let (row, count) = (width.max(1), width * height * depth);
+    let chunk = |start: usize, end: usize| {
+        let mut i = start;
+        while i < end {
+            let line = i / row;
+            let stop = end.min((line + 1) * row);
+            let (y, z) = ((line % height) as u32, (line / height) as u32);
+            for j in i..stop {
+                f(UVec3::new((j - line * row) as u32, y, z), j as u32);
+            }
+            i = stop;
+        }
+    };
     guard(|| {
         if mode.parallel {
-            (0..count).into_par_iter().with_min_len(CHUNK).for_each(&f);
+            (0..count.div_ceil(CHUNK))
+                .into_par_iter()
+                .for_each(|i| chunk(i * CHUNK, count.min((i + 1) * CHUNK)));
         } else {
-            (0..count).for_each(&f);
+            chunk(0, count);
         }
     })
 }
@@ -369,30 +483,6 @@ pub fn map_texels2<T: Texel<Channels: Channels>>(
     f: impl Fn(UVec2) -> T + Sync,
 ) -> Result<(), CallError> {
     map_texels(mode, out, |at| f(at.truncate()))
-}
-
-/// Runs workgroups of `N` invocations through `phases` phases after phase 0. `f` gets the phase,
-/// the invocation's index and the workgroup's memory as the phase before left it. The last phase's
-/// values are the output: each invocation's own, or with `per_group` the first invocation's for its
-/// group.
-pub fn phases<T: Copy + Default + Send + Sync, const N: usize>(
-    mode: Mode,
-    out: &mut [T],
-    per_group: bool,
-    phases: u32,
-    f: impl Fn(u32, usize, Group<'_, T, N>) -> T + Sync,
-) -> Result<(), CallError> {
-    let size = if per_group { 1 } else { N };
-    guard(|| {
-        chunks(mode, out, size, |start, chunk| {
-            let first = start / size * N;
-            let mut slots = [T::default(); N];
-            for phase in 0..=phases {
-                slots = core::array::from_fn(|i| f(phase, first + i, Group::new(&slots, i as u32)));
-            }
-            chunk.copy_from_slice(&slots[..chunk.len()]);
-        });
-    })
 }
 
 /// Output slices of a vertex or fragment kernel, written together.

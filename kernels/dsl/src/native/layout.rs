@@ -116,6 +116,21 @@ pub const fn round_up(value: usize, align: usize) -> usize {
     value.div_ceil(align) * align
 }
 
+/// The scalar of an integer with atomic operations.
+#[doc(hidden)]
+pub trait AtomicScalar: crate::AtomicInteger {
+    /// Which.
+    const SCALAR: Scalar;
+}
+
+impl AtomicScalar for u32 {
+    const SCALAR: Scalar = Scalar::U32;
+}
+
+impl AtomicScalar for i32 {
+    const SCALAR: Scalar = Scalar::I32;
+}
+
 /// The precision of a scalar type.
 #[doc(hidden)]
 pub trait HasPrecision {

@@ -11,6 +11,8 @@ pub mod layout;
 pub mod plugin;
 pub mod texel;
 mod transpose;
+#[doc(hidden)]
+pub mod workgroup;
 
 pub use call::{Address, Arg, Call, CallError, Filter, Mode, Run, Sampler, TextureMut, TextureRef};
 

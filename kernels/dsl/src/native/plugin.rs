@@ -7,7 +7,6 @@
 
 #[doc(hidden)]
 pub use core::ffi::c_void;
-use core::sync::atomic::AtomicU32;
 use std::path::{Path, PathBuf};
 use std::string::{String, ToString};
 #[doc(hidden)]
@@ -21,7 +20,7 @@ use super::describe::Kernel;
 use super::texel::FORMATS;
 
 /// Version of what crosses the border.
-pub const ABI: u32 = 1;
+pub const ABI: u32 = 2;
 
 /// The exported function's name.
 pub const SYMBOL: &str = "hankel_plugin";
@@ -68,10 +67,9 @@ struct RawArg {
 
 const BYTES: u32 = 0;
 const BYTES_MUT: u32 = 1;
-const ATOMICS: u32 = 2;
-const TEXTURE: u32 = 3;
-const TEXTURE_MUT: u32 = 4;
-const SAMPLER: u32 = 5;
+const TEXTURE: u32 = 2;
+const TEXTURE_MUT: u32 = 3;
+const SAMPLER: u32 = 4;
 
 impl RawArg {
     fn new(arg: &mut Arg<'_>) -> Self {
@@ -89,10 +87,6 @@ impl RawArg {
             Arg::BytesMut(b) => {
                 raw.kind = BYTES_MUT;
                 (b.as_mut_ptr(), b.len())
-            }
-            Arg::Atomics(a) => {
-                raw.kind = ATOMICS;
-                (a.as_ptr().cast_mut().cast(), a.len())
             }
             Arg::Texture(t) => {
                 raw.kind = TEXTURE;
@@ -124,12 +118,6 @@ impl RawArg {
         Some(match self.kind {
             BYTES => Arg::Bytes(bytes()),
             BYTES_MUT => Arg::BytesMut(bytes_mut()),
-            ATOMICS => {
-                // SAFETY: the same; `len` counts counters here.
-                Arg::Atomics(unsafe {
-                    slice::from_raw_parts(self.data.cast::<AtomicU32>(), self.len)
-                })
-            }
             TEXTURE => Arg::Texture(TextureRef {
                 size: self.size,
                 samples: self.samples,

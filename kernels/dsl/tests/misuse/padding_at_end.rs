@@ -1,5 +1,8 @@
 #![allow(unused_imports)]
-use hankel_dsl::{Atomics, Buffer, Element, Group, Real, Sampler, Texture2d, glam::*, kernel};
+use hankel_dsl::{
+    Atomics, Buffer, Element, Real, Sampler, Shared, StorageMut, Texture2d, barrier, cooperative,
+    glam::*, kernel,
+};
 
 #[derive(Clone, Copy, Element)]
 #[repr(C)]

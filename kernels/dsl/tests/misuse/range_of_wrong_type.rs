@@ -1,0 +1,13 @@
+#![allow(unused_imports)]
+use hankel_dsl::{
+    Atomics, Buffer, Element, Real, Sampler, Shared, StorageMut, Texture2d, barrier, cooperative,
+    glam::*, kernel,
+};
+
+/// The index.
+#[kernel(compute, threads(8, 8), range(size))]
+fn index(#[index] at: UVec2, #[uniform] size: &u32) -> u32 {
+    at.x
+}
+
+fn main() {}

@@ -1,0 +1,13 @@
+#![allow(unused_imports)]
+use hankel_dsl::{
+    Atomics, Buffer, Element, Real, Sampler, Shared, StorageMut, Texture2d, barrier, cooperative,
+    glam::*, kernel,
+};
+
+/// Two colours.
+#[kernel(compute, threads(8, 8), texture(rgba8unorm))]
+fn colours(#[index] at: UVec2) -> (Vec4, Vec4) {
+    (Vec4::ZERO, Vec4::ONE)
+}
+
+fn main() {}
