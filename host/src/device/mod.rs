@@ -12,6 +12,7 @@
 
 pub mod error;
 pub mod native;
+pub mod route;
 pub mod slots;
 pub mod vulkan;
 
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::{DeviceError, Result};
 pub use native::NativeDevice;
+pub use route::Arithmetic;
 pub use vulkan::VulkanDevice;
 
 /// A buffer of a device.
