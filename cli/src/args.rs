@@ -221,7 +221,8 @@ pub struct Parity {
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
-    /// Every kernel in every language on every compiler and driver.
+    /// Every kernel in every language on every compiler and driver; without it, natively and through
+    /// Vulkan as SPIR-V and WGSL.
     #[arg(long)]
     pub matrix: bool,
     #[command(flatten)]
@@ -251,11 +252,23 @@ pub struct OfMatrix {
     /// List of known differences; without it, the built-in kernels have their own.
     #[arg(long, value_name = "FILE", requires = "matrix")]
     pub known: Option<PathBuf>,
+    /// Table of cells that are known not to run; without it, the built-in kernels have their own. A run
+    /// with all kernels in all columns is compared with it.
+    #[arg(long, value_name = "FILE", requires = "matrix")]
+    pub absent: Option<PathBuf>,
+    /// Writes that table, as this run finds it.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "matrix",
+        conflicts_with = "absent"
+    )]
+    pub write_absent: Option<PathBuf>,
     /// Seconds that a compiler or device may take for one kernel.
     #[arg(long, value_name = "SECONDS", default_value_t = 120, requires = "matrix",
           value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub limit: u64,
-    /// Runs everything anew.
+    /// Runs everything anew, as it is done where CI=true.
     #[arg(long, requires = "matrix")]
     pub no_cache: bool,
 }
@@ -360,6 +373,11 @@ pub struct Render {
     /// Render on both backends and compare.
     #[arg(long)]
     pub compare: bool,
+    /// With --compare: fails if more than this share of the pixels, in percent, differs by more than
+    /// 1/255. Without it, the share is what rounding can do at the scene's edges.
+    #[arg(long, value_name = "PERCENT", requires = "compare",
+          value_parser = percentage)]
+    pub limit: Option<f64>,
     /// How much the difference picture is amplified.
     #[arg(long, value_name = "FACTOR", default_value_t = hankel_host::frame::AMPLIFICATION)]
     pub amplify: u32,
@@ -608,4 +626,12 @@ pub enum Method {
     Rustup,
     /// The compiler without LLVM, from Debian's rust-src package and crates.io.
     Source,
+}
+
+/// A number from 0 to 100.
+fn percentage(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (0.0..=100.0).contains(&x) => Ok(x),
+        _ => Err("give a number from 0 to 100".into()),
+    }
 }

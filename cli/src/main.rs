@@ -36,7 +36,7 @@ fn main() -> ExitCode {
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
         Command::Doctor(a) => commands::doctor::run(&a),
         Command::Completions(a) => commands::completions::run(&a),
-        Command::MatrixRunner { which } => commands::matrix::serve(&which),
+        Command::MatrixRunner { which } => commands::parity::serve(&which),
     };
     match outcome {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,

@@ -566,15 +566,10 @@ fn bounds_are_put_under_stress() {
 fn parity_reports_and_filters() {
     let desk = Desk::new();
     let out = desk.hankel("parity --kernel quantize_4_unit").code(0).out();
-    for word in [
-        "native lanes",
-        "SPIR-V via naga",
-        "WGSL",
-        "bit for bit",
-        "pass",
-    ] {
+    for word in ["native-simd", "spirv-naga", "wgsl", "same", "all pass"] {
         assert!(out.contains(word), "{out}");
     }
+    assert!(!out.contains("msl"), "{out}");
     let json = desk
         .hankel("parity --kernel vsm --seed 5 --format json")
         .code(0)
@@ -603,7 +598,8 @@ fn every_instruction_set_gives_the_same_bits() {
             .output()
             .expect("hankel starts");
         let json = Run(output).code(0).out();
-        assert!(json.contains("\"native_lanes\""), "{level}: {json}");
+        assert!(json.contains("\"native-simd\""), "{level}: {json}");
+        assert!(json.contains("\"passed\": true"), "{level}: {json}");
     }
 }
 
@@ -642,6 +638,10 @@ fn a_scene_is_rendered_and_compared() {
         .code(0)
         .out();
     assert!(out.contains("\"psnr\""), "{out}");
+    desk.hankel("render scene.toml --out a.png --compare --limit 0")
+        .fails(1, &["the pictures differ", "at most 0.000 %"]);
+    desk.hankel("render scene.toml --out a.png --compare --limit 101")
+        .fails(2, &["from 0 to 100"]);
     for file in ["a.png", "a-vulkan.png", "a-difference.png"] {
         let bytes = fs::read(desk.path(file)).expect("it was written");
         assert_eq!(&bytes[1..4], b"PNG", "{file}");

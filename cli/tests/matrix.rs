@@ -40,6 +40,7 @@ impl Desk {
             .args(line.split_whitespace())
             .current_dir(self.0.path())
             .env("HANKEL_CACHE", self.path("cache"))
+            .env("CI", "")
             .envs(variables.iter().copied())
             .output()
             .expect("hankel starts");
@@ -112,30 +113,88 @@ fn what_is_not_installed_is_named_and_fails_only_if_required() {
 }
 
 #[test]
-fn a_known_difference_that_is_none_fails() {
+fn a_known_difference_is_one_cell_with_its_outcome() {
     let desk = Desk::new();
     let known = desk.path("known.toml");
+    let refusing = desk.program(
+        "glslang",
+        "case $1 in --version) echo glslang 1.0; exit;; esac\necho 'ERROR: odd words'; exit 2",
+    );
+    let refusing = [("HANKEL_GLSLANG", refusing.as_str())];
     let line = format!(
-        "parity --matrix --kernel vsm --column msl --known {}",
+        "parity --matrix --kernel vsm_f64 --column glsl --known {}",
         known.display()
     );
-    let entry = |kernels: &str| {
-        format!(
-            "[[difference]]\nkernels = [\"{kernels}\"]\ncolumns = [\"msl\"]\n\
-             what = \"all of it\"\nwhy = \"for a test\"\n"
-        )
+    let write = |cells: &str| {
+        let text = format!(
+            "[[difference]]\nwhat = \"all of it\"\nwhy = \"for a test\"\ncells = [{cells}]\n"
+        );
+        fs::write(&known, text).expect("the desk can be written");
     };
-    fs::write(&known, entry("v*")).expect("the desk can be written");
-    desk.hankel(&line, &[]).says(
-        1,
-        &["all of it", "vsm in msl passed", "take it off the list"],
-    );
-    fs::write(&known, entry("other")).expect("the desk can be written");
+    let cell = |kernel: &str, rest: &str| {
+        format!("{{ kernel = \"{kernel}\", column = \"glsl\", {rest} }}")
+    };
+    let refused = "outcome = \"REFUSED\", says = \"odd words\"";
+    write(&cell("vsm_f64", refused));
+    desk.hankel(&line, &refusing).says(0, &["known"]);
+    // Another outcome, and other words, are not what is known.
+    write(&cell(
+        "vsm_f64",
+        "outcome = \"FAIL\", numbers = 1, absolute = 0.1",
+    ));
+    desk.hankel(&line, &refusing)
+        .says(1, &["vsm_f64 in glsl", "fails otherwise", "`REFUSED`"]);
+    write(&cell(
+        "vsm_f64",
+        "outcome = \"REFUSED\", says = \"even words\"",
+    ));
+    desk.hankel(&line, &refusing)
+        .says(1, &["fails otherwise", "even words"]);
+    // Each cell is stale by itself.
+    write(&cell("vsm_f64", refused));
+    desk.hankel(&line, &[])
+        .says(1, &["vsm_f64 in glsl", "it passed; take it off the list"]);
+    write(&cell("other", refused));
     desk.hankel(&line, &[]).says(0, &["all pass"]);
-    fs::write(&known, "[[difference]]\nkernels = []\n").expect("the desk can be written");
-    desk.hankel(&line, &[]).says(2, &["known.toml", "columns"]);
+    for (cells, words) in [
+        ("", "`cells` is empty"),
+        (&*cell("vsm", "outcome = \"FAIL\""), "`numbers`"),
+        (&*cell("vsm", "outcome = \"same\""), "none of FAIL"),
+    ] {
+        write(cells);
+        desk.hankel(&line, &[]).says(2, &["known.toml", words]);
+    }
     desk.hankel("parity --matrix --known nosuch.toml", &[])
         .says(2, &["nosuch.toml"]);
+}
+
+#[test]
+fn cells_that_do_not_run_are_a_table() {
+    let desk = Desk::new();
+    let table = desk.path("absent.toml");
+    let line = "parity --matrix --kernel vsm --kernel vsm_f64 --column wgsl --column native";
+    desk.hankel(&format!("{line} --write-absent {}", table.display()), &[])
+        .says(0, &["all pass"]);
+    let text = fs::read_to_string(&table).expect("the table is there");
+    assert!(text.contains("wgsl = [\n    \"vsm_f64\",\n]"), "{text}");
+    fs::write(&table, "[lacks]\nfoo = 3\n").expect("the desk can be written");
+    desk.hankel(&format!("{line} --absent {}", table.display()), &[])
+        .says(2, &["absent.toml", "foo"]);
+}
+
+#[test]
+fn continuous_integration_takes_nothing_from_the_cache() {
+    let desk = Desk::new();
+    let line = "parity --matrix --kernel vsm --column native --column spirv";
+    desk.hankel(line, &[("CI", "")])
+        .says(0, &["0 from the cache"]);
+    desk.hankel(line, &[("CI", "")])
+        .says(0, &["2 from the cache"]);
+    desk.hankel(line, &[("CI", "true")])
+        .says(0, &["0 from the cache"]);
+    // What a driver reads decides, too.
+    desk.hankel(line, &[("CI", ""), ("LP_NATIVE_VECTOR_WIDTH", "128")])
+        .says(0, &["0 from the cache"]);
 }
 
 #[test]

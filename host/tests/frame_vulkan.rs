@@ -61,28 +61,12 @@ fn both(geometry: &str, shadow: &str) -> Comparison {
     compare(&scene, &shaders(), 16, &mut Quiet).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The share of pixels that may differ visibly.
-///
-/// A rasteriser puts vertices on a grid of 1/256 pixel, rays do not. So an edge may be half a step
-/// and a rounding away from where the ray sees it, at most 1/256 pixel, and a sample sees another
-/// triangle only if it lies in a strip of that half-width along the edge. A strip crosses at most
-/// sqrt(2) of a pixel; four samples, none likelier than another to lie in it: of the pixels with
-/// an edge, at most 4 * sqrt(2) * 2/256 = 4.4 % have such a sample. The same happens to texels
-/// of the shadow map, where a changed sample is a quarter of one texel and the filter spreads it:
-/// its share of the picture is counted as once more as much.
-fn bound(edges: f64) -> f64 {
-    2.0 * 4.0 * 2.0_f64.sqrt() * 2.0 / 256.0 * edges
-}
-
 fn agree(geometry: &str, shadow: &str) {
     let c = both(geometry, shadow);
     let edges = c.native.edges.unwrap_or(0.0);
     let what = format!("{geometry}, {shadow}: {}, edges {edges:.4}", c.difference);
     assert!(edges > 0.01 && edges < 0.8, "{what}");
-    assert!(c.difference.over_8 <= bound(edges), "{what}");
-    // Elsewhere only rounding differs: of the sampler's weights to 8 bits, of the target to half
-    // precision, of the moments to 16 bits.
-    assert!(c.difference.over_1 <= bound(edges) + 0.01, "{what}");
+    assert!(c.difference.over_1 <= c.limit(), "{what}");
     // The picture shows something: not all of one colour.
     let first = c.vulkan.picture.pixels[0];
     let other = c

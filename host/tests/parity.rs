@@ -1,13 +1,67 @@
-//! Kernels that agree pass, and one that was tampered with is caught, on the right path.
+//! Comparison of devices: kernels that agree pass, and one that was tampered with is caught, on the
+//! right way to the driver.
 
 mod common;
 
 use common::*;
-use hankel_dsl::native::describe::Kernel;
-use hankel_dsl::native::{Arg, CallError};
-use hankel_host::crates::KernelEntry;
+use hankel_dsl::native::{Arg, CallError, Mode};
+use hankel_host::device::{NativeDevice, Shader};
 use hankel_host::inputs::{self, Class};
-use hankel_host::parity::{self, KernelReport, Outcome, Path, Report, Subject, Wgsl};
+use hankel_host::parity::execute;
+use hankel_host::parity::numbers::{Found, Numbers, Rules};
+use hankel_host::parity::panics;
+
+/// How a sample is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Path {
+    Lanes,
+    Spirv,
+    SpirvNaga,
+    Wgsl,
+}
+
+const PATHS: [Path; 4] = [Path::Lanes, Path::Spirv, Path::SpirvNaga, Path::Wgsl];
+
+/// What a comparison with the native scalar run finds.
+fn found(sample: &Sample, path: Path, seed: u64) -> Result<Found, String> {
+    let entry = sample.entry();
+    let kernel = &entry.kernel;
+    let shader = match path {
+        Path::Lanes => None,
+        Path::Spirv => Some(Shader::SpirvPassthrough(&sample.spirv)),
+        Path::SpirvNaga => Some(Shader::SpirvThroughNaga(&sample.spirv)),
+        Path::Wgsl => Some(Shader::Wgsl {
+            text: &sample.wgsl,
+            entry_point: &kernel.name,
+        }),
+    };
+    let program = entry.program(shader, &[]);
+    let mut scalar = NativeDevice::with_mode(Mode::REFERENCE);
+    let mut lanes = NativeDevice::new();
+    let mut gpu = vulkan();
+    let numbers = Numbers::of(kernel);
+    let rules = Rules::of(kernel, kernel.tolerance.clone());
+    let mut found = Found::default();
+    for case in inputs::cases(kernel, seed) {
+        let reference =
+            execute::dispatch(&mut scalar, &program, &case).map_err(|e| e.to_string())?;
+        let written = if path == Path::Lanes {
+            execute::dispatch(&mut lanes, &program, &case).map_err(|e| e.to_string())?
+        } else {
+            execute::on_vulkan(&mut gpu, &program, &case).map_err(|e| e.to_string())?
+        };
+        numbers.compare(&case, &rules, &reference, &written, &mut found);
+    }
+    Ok(found)
+}
+
+/// Whether a way passes.
+fn passes(sample: &Sample, path: Path) -> bool {
+    found(sample, path, inputs::SEED)
+        .unwrap_or_else(|e| panic!("{path:?}: {e}"))
+        .beyond
+        == 0
+}
 
 fn all_samples() -> Vec<Sample> {
     vec![
@@ -22,66 +76,27 @@ fn all_samples() -> Vec<Sample> {
     ]
 }
 
-fn compare(samples: &[Sample], seed: u64) -> Report {
-    let entries: Vec<KernelEntry> = samples.iter().map(Sample::entry).collect();
-    let subjects: Vec<Subject<'_>> = samples
-        .iter()
-        .zip(&entries)
-        .map(|(s, entry)| Subject {
-            entry,
-            spirv: Ok(&s.spirv),
-            wgsl: Ok(Wgsl {
-                text: &s.wgsl,
-                entry_point: &s.kernel.name,
-            }),
-        })
-        .collect();
-    parity::run(&mut vulkan(), &subjects, seed, &mut |_| {})
-}
-
-fn outcome(kernel: &KernelReport, path: Path) -> &Outcome {
-    &kernel
-        .paths
-        .iter()
-        .find(|p| p.path == path)
-        .unwrap()
-        .outcome
-}
-
 #[test]
 fn every_stage_agrees_on_every_path() {
-    let samples = all_samples();
-    let report = compare(&samples, inputs::SEED);
-    let text = report.to_string();
-    assert!(report.passed, "{text}");
-    assert!(text.contains("all 8 kernels agree"), "{text}");
-    for kernel in &report.kernels {
-        assert_eq!(kernel.paths.len(), 4);
-        for path in &kernel.paths {
-            assert_eq!(path.outcome, Outcome::Passed, "{text}");
+    for sample in all_samples() {
+        let name = &sample.kernel.name;
+        for path in PATHS {
+            let found =
+                found(&sample, path, inputs::SEED).unwrap_or_else(|e| panic!("{name}: {e}"));
             assert_eq!(
-                (path.found.beyond, path.found.largest_ulp),
+                (found.beyond, found.largest_ulp),
                 (0, 0),
-                "{text}"
+                "{name}: {found:?}"
             );
-            assert!(
-                path.found.values >= 1000
-                    || kernel.kernel == "histogram"
-                    || kernel.kernel == "sums",
-                "{text}"
-            );
+            let few = ["histogram", "sums"].contains(&name.as_str());
+            assert!(found.values >= 1000 || few, "{name}: {found:?}");
         }
-        assert!(kernel.cases.iter().all(|(_, n)| *n > 1000), "{text}");
     }
-    let json = serde_json::to_string(&report).unwrap();
-    assert_eq!(serde_json::from_str::<Report>(&json).unwrap(), report);
 }
 
 #[test]
-fn the_same_seed_makes_the_same_report_and_another_other_inputs() {
-    let samples = [affine()];
-    assert_eq!(compare(&samples, 5), compare(&samples, 5));
-    let kernel = &samples[0].kernel;
+fn the_same_seed_makes_the_same_inputs_and_another_others() {
+    let kernel = &affine().kernel;
     assert_eq!(inputs::cases(kernel, 5), inputs::cases(kernel, 5));
     assert_ne!(inputs::cases(kernel, 5), inputs::cases(kernel, 6));
 }
@@ -91,7 +106,7 @@ fn hostile_inputs_are_absurd_but_finite() {
     for sample in all_samples() {
         for case in inputs::cases(&sample.kernel, 11) {
             assert!(
-                parity::is_finite(&sample.kernel, &case),
+                inputs::is_finite(&sample.kernel, &case),
                 "{}",
                 sample.kernel.name
             );
@@ -127,27 +142,19 @@ fn a_changed_constant_in_the_spirv_is_caught_there_and_not_in_the_wgsl() {
     let mut sample = place();
     let two = 2.0f32;
     sample.spirv = tampered(&sample.spirv, two.to_bits(), two.next_up().to_bits());
-    let report = compare(&[sample], inputs::SEED);
-    let kernel = &report.kernels[0];
-    assert!(!report.passed && !kernel.passed);
-    assert_eq!(*outcome(kernel, Path::NativeLanes), Outcome::Passed);
-    assert_eq!(*outcome(kernel, Path::SpirvPassthrough), Outcome::Failed);
-    assert_eq!(*outcome(kernel, Path::SpirvThroughNaga), Outcome::Failed);
-    assert_eq!(*outcome(kernel, Path::Wgsl), Outcome::Passed);
-    let found = &kernel.paths[1];
-    assert!(found.found.beyond > 100, "{report}");
-    let first = found.found.first.as_ref().unwrap();
+    let caught = PATHS.map(|path| !passes(&sample, path));
+    assert_eq!(caught, [false, true, true, false]);
+    let found = found(&sample, Path::Spirv, inputs::SEED).unwrap();
+    assert!(found.beyond > 100, "{found:?}");
+    let first = found.first.unwrap();
     assert!(first.value.starts_with("output[1]."), "{first:?}");
     assert!((1..=2).contains(&first.ulp), "{first:?}");
-    assert!(
-        first.inputs.iter().any(|(name, _)| name == "colour.x"),
-        "{first:?}"
-    );
-    let text = report.to_string();
-    assert!(
-        text.contains("1 of 1 kernels do not agree") && text.contains("shift = "),
-        "{text}"
-    );
+    for name in ["colour.x", "shift"] {
+        assert!(
+            first.inputs.iter().any(|(n, _)| n.starts_with(name)),
+            "{first:?}"
+        );
+    }
 }
 
 #[test]
@@ -156,10 +163,8 @@ fn a_changed_expression_in_the_wgsl_is_caught_there() {
     sample.wgsl = sample
         .wgsl
         .replace("settings.offset)", "settings.offset * 1.0000002)");
-    let report = compare(&[sample], inputs::SEED);
-    let kernel = &report.kernels[0];
-    assert_eq!(*outcome(kernel, Path::SpirvPassthrough), Outcome::Passed);
-    assert_eq!(*outcome(kernel, Path::Wgsl), Outcome::Failed);
+    assert!(passes(&sample, Path::Spirv));
+    assert!(!passes(&sample, Path::Wgsl));
 }
 
 #[test]
@@ -170,7 +175,7 @@ fn a_tolerance_allows_what_it_says_and_no_more() {
         sample.spirv = tampered(&sample.spirv, two.to_bits(), two.next_up().to_bits());
         sample.kernel.tolerance.ulp = ulp;
         sample.kernel.tolerance.absolute = absolute;
-        compare(&[sample], inputs::SEED).passed
+        PATHS.iter().all(|path| passes(&sample, *path))
     };
     assert!(with(2, 0.0));
     assert!(with(0, 1e-6));
@@ -179,50 +184,40 @@ fn a_tolerance_allows_what_it_says_and_no_more() {
 }
 
 #[test]
-fn what_does_not_run_is_an_error_and_what_is_not_there_is_said() {
-    let sample = affine();
-    let panics = KernelEntry::new(
-        Kernel {
-            name: "panics".into(),
-            ..sample.kernel.clone()
-        },
-        |_| {
-            Err(CallError::Panic {
-                message: "index 7 of 3".into(),
-            })
-        },
-    );
-    let entry = sample.entry();
-    let broken = sample.wgsl.replace("let p", "lett p");
-    let subject = |entry, text| Subject {
-        entry,
-        spirv: Err("there is no snapshot".into()),
-        wgsl: Ok(Wgsl {
-            text,
-            entry_point: "affine",
-        }),
+fn what_does_not_run_says_why() {
+    let mut sample = affine();
+    sample.wgsl = sample.wgsl.replace("let p", "lett p");
+    let error = found(&sample, Path::Wgsl, 1).unwrap_err();
+    assert!(error.contains("affine"), "{error}");
+}
+
+/// A kernel that panics, as one that divides by an integer does, is caught with the input.
+#[test]
+fn a_panic_names_its_input() {
+    let mut sample = mixed();
+    sample.native = |call| {
+        let Arg::Bytes(rows) = &call.args[1] else {
+            return Err(CallError::Count {
+                expected: 3,
+                got: call.args.len(),
+            });
+        };
+        let zero = rows.chunks(16).any(|r| r[12..16] == [0; 4]);
+        if zero {
+            let message = "attempt to divide by zero".into();
+            return Err(CallError::Panic { message });
+        }
+        Ok(())
     };
-    let subjects = [subject(&panics, &sample.wgsl), subject(&entry, &broken)];
-    let report = parity::run(&mut vulkan(), &subjects, 1, &mut |_| {});
-    assert!(!report.passed);
-    let text = report.to_string();
-    assert!(
-        report.kernels[0]
-            .error
-            .as_ref()
-            .unwrap()
-            .contains("index 7 of 3"),
-        "{text}"
-    );
-    let affine = &report.kernels[1];
-    assert!(
-        matches!(outcome(affine, Path::Wgsl), Outcome::Error { message } if message.contains("affine"))
-    );
-    assert!(matches!(
-        outcome(affine, Path::SpirvPassthrough),
-        Outcome::Unavailable { .. }
-    ));
-    assert!(text.contains("there is no snapshot"), "{text}");
+    let entry = sample.entry();
+    let program = entry.program(None, &[]);
+    let mut native = NativeDevice::with_mode(Mode::REFERENCE);
+    let mut fails = |case: &inputs::Case| execute::dispatch(&mut native, &program, case).is_err();
+    let cases = inputs::cases(&sample.kernel, 1);
+    let case = cases.iter().find(|case| fails(case));
+    let case = case.expect("an i32 takes the value 0 somewhere in the inputs");
+    let words = panics::culprit(&sample.kernel, case, fails).unwrap();
+    assert!(words.contains("row.m = 0"), "{words}");
 }
 
 #[test]
@@ -231,19 +226,15 @@ fn absurd_inputs_of_a_kernel_with_a_tolerance_must_still_give_finite_results() {
         let mut sample = affine();
         sample.kernel.tolerance.absolute = 1.0;
         sample.wgsl = sample.wgsl.replace("/ p.y;", wgsl);
-        let report = compare(&[sample], inputs::SEED);
-        outcome(&report.kernels[0], Path::Wgsl).clone()
+        passes(&sample, Path::Wgsl)
     };
-    assert_eq!(run("/ p.y;"), Outcome::Passed);
+    assert!(run("/ p.y;"));
     // Overflows where the reference does not, for absurd numbers alone.
-    assert_eq!(
-        run("/ p.y * (1.0 + p.x * 0.0) + p.x * p.x * 1e-30;"),
-        Outcome::Failed
-    );
+    assert!(!run("/ p.y * (1.0 + p.x * 0.0) + p.x * p.x * 1e-30;"));
 }
 
 #[test]
-fn the_driver_does_not_reorder_what_naga_wrote() {
+fn the_driver_does_not_reorder_what_naga_wrote_of_a_pinned_kernel() {
     let mut sample = affine();
     // lavapipe would factor the sum out of these products.
     let sums = "p.x * settings.scale + p.y * settings.scale + p.x * 0.3";
@@ -267,15 +258,8 @@ fn the_driver_does_not_reorder_what_naga_wrote() {
         }
         Ok(())
     };
-    let report = compare(&[sample], inputs::SEED);
-    assert_eq!(
-        *outcome(&report.kernels[0], Path::SpirvThroughNaga),
-        Outcome::Passed,
-        "{report}"
-    );
-    assert_eq!(
-        *outcome(&report.kernels[0], Path::Wgsl),
-        Outcome::Passed,
-        "{report}"
-    );
+    assert!(!passes(&sample, Path::Wgsl), "the driver reorders");
+    sample.kernel.pinned = true;
+    assert!(passes(&sample, Path::SpirvNaga));
+    assert!(passes(&sample, Path::Wgsl));
 }

@@ -11,6 +11,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::column::Column;
+use crate::machine::Machine;
 use crate::tools::Status;
 
 /// Another program's results are removed when none was added for so long: 30 days.
@@ -43,11 +44,11 @@ impl Cache {
         Self { folder, program }
     }
 
-    /// The name of what follows from `what`.
+    /// The name of what follows from `what`; none for what has no JSON form, which is not kept.
     #[must_use]
-    pub fn key(&self, what: &impl Serialize) -> String {
-        let text = serde_json::to_string(&(&self.program, what)).unwrap_or_default();
-        sha256(text.as_bytes())
+    pub fn key(&self, what: &impl Serialize) -> Option<String> {
+        let text = serde_json::to_string(&(&self.program, what)).ok()?;
+        Some(sha256(text.as_bytes()))
     }
 
     /// What was kept under a name.
@@ -69,9 +70,9 @@ impl Cache {
 
     /// The name under which the device is kept that ran a column.
     #[must_use]
-    pub fn device_key(&self, column: Column, tools: &[Status]) -> String {
+    pub fn device_key(&self, column: Column, tools: &[Status]) -> Option<String> {
         let own: Vec<&Status> = column.statuses(tools).collect();
-        self.key(&("device", column, own))
+        self.key(&("device", column, own, Machine::this()))
     }
 }
 
@@ -94,6 +95,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_has_no_name_is_not_kept() {
+        struct Broken;
+        impl Serialize for Broken {
+            fn serialize<S: serde::Serializer>(&self, _: S) -> Result<S::Ok, S::Error> {
+                Err(serde::ser::Error::custom("on purpose"))
+            }
+        }
+        let cache = Cache::new(None, &[]);
+        assert_eq!(cache.key(&Broken), None);
+        assert_ne!(cache.key(&1), cache.key(&2));
+    }
+
+    #[test]
     fn what_another_program_left_goes_after_a_month() {
         let folder = tempfile::tempdir().unwrap();
         let program = |name: &str| {
@@ -103,11 +117,11 @@ mod tests {
         };
         let (old, new) = (program("old"), program("new"));
         let open = |program: &[OsString]| Cache::new(Some(folder.path()), program);
-        let key = open(&old).key(&"a question");
+        let key = open(&old).key(&"a question").unwrap();
         open(&old).put(&key, &"an answer");
         assert_eq!(open(&old).get(&key), Some("an answer".to_owned()));
         // Another program asks otherwise, and finds nothing under the same name.
-        assert_ne!(open(&new).key(&"a question"), key);
+        assert_ne!(open(&new).key(&"a question"), Some(key.clone()));
         assert_eq!(open(&new).get::<String>(&key), None);
         assert!(open(&old).get::<String>(&key).is_some());
 

@@ -61,6 +61,16 @@ impl Column {
         Self::WgslChromium,
     ];
 
+    /// Those that take no other tool than a Vulkan driver, and no other language than what runs on it
+    /// as it is: plain parity.
+    pub const PLAIN: [Self; 5] = [
+        Self::Native,
+        Self::NativeSimd,
+        Self::Spirv,
+        Self::SpirvNaga,
+        Self::Wgsl,
+    ];
+
     /// The name on the command line and in files.
     #[must_use]
     pub const fn id(self) -> &'static str {

@@ -89,6 +89,10 @@ const LEGEND: [(&str, &str); 11] = [
         "something that the column takes is not installed",
     ),
     ("FAIL", "ran, and gave other numbers than it may"),
+    (
+        "NATIVE",
+        "the native run itself failed: there is nothing to compare with",
+    ),
     ("REFUSED", "a compiler or driver refused it"),
     (
         "CRASHED",
@@ -207,7 +211,7 @@ fn brief(cell: &Cell) -> String {
 
 fn class(word: &str) -> &str {
     match word {
-        "FAIL" | "REFUSED" | "CRASHED" | "TIMEOUT" => "fail",
+        "FAIL" | "NATIVE" | "REFUSED" | "CRASHED" | "TIMEOUT" => "fail",
         "-" => "none",
         other => other,
     }
@@ -324,6 +328,9 @@ fn block(i: usize, row: &Row, column: Column, cell: &Cell, open: bool) -> String
     body += &facts(&known);
     if let Outcome::Foreign { failure } = outcome {
         body += &format!("<pre>{}</pre>\n", escape(&failure.to_string()));
+    }
+    if let Outcome::NoReference { problem } = outcome {
+        body += &format!("<pre>{}</pre>\n", escape(problem));
     }
     if let Some(line) = &cell.line {
         let [number, text] = [line.number.to_string(), escape(&line.text)];

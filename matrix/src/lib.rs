@@ -2,12 +2,14 @@
 //! meet it, and what they compute is compared with the native scalar run.
 //!
 //! - [`mod@column`]: the ways to run a kernel; [`tools`]: the foreign programs that they take.
-//! - [`run`]: the matrix; [`report`]: what it found; [`known`]: differences that are known.
+//! - [`run`]: the matrix; [`report`]: what it found; [`known`]: differences that are known;
+//!   [`absent`]: cells that are known not to run.
 //! - [`job`]: what the processes that run kernels are told. Every one is a process of its own
 //!   ([`process`]), so that a crash or a hang is a result like others: [`vulkan`] and [`gl`] are this
 //!   program again ([`serve`]), [`webgpu`] is Node.js, [`msl`] a program made for each kernel.
 //! - [`compile`] and [`adopt`]: foreign SPIR-V.
 
+pub mod absent;
 pub mod adopt;
 mod cache;
 pub mod column;
@@ -18,6 +20,7 @@ pub mod html;
 pub mod job;
 pub mod known;
 mod locate;
+mod machine;
 pub mod msl;
 pub mod prepare;
 pub mod process;

@@ -91,6 +91,11 @@ pub enum Outcome {
     Passed,
     /// Some are not.
     Differs,
+    /// There is nothing to compare with: the native scalar run failed, or there are no inputs.
+    NoReference {
+        /// Why, and with which input.
+        problem: String,
+    },
     /// A compiler or driver refused it, crashed, or gave no answer.
     Foreign {
         /// How.
@@ -133,6 +138,7 @@ impl Outcome {
         match self {
             Self::Passed => "pass",
             Self::Differs => "FAIL",
+            Self::NoReference { .. } => "NATIVE",
             Self::Foreign { failure } => match failure {
                 Failure::Refused { .. } => "REFUSED",
                 Failure::Crashed { .. } => "CRASHED",
@@ -149,7 +155,10 @@ impl Outcome {
     /// Whether it fails a run.
     #[must_use]
     pub const fn fails(&self) -> bool {
-        matches!(self, Self::Differs | Self::Foreign { .. })
+        matches!(
+            self,
+            Self::Differs | Self::NoReference { .. } | Self::Foreign { .. }
+        )
     }
 }
 

@@ -38,8 +38,14 @@ impl Display for Report {
         }
         writeln!(f, "\n{table}\n")?;
         for row in &self.kernels {
-            for (column, cell) in &row.cells {
-                if cell.outcome.fails() {
+            for (i, (column, cell)) in row.cells.iter().enumerate() {
+                // What is wrong natively is the same in all columns.
+                if let Outcome::NoReference { problem } = &cell.outcome {
+                    if i == 0 {
+                        let [name, problem] = [&row.kernel, problem].map(|t| plain(t));
+                        writeln!(f, "{name}: the native scalar run fails\n    {problem}\n")?;
+                    }
+                } else if cell.outcome.fails() {
                     failure(f, &format!("{}, {column}", plain(&row.kernel)), cell)?;
                 }
             }
@@ -215,7 +221,10 @@ pub(crate) fn tally(report: &Report) -> String {
         ("within what is allowed", &["near"]),
         ("known to fail", &["known"]),
         ("not run", &["lacks", "-", "missing"]),
-        ("failing", &["FAIL", "REFUSED", "CRASHED", "TIMEOUT"]),
+        (
+            "failing",
+            &["FAIL", "NATIVE", "REFUSED", "CRASHED", "TIMEOUT"],
+        ),
     ];
     let parts: Vec<String> = parts
         .into_iter()
@@ -256,7 +265,10 @@ pub(crate) fn note(outcome: &Outcome) -> Option<Note<'_>> {
         Outcome::Inexpressible { reason } => (reason, None, None),
         Outcome::Lacking { what } => (what, None, None),
         Outcome::NotInstalled { what, install } => (what, Some(install), None),
-        Outcome::Passed | Outcome::Differs | Outcome::Foreign { .. } => return None,
+        Outcome::Passed
+        | Outcome::Differs
+        | Outcome::NoReference { .. }
+        | Outcome::Foreign { .. } => return None,
     };
     Some(Note {
         word: outcome.word(),

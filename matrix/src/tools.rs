@@ -1,8 +1,10 @@
 //! What of other people's the matrix runs on: where it is, which version it is, what installs it,
 //! and under which licence it comes. Nothing of it is part of Hankel.
 
+use std::collections::BTreeSet;
 use std::env;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -229,7 +231,7 @@ impl Tools {
         };
         match self.find(tool) {
             Ok(Some((path, version))) => {
-                status.files = files_of(tool, &path).iter().map(|f| stamp(f)).collect();
+                status.files = stamps(&files_of(tool, &path));
                 status.path = Some(path);
                 status.version = Some(version);
             }
@@ -485,9 +487,13 @@ fn vulkan_driver() -> Option<PathBuf> {
 fn files_of(tool: Tool, path: &Path) -> Vec<PathBuf> {
     let mut all = vec![path.to_owned()];
     match tool {
-        Tool::Vulkan | Tool::SwiftShader => all.extend(driver_library(path)),
+        Tool::Vulkan | Tool::SwiftShader => {
+            all.extend(driver_library(path));
+            all.extend(library("libvulkan.so.1"));
+        }
         Tool::Egl => {
             all.extend(library("libEGL_mesa.so.0"));
+            all.extend(library("libGLESv2.so.2"));
             all.extend(
                 ["swrast_dri.so", "libgallium_dri.so"]
                     .iter()
@@ -511,6 +517,40 @@ fn driver_library(manifest: &Path) -> Option<PathBuf> {
     } else {
         library(named)
     }
+}
+
+/// Stamps of files and of all shared libraries that they are linked with: a driver's compiler is
+/// one of these.
+fn stamps(files: &[PathBuf]) -> Vec<String> {
+    let mut all: BTreeSet<PathBuf> = BTreeSet::new();
+    for file in files {
+        all.insert(file.clone());
+        all.extend(linked(file));
+    }
+    all.iter().map(|f| stamp(f)).collect()
+}
+
+/// The shared libraries that a program or library is linked with, as the system's loader finds
+/// them; none for what is neither.
+fn linked(file: &Path) -> Vec<PathBuf> {
+    let is_elf = fs::File::open(file).is_ok_and(|mut opened| {
+        let mut magic = [0; 4];
+        opened.read_exact(&mut magic).is_ok() && magic == *b"\x7fELF"
+    });
+    if !is_elf {
+        return Vec::new();
+    }
+    let Ok(done) = run(Command::new("ldd").arg(file), LIMIT) else {
+        return Vec::new();
+    };
+    done.stdout
+        .lines()
+        .filter_map(|line| {
+            // `libLLVM-15.so.1 => /lib/x86_64-linux-gnu/libLLVM-15.so.1 (0x00007f…)`
+            let path = line.split_once("=> ")?.1.split(" (").next()?.trim();
+            path.starts_with('/').then(|| path.into())
+        })
+        .collect()
 }
 
 /// A file's size and time.
@@ -552,4 +592,25 @@ fn real_name(path: &Path) -> String {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn what_a_program_is_linked_with_is_stamped() {
+        let own = env::current_exe().unwrap();
+        let all = stamps(std::slice::from_ref(&own));
+        assert!(
+            all.iter()
+                .any(|s| s.starts_with(&own.display().to_string()))
+        );
+        assert!(all.iter().any(|s| s.contains("/libc.so.6 ")), "{all:?}");
+        let folder = tempfile::tempdir().unwrap();
+        let text = folder.path().join("driver.json");
+        fs::write(&text, "{}").unwrap();
+        assert_eq!(stamps(&[text]).len(), 1);
+    }
 }

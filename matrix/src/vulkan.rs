@@ -7,7 +7,7 @@ use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::{DeviceError, Format, Program, Shader, TextureShape, VulkanDevice};
 use hankel_host::inputs::{Case, Class, Input};
-use hankel_host::parity::execute::{self, Arithmetic, ExecuteError};
+use hankel_host::parity::execute::{self, ExecuteError};
 use serde::{Deserialize, Serialize};
 
 use crate::adopt;
@@ -83,14 +83,6 @@ fn run(device: &mut VulkanDevice, it: &VulkanJob) -> Result<(), Problem> {
             entry_point: &job.entry_point,
         },
     };
-    // naga drops what forbids a driver to reorder a pinned kernel's sums. That is known, and what it
-    // costs in accuracy is measured elsewhere (`hankel stress`); here it would only hide what else
-    // naga made of the code.
-    let arithmetic = if it.description.pinned || it.description.exact {
-        Arithmetic::Pinned
-    } else {
-        Arithmetic::Free
-    };
     let program = Program {
         kernel: &it.description,
         constants: &[],
@@ -99,7 +91,7 @@ fn run(device: &mut VulkanDevice, it: &VulkanJob) -> Result<(), Problem> {
     };
     let mut results = Vec::new();
     for case in cases(job, &inputs)? {
-        let written = execute::on_vulkan(device, &program, &case, arithmetic)?;
+        let written = execute::on_vulkan(device, &program, &case)?;
         results.extend(written.into_iter().flatten());
     }
     fs::write(&job.results, results)

@@ -23,18 +23,23 @@ use rspirv::spirv::{Decoration, Op};
 static ONE: Mutex<()> = Mutex::new(());
 
 fn matrix(subjects: &[Subject]) -> Report {
+    matrix_in(&Column::ALL, Known::default(), subjects)
+}
+
+fn matrix_in(columns: &[Column], known: Known, subjects: &[Subject]) -> Report {
     let _one = ONE.lock().unwrap_or_else(|e| e.into_inner());
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
     let request = Request {
-        columns: Column::ALL.into(),
+        columns: columns.into(),
         seed: 1,
         limit: Duration::from_secs(120),
         tools: Tools::of_cache(cache.as_deref()),
         runner: vec![PathBuf::from(env!("CARGO_BIN_EXE_hankel-tests-runner")).into()],
         cache: None,
-        known: Known::default(),
-        whole: true,
-        required: Column::ALL.into(),
+        known,
+        absent: None,
+        whole: false,
+        required: columns.into(),
     };
     run::run(&request, subjects, &|_| ()).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -56,6 +61,31 @@ fn every_kind_of_kernel_passes_in_every_column() {
         .filter(|cell| cell.outcome == Outcome::Passed)
         .count();
     assert!(passing > 190, "only {passing} cells passed\n{report}");
+}
+
+/// The cells of the list differ as it says, by as much, and no cell beside them does.
+#[test]
+fn known_differences_of_the_built_in_kernels_are_what_the_list_says() {
+    let known = Known::read(&hankel_tests::root().join("snapshots/known-differences.toml"))
+        .unwrap_or_else(|e| panic!("{e}"));
+    let cells = || known.difference.iter().flat_map(|d| &d.cells);
+    let columns: BTreeSet<Column> = cells().map(|cell| cell.column).collect();
+    let columns: Vec<Column> = columns.into_iter().collect();
+    let krate = Crate::shadows();
+    let entries: Vec<KernelEntry> = krate.entries.iter().cloned().map(Into::into).collect();
+    let subjects: Vec<Subject> = Subject::all(&krate.generate(), &entries)
+        .into_iter()
+        .filter(|s| cells().any(|cell| cell.kernel == s.entry.kernel.name))
+        .collect();
+    let report = matrix_in(&columns, known.clone(), &subjects);
+    assert!(report.passed, "{report}");
+    let named = report
+        .kernels
+        .iter()
+        .flat_map(|row| row.cells.values())
+        .filter(|cell| matches!(cell.outcome, Outcome::Known { .. }))
+        .count();
+    assert_eq!(named, cells().count(), "{report}");
 }
 
 /// A fault in the pipeline.

@@ -5,7 +5,7 @@ use crate::args::{Doctor, Format};
 use crate::failure::{Outcome, Result};
 
 pub fn run(args: &Doctor) -> Result<Outcome> {
-    let tools = super::matrix::tools();
+    let tools = super::parity::tools();
     let all: Vec<Status> = Tool::ALL.into_iter().map(|t| tools.status(t)).collect();
     if args.format == Format::Json {
         print_json(&all);

@@ -1,5 +1,5 @@
 use hankel_dsl::native::describe;
-use hankel_host::device::{Backend, Shader, open};
+use hankel_host::device::{Arithmetic, Backend, open};
 use hankel_host::eval::{Job, parse_setting, select};
 
 use crate::args::{Eval, Precision};
@@ -27,14 +27,10 @@ pub fn run(args: &Eval, quiet: bool) -> Result<Outcome> {
         Backend::Vulkan => Some(session.words(&entry.kernel.name)?),
     };
     let mut device = open(backend)?;
-    let shader = |words| match entry.kernel.exact {
-        // naga would lose what forbids the driver to reorder.
-        true => Shader::SpirvPassthrough(words),
-        false => Shader::SpirvThroughNaga(words),
-    };
+    let arithmetic = Arithmetic::of([&entry.kernel]);
     let job = Job {
         entry,
-        shader: words.as_deref().map(shader),
+        shader: words.as_deref().map(|words| arithmetic.shader(words)),
         settings: &settings,
         input: &args.input,
         output: &args.output,

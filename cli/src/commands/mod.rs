@@ -8,7 +8,6 @@ pub mod doctor;
 pub mod eval;
 pub mod judge;
 pub mod list;
-pub mod matrix;
 pub mod new;
 pub mod parity;
 pub mod render;

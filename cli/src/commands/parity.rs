@@ -1,73 +1,159 @@
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::time::Duration;
 
 use hankel_codegen::Language;
 use hankel_codegen::build::generate;
-use hankel_codegen::spirv::words;
+use hankel_codegen::files::write_whole;
 use hankel_codegen::translate::Options;
 use hankel_host::device::VulkanDevice;
-use hankel_host::parity::{Subject, Wgsl};
+use hankel_matrix::absent::Absent;
+use hankel_matrix::column::Column;
+use hankel_matrix::compile::SHADER_MODEL;
+use hankel_matrix::known::Known;
+use hankel_matrix::run::Request;
+use hankel_matrix::subject::Subject;
+use hankel_matrix::tools::Tools;
 
 use super::print_json;
 use crate::args::{Format, Parity};
-use crate::failure::{Outcome, Result};
+use crate::failure::{Failure, Outcome, Result};
 use crate::progress::Progress;
 use crate::session::Session;
 
+/// Cells of the built-in kernels that are known not to run.
+const ABSENT: &str = include_str!("../../../snapshots/absent-cells.toml");
+
+/// Known differences of the built-in kernels.
+const KNOWN: &str = include_str!("../../../snapshots/known-differences.toml");
+
 pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
-    if args.matrix {
-        return super::matrix::run(args, quiet);
-    }
-    // Whether there is a driver shows before the long work starts.
-    let mut vulkan = VulkanDevice::new()?;
-    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
-    let targets = vec![Language::Spirv, Language::Wgsl];
-    let request = session.request_for(args.kernels.clone(), targets, Options::default());
-    let generated = generate(&request, &session.modules()?)?;
-
-    let mut codes = BTreeMap::new();
-    for (name, entry) in &generated.manifest.kernels {
-        let text = |language: Language| {
-            let there = entry.languages.get(&language);
-            there
-                .and_then(|l| Some((generated.files.get(&l.file)?, l.entry_point.as_str())))
-                .ok_or_else(|| {
-                    let why = entry.unsupported.get(&language).cloned();
-                    why.unwrap_or_else(|| format!("there is no {language}"))
-                })
+    let own = &args.of_matrix;
+    let (columns, required) = if args.matrix {
+        let required = if own.require.iter().any(|r| r == "all") {
+            Column::ALL.into()
+        } else {
+            columns_named(&own.require)?
         };
-        let spirv = text(Language::Spirv)
-            .and_then(|(bytes, _)| words(bytes, name).map_err(|failure| failure.to_string()));
-        let wgsl = text(Language::Wgsl)
-            .map(|(bytes, entry_point)| (String::from_utf8_lossy(bytes).into_owned(), entry_point));
-        codes.insert(name.as_str(), (spirv, wgsl));
-    }
-    let krate = session.native(generated.manifest.kernels.keys())?;
-    let subjects: Vec<Subject<'_>> = krate
-        .entries
-        .iter()
-        .filter_map(|entry| {
-            let (spirv, wgsl) = codes.get(entry.kernel.name.as_str())?;
-            Some(Subject {
-                entry,
-                spirv: spirv.as_deref().map_err(Clone::clone),
-                wgsl: match wgsl {
-                    Ok((text, entry_point)) => Ok(Wgsl { text, entry_point }),
-                    Err(why) => Err(why.clone()),
-                },
-            })
-        })
-        .collect();
-
-    let progress = Progress::new(quiet);
-    progress.begin(&format!("Comparing {} kernels", subjects.len()));
-    let report = hankel_host::parity::run(&mut vulkan, &subjects, args.seed, &mut |kernel| {
-        progress.detail(kernel);
-    });
-    drop(progress);
-    if args.format == Format::Json {
-        print_json(&report);
+        (columns(&own.columns)?, required)
     } else {
-        println!("{report}");
+        // Whether there is a driver shows before the long work starts.
+        drop(VulkanDevice::new()?);
+        (Column::PLAIN.into(), Column::PLAIN.into())
+    };
+    let whole = args.matrix && args.kernels.is_empty() && own.columns.is_empty();
+    let built_in = args.source.manifest_path.is_none();
+    let known = match &own.known {
+        Some(file) => Known::read(file),
+        None if built_in => Known::parse(KNOWN),
+        None => Ok(Known::default()),
+    }
+    .map_err(|e| Failure::input(e, "Mend the list of known differences."))?;
+    let absent = match &own.absent {
+        Some(file) => {
+            let text = std::fs::read_to_string(file).map_err(|e| e.to_string());
+            let table = text.and_then(|text| Absent::parse(&text));
+            Some(table.map_err(|e| format!("{}: {e}", file.display())))
+        }
+        None if built_in => Some(Absent::parse(ABSENT)),
+        None => None,
+    }
+    .transpose()
+    .map_err(|e| Failure::input(e, "Mend the table of absent cells."))?;
+    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let options = Options {
+        shader_model: SHADER_MODEL.parse()?,
+        ..Options::default()
+    };
+    let targets: BTreeSet<Language> = columns.iter().filter_map(|c| c.language()).collect();
+    let targets = targets.into_iter().collect();
+    let request = session.request_for(args.kernels.clone(), targets, options);
+    let generated = generate(&request, &session.modules()?)?;
+    let krate = session.native(generated.manifest.kernels.keys())?;
+    let subjects = Subject::all(&generated, &krate.entries);
+
+    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
+    let this = std::env::current_exe()
+        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))?;
+    let request = Request {
+        columns,
+        seed: args.seed,
+        limit: Duration::from_secs(own.limit),
+        tools: tools(),
+        runner: vec![this.into_os_string(), OsString::from("matrix-runner")],
+        cache: cache.filter(|_| !own.no_cache && !in_ci()),
+        known,
+        absent: absent.filter(|_| whole && own.write_absent.is_none()),
+        whole,
+        required,
+    };
+    let progress = Progress::new(quiet);
+    progress.begin(&format!(
+        "Running {} kernels in {} columns",
+        subjects.len(),
+        request.columns.len()
+    ));
+    let report = hankel_matrix::run::run(&request, &subjects, &|what| progress.detail(what))
+        .map_err(|e| Failure::machine(e.to_string(), None))?;
+    drop(progress);
+    if let Some(file) = &own.write_absent {
+        write(file, Absent::of(&report).text().as_bytes())?;
+    }
+    if let Some(file) = &own.json {
+        let text = serde_json::to_string_pretty(&report)
+            .map_err(|e| Failure::machine(format!("the report has no JSON form: {e}"), None))?;
+        write(file, text.as_bytes())?;
+    }
+    if let Some(file) = &own.html {
+        write(file, hankel_matrix::html::page(&report).as_bytes())?;
+    }
+    if let Some(file) = &own.markdown {
+        write(file, report.markdown().as_bytes())?;
+    }
+    match args.format {
+        Format::Json => print_json(&report),
+        Format::Text => println!("{report}"),
     }
     Ok(Outcome::of(report.passed))
+}
+
+/// Whether this is a run of continuous integration, where results of other runs count for nothing.
+fn in_ci() -> bool {
+    std::env::var_os("CI").is_some_and(|v| v == "true" || v == "1")
+}
+
+/// A process that the matrix runs kernels in.
+pub fn serve(which: &str) -> Result<Outcome> {
+    hankel_matrix::serve(which)
+        .map(|()| Outcome::Fine)
+        .map_err(|e| Failure::machine(e, None))
+}
+
+/// Where foreign programs are looked for.
+pub fn tools() -> Tools {
+    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
+    Tools::of_cache(cache.as_deref())
+}
+
+fn columns(names: &[String]) -> Result<Vec<Column>> {
+    if names.is_empty() {
+        Ok(Column::ALL.into())
+    } else {
+        columns_named(names)
+    }
+}
+
+fn columns_named(names: &[String]) -> Result<Vec<Column>> {
+    let mut all = names
+        .iter()
+        .map(|n| n.parse::<Column>())
+        .collect::<std::result::Result<Vec<_>, _>>()
+        .map_err(|e| Failure::input(e, "Give one of these names."))?;
+    all.sort();
+    all.dedup();
+    Ok(all)
+}
+
+fn write(file: &std::path::Path, bytes: &[u8]) -> Result<()> {
+    write_whole(file, bytes).map_err(|e| Failure::machine(e.to_string(), None))
 }

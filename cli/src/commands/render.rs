@@ -56,7 +56,18 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         &[&comparison.native, &comparison.vulkan],
         Some(&comparison.difference),
     );
-    Ok(Outcome::Fine)
+    let limit = args
+        .limit
+        .map_or_else(|| comparison.limit(), |percent| percent / 100.0);
+    let share = comparison.difference.over_1;
+    if share > limit {
+        eprintln!(
+            "the pictures differ: {:.3} % of the pixels by more than 1/255, at most {:.3} % may",
+            share * 100.0,
+            limit * 100.0
+        );
+    }
+    Ok(Outcome::of(share <= limit))
 }
 
 /// `scan.png` and `vulkan` to `scan-vulkan.png`.

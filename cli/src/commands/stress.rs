@@ -176,6 +176,7 @@ impl stress::Backend for Vulkan {
             kernel,
             constants: &[],
             native: None,
+            // On purpose, pinned or not: what a driver may do with the sums is what is measured.
             shader: Some(Shader::SpirvThroughNaga(&words)),
         };
         self.dispatch(&program, uniform, elements, output)

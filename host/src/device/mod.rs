@@ -13,6 +13,7 @@
 pub mod error;
 pub mod extent;
 pub mod native;
+pub mod route;
 pub mod slots;
 pub mod vulkan;
 
@@ -25,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::{DeviceError, Result};
 pub use native::NativeDevice;
+pub use route::Arithmetic;
 pub use vulkan::VulkanDevice;
 
 /// A buffer of a device.

@@ -21,7 +21,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::device::{self, Backend, Device, Shader};
+use crate::device::{self, Backend, Device};
 use crate::scene::{Mesh, Scene};
 
 pub use error::{FrameError, Result};
@@ -31,8 +31,8 @@ pub use plan::{Omission, Pass, Plan, gaussian};
 /// Where the shaders of the built-in kernels come from, by entry-point name. The native device
 /// needs none.
 pub trait Shaders {
-    /// The shader of a kernel; `None` if there is none.
-    fn shader(&self, kernel: &str) -> Option<Shader<'_>>;
+    /// The SPIR-V of a kernel; `None` if there is none.
+    fn words(&self, kernel: &str) -> Option<&[u32]>;
 }
 
 /// No shaders: enough for [`Backend::Native`].
@@ -40,16 +40,15 @@ pub trait Shaders {
 pub struct NoShaders;
 
 impl Shaders for NoShaders {
-    fn shader(&self, _: &str) -> Option<Shader<'_>> {
+    fn words(&self, _: &str) -> Option<&[u32]> {
         None
     }
 }
 
-/// SPIR-V modules by entry-point name; naga reads them on their way to the driver.
+/// SPIR-V modules by entry-point name.
 impl Shaders for BTreeMap<String, Vec<u32>> {
-    fn shader(&self, kernel: &str) -> Option<Shader<'_>> {
-        self.get(kernel)
-            .map(|words| Shader::SpirvThroughNaga(words))
+    fn words(&self, kernel: &str) -> Option<&[u32]> {
+        self.get(kernel).map(Vec::as_slice)
     }
 }
 
@@ -126,6 +125,27 @@ pub struct Comparison {
     pub vulkan: Rendering,
     /// How they differ.
     pub difference: Difference,
+}
+
+/// Share of the pixels where rounding of the sampler's weights, of the target to half precision and
+/// of the moments to 16 bits may be seen, away from edges.
+const ROUNDED: f64 = 0.01;
+
+impl Comparison {
+    /// The share of pixels that may differ by more than 1/255 between the backends.
+    ///
+    /// A rasteriser puts vertices on a grid of 1/256 pixel, rays do not. So an edge may be half a
+    /// step and a rounding away from where the ray sees it, at most 1/256 pixel, and a sample sees
+    /// another triangle only if it lies in a strip of that half-width along the edge. A strip
+    /// crosses at most sqrt(2) of a pixel; four samples, none likelier than another to lie in it: of
+    /// the pixels with an edge, at most 4 * sqrt(2) * 2/256 = 4.4 % have such a sample. The same
+    /// happens to texels of the shadow map, where a changed sample is a quarter of one texel and the
+    /// filter spreads it: its share of the picture is counted as once more as much.
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        let edges = self.native.edges.unwrap_or(0.0);
+        2.0 * 4.0 * 2.0_f64.sqrt() * 2.0 / 256.0 * edges + ROUNDED
+    }
 }
 
 /// By how much [`compare`] amplifies the difference picture unless told otherwise.

@@ -16,8 +16,8 @@ use super::fragments::{Fragments, Varying};
 use super::plan::{Pass, Plan};
 use super::{Picture, Progress, Rendering, Shaders, Timing};
 use crate::device::{
-    self, Backend, Bind, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw,
-    Program, TextureId, TextureShape, Topology,
+    self, Arithmetic, Backend, Bind, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError,
+    Draw, Program, TextureId, TextureShape, Topology,
 };
 use crate::scene::{CameraView, DepthRange, LightView, MapFormat, Mesh, Scene, Shadow, Technique};
 
@@ -90,13 +90,48 @@ fn program<'a>(
     name: &str,
     constants: &'a [u32],
 ) -> Result<Program<'a>> {
+    let arithmetic = Arithmetic::of([&find(entries, name)?.kernel]);
+    routed(entries, shaders, backend, arithmetic, name, constants)
+}
+
+/// The two stages of a draw on Vulkan, which go the same way.
+fn stages<'a>(
+    entries: &'a [Entry],
+    shaders: &'a dyn Shaders,
+    vertex: &str,
+    fragment: &str,
+    constants: &'a [u32],
+) -> Result<[Program<'a>; 2]> {
+    let both = [
+        &find(entries, vertex)?.kernel,
+        &find(entries, fragment)?.kernel,
+    ];
+    let way = Arithmetic::of(both);
+    let vulkan = Backend::Vulkan;
+    Ok([
+        routed(entries, shaders, vulkan, way, vertex, &[])?,
+        routed(entries, shaders, vulkan, way, fragment, constants)?,
+    ])
+}
+
+fn routed<'a>(
+    entries: &'a [Entry],
+    shaders: &'a dyn Shaders,
+    backend: Backend,
+    arithmetic: Arithmetic,
+    name: &str,
+    constants: &'a [u32],
+) -> Result<Program<'a>> {
     let entry = find(entries, name)?;
     let shader = match backend {
         Backend::Native => None,
-        Backend::Vulkan => Some(shaders.shader(name).ok_or_else(|| FrameError::Kernel {
-            kernel: name.into(),
-            problem: "there is no shader of it: build the shaders first".into(),
-        })?),
+        Backend::Vulkan => {
+            let words = shaders.words(name).ok_or_else(|| FrameError::Kernel {
+                kernel: name.into(),
+                problem: "there is no shader of it: build the shaders first".into(),
+            })?;
+            Some(arithmetic.shader(words))
+        }
     };
     Ok(Program {
         kernel: &entry.kernel,
@@ -403,7 +438,7 @@ impl<'a> Frame<'a> {
         let depth = TextureShape::depth(width, height).multisampled(samples);
         let depth = self.texture("camera depth", &depth)?;
         let [r, g, b] = BACKGROUND.map(f64::from);
-        let vulkan = Backend::Vulkan;
+        let [vertex, fragment] = stages(&self.entries, self.shaders, "surface", kernel, constants)?;
         self.device
             .draw(&device::Pass {
                 label: "shade",
@@ -414,20 +449,14 @@ impl<'a> Frame<'a> {
                 }],
                 depth: Some(depth_target(depth)),
                 draws: &[Draw {
-                    vertex: program(&self.entries, self.shaders, vulkan, "surface", &[])?,
+                    vertex,
                     vertex_args: &[
                         Bind::Buffer(self.geometry.positions),
                         Bind::Buffer(self.geometry.normals),
                         Bind::Buffer(self.geometry.colours),
                         camera,
                     ],
-                    fragment: Some(program(
-                        &self.entries,
-                        self.shaders,
-                        vulkan,
-                        kernel,
-                        constants,
-                    )?),
+                    fragment: Some(fragment),
                     fragment_args: &args,
                     indices: Some(self.geometry.indices),
                     count: self.mesh.indices().len() as u32,
@@ -447,7 +476,6 @@ impl<'a> Frame<'a> {
         constants: &[u32],
         camera: Bind<'_>,
     ) -> Result<Shaded> {
-        let during = failed("shade");
         let lens = Lens::new(self.camera.clip_from_world, size[0], size[1]);
         let Some(caster) = &self.caster else {
             return Err(no_caster());
@@ -463,8 +491,7 @@ impl<'a> Frame<'a> {
         let fragment = find(&self.entries, kernel)?.kernel.clone();
         let varyings = varyings(&surface, &fragment, &vertices)?;
         let values = fragments.interpolate(self.mesh, &lens, &varyings);
-        let shaded = self.run_over(kernel, constants, &values, args, fragments.count());
-        let shaded = shaded.map_err(during)?;
+        let shaded = self.run_over(kernel, constants, &values, args, fragments.count())?;
         let colours: Vec<Vec4> = bytemuck::pod_collect_to_vec(&shaded);
         Ok(Shaded::Here(resolve(&fragments, &colours)))
     }
@@ -477,29 +504,30 @@ impl<'a> Frame<'a> {
         varyings: &[Vec<f32>],
         args: &[Bind<'_>],
         count: usize,
-    ) -> device::Result<Vec<u8>> {
-        let target = self.device.buffer("target", count * size_of::<Vec4>())?;
+    ) -> Result<Vec<u8>> {
+        let entry = find(&self.entries, kernel)?;
+        let target = self
+            .device
+            .buffer("target", count * size_of::<Vec4>())
+            .map_err(failed("shade"))?;
         let mut all: Vec<Bind<'_>> = varyings
             .iter()
             .map(|v| Bind::Bytes(cast_slice(v)))
             .collect();
         all.extend_from_slice(args);
         all.push(Bind::Buffer(target));
-        let done = match find(&self.entries, kernel) {
-            Ok(entry) => self.device.dispatch(
-                &Program {
-                    kernel: &entry.kernel,
-                    constants,
-                    native: Some(&entry.run),
-                    shader: None,
-                },
-                &all,
-            ),
-            Err(_) => Ok(()),
+        let program = Program {
+            kernel: &entry.kernel,
+            constants,
+            native: Some(&entry.run),
+            shader: None,
         };
+        let done = self.device.dispatch(&program, &all);
         let bytes = done.and_then(|()| self.device.read_buffer(target));
-        self.device.free_buffer(target)?;
-        bytes
+        let freed = self.device.free_buffer(target);
+        let bytes = bytes.map_err(failed("shade"))?;
+        freed.map_err(failed("shade"))?;
+        Ok(bytes)
     }
 
     /// Runs a vertex kernel natively over all vertices: the bytes of each of its outputs. `uniforms`

@@ -5,7 +5,7 @@
 //! 1. a range in its field's documentation, `[0, 1]` or `from 0 to 1`;
 //! 2. its name, see [`values::by_name`];
 //! 3. its type: floats lie in [-1, 1]; a `u32` of a uniform in 0..=8 (counts and radii), elsewhere
-//!    anywhere.
+//!    anywhere, 0, 1, -1 and the extremes among them.
 //!
 //! Integers keep to their ranges in every class: they are counts and indices, and what lies
 //! beyond is a mistake of the caller, not an input.
@@ -330,4 +330,29 @@ pub fn of_invocation(kernel: &Kernel, case: &Case, invocation: usize) -> Vec<(St
         }
     }
     all
+}
+
+/// Whether a case's arguments hold only finite numbers.
+#[must_use]
+pub fn is_finite(kernel: &Kernel, case: &Case) -> bool {
+    slots::slots(kernel)
+        .iter()
+        .zip(&case.args)
+        .all(|(slot, arg)| {
+            let (Input::Bytes(bytes), Some(stride)) = (arg, slot.role.element_bytes()) else {
+                return true;
+            };
+            let leaves = match slot.role {
+                Use::Uniform(l) | Use::Element(l) | Use::Storage(l) => flat::leaves(l),
+                Use::Attribute(_, ty) | Use::Varying(_, ty) => flat::type_leaves(ty),
+                _ => return true,
+            };
+            bytes.chunks_exact(stride).all(|e| {
+                leaves.iter().all(|l| {
+                    flat::Number::read(l.scalar, &e[l.offset..])
+                        .to_f64()
+                        .is_finite()
+                })
+            })
+        })
 }

@@ -260,10 +260,17 @@ impl Values {
             Scalar::I32 => (i32::MIN.into(), i32::MAX.into()),
             _ => (0, u32::MAX.into()),
         });
-        let value = match (self.class, self.rng.u32(..4)) {
-            (Class::Edge | Class::Hostile, 0) => a,
-            (Class::Edge | Class::Hostile, 1) => b,
-            _ => self.rng.i64(a..=b.max(a)),
+        let b = b.max(a);
+        // The ends, 0, 1, -1 and their neighbours come often: divisors and masks are made of them.
+        let special = match self.class {
+            Class::Ordinary => 4,
+            Class::Edge | Class::Hostile => 2,
+        };
+        let value = if self.rng.u32(..special) == 0 {
+            let some = [a, b, 0, 1, -1, 2, a.saturating_add(1), b.saturating_sub(1)];
+            some[self.rng.usize(..some.len())].clamp(a, b)
+        } else {
+            self.rng.i64(a..=b)
         };
         match scalar {
             Scalar::I32 => Number::I32(value.clamp(i32::MIN.into(), i32::MAX.into()) as i32),
@@ -353,6 +360,22 @@ mod tests {
                 assert!(b[1] - b[0] * b[0] > -1e-12, "{b:?}");
                 assert!(b[3] - b[1] * b[1] > -1e-12, "{b:?}");
                 assert!(b.iter().all(|x| x.abs() <= 1.0 + 1e-9), "{b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn integers_meet_zero_one_minus_one_and_the_extremes() {
+        for class in Class::ALL {
+            let leaves = [leaf("i", Scalar::I32, 0, ""), leaf("u", Scalar::U32, 4, "")];
+            let bytes = values(class).elements("p", &leaves, 8, 4099, false);
+            let all: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+            let (i, u): (Vec<_>, Vec<_>) = all.chunks(2).map(|e| (e[0] as i32, e[1])).unzip();
+            for wanted in [0, 1, -1, i32::MIN, i32::MAX] {
+                assert!(i.contains(&wanted), "{class}: {wanted}");
+            }
+            for wanted in [0, 1, u32::MAX] {
+                assert!(u.contains(&wanted), "{class}: {wanted}");
             }
         }
     }

@@ -7,8 +7,8 @@ use hankel_dsl::native::describe::{
 use super::capture;
 use crate::device::slots::{self, Slot, Use};
 use crate::device::{
-    Bind, BufferId, Colour, Cull, Device, DeviceError, Draw, Pass, Program, Shader, TextureId,
-    TextureShape, Topology,
+    Arithmetic, Bind, BufferId, Colour, Cull, Device, DeviceError, Draw, Pass, Program, Shader,
+    TextureId, TextureShape, Topology,
 };
 use crate::inputs::{Case, Input};
 
@@ -129,17 +129,9 @@ fn upload<'a>(
     Ok(binds)
 }
 
-/// What a driver may do with the arithmetic of code that naga wrote.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Arithmetic {
-    /// Nothing: it is forbidden to fuse, factor and reorder ([`super::translate`]).
-    Pinned,
-    /// What it does anywhere: the code reaches it as wgpu hands it over.
-    Free,
-}
-
 /// Runs a case on Vulkan, whatever its stage: vertices and fragments are drawn as points, each in
-/// a pixel of its own.
+/// a pixel of its own. What naga wrote of a kernel that is not free in its rounding is pinned
+/// behind naga ([`super::translate`]).
 ///
 /// # Errors
 /// The device's, and [`ExecuteError::Stage`] for an interface that targets cannot hold.
@@ -147,9 +139,9 @@ pub fn on_vulkan(
     device: &mut dyn Device,
     program: &Program<'_>,
     case: &Case,
-    arithmetic: Arithmetic,
 ) -> Result<Written, ExecuteError> {
     let kernel = program.kernel;
+    let arithmetic = Arithmetic::of([kernel]);
     // A vertex stage is rewritten as SPIR-V to be read back.
     let as_it_is = arithmetic == Arithmetic::Free && kernel.stage != Stage::Vertex;
     let translated = match program.shader {

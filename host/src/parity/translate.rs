@@ -8,7 +8,7 @@ use naga::back::pipeline_constants::process_overrides;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use super::execute::Arithmetic;
+use crate::device::Arithmetic;
 use crate::device::vulkan::words;
 
 /// SPIR-V read and written anew by naga, with its specialisation constants at their defaults.

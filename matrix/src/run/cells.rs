@@ -14,6 +14,7 @@ use super::permits::{Permits, locked};
 use super::reference::Ready;
 use crate::cache::Cache;
 use crate::column::Column;
+use crate::machine::Machine;
 use crate::process::Failure;
 use crate::report::{Cell, Outcome};
 use crate::subject::Code;
@@ -63,9 +64,8 @@ impl<'a> Shared<'a> {
     pub(super) fn settle(&self, column: Column, row: usize, it: &'a Ready<'a>) -> Settled<'a> {
         let unrun = |outcome| Settled::Cell(Box::new(Cell::unrun(outcome)));
         if let Err(problem) = &it.reference {
-            let message = format!("the native scalar run fails: {problem}");
-            return unrun(Outcome::Foreign {
-                failure: Failure::refused(message),
+            return unrun(Outcome::NoReference {
+                problem: problem.clone(),
             });
         }
         let Some(language) = column.language() else {
@@ -104,16 +104,18 @@ impl<'a> Shared<'a> {
         if let Some(what) = rules::lacking(it.kernel(), column) {
             return unrun(Outcome::Lacking { what });
         }
-        match self.cache.get(&self.key(column, it, code)) {
+        let key = self.key(column, it, code);
+        match key.and_then(|key| self.cache.get(&key)) {
             Some(cell) => Settled::Cached(Box::new(cell)),
             None => Settled::Run(Unit { row, it, code }),
         }
     }
 
-    fn key(&self, column: Column, it: &Ready<'_>, code: &Code) -> String {
+    fn key(&self, column: Column, it: &Ready<'_>, code: &Code) -> Option<String> {
         let versions: Vec<&Status> = column.statuses(self.tools).collect();
         self.cache.key(&(
             column,
+            Machine::this(),
             it.kernel(),
             sha256(&code.bytes),
             &code.entry_point,
@@ -151,8 +153,8 @@ impl<'a> Shared<'a> {
                 cell.outcome,
                 Outcome::Passed | Outcome::Differs | Outcome::Lacking { .. }
             );
-            if ran {
-                self.cache.put(&self.key(column, unit.it, unit.code), &cell);
+            if let Some(key) = self.key(column, unit.it, unit.code).filter(|_| ran) {
+                self.cache.put(&key, &cell);
             }
             found.push((unit.row, cell));
             let left = {

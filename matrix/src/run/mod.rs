@@ -16,6 +16,7 @@ use hankel_dsl::native::describe::Stage;
 use hankel_host::parity::numbers::Numbers;
 use rayon::prelude::*;
 
+use crate::absent::Absent;
 use crate::cache::Cache;
 use crate::column::Column;
 use crate::known::Known;
@@ -44,6 +45,8 @@ pub struct Request {
     pub cache: Option<PathBuf>,
     /// Known differences.
     pub known: Known,
+    /// Cells that are known not to run; none where that is not to be compared.
+    pub absent: Option<Absent>,
     /// All kernels of the crate are there, and all columns.
     pub whole: bool,
     /// Columns that must run: one that is not installed is a complaint.
@@ -173,7 +176,7 @@ pub fn run(
                 device: devices
                     .get(&column)
                     .cloned()
-                    .or_else(|| cache.get(&cache.device_key(column, &tools))),
+                    .or_else(|| cache.get(&cache.device_key(column, &tools)?)),
             })
             .collect(),
         kernels: ready
@@ -188,9 +191,15 @@ pub fn run(
         passed: false,
     };
     for (column, device) in &devices {
-        cache.put(&cache.device_key(*column, &tools), device);
+        if let Some(key) = cache.device_key(*column, &tools) {
+            cache.put(&key, device);
+        }
     }
     complain(request, &mut report);
+    if let Some(absent) = &request.absent {
+        let differences = absent.differences(&report);
+        report.complaints.extend(differences);
+    }
     request.known.apply(&mut report, request.whole);
     report.passed = report.complaints.is_empty()
         && report

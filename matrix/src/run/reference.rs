@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use hankel_codegen::files::sha256;
 use hankel_dsl::native::Mode;
 use hankel_dsl::native::describe::Kernel;
-use hankel_host::device::NativeDevice;
+use hankel_host::device::{DeviceError, NativeDevice};
+use hankel_host::inputs::Case;
 use hankel_host::parity::execute::{self, Written};
+use hankel_host::parity::panics;
 use rayon::prelude::*;
 
 use super::Request;
@@ -61,15 +63,19 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
     let inputs = work.join(format!("{}.inputs", kernel.name));
     let prepared = Prepared::new(kernel, request.seed, &inputs)?;
     let program = subject.entry.program(None, &[]);
+    let run = |mode: Mode, case: &Case| {
+        execute::dispatch(&mut NativeDevice::with_mode(mode), &program, case)
+    };
     let natively = |mode: Mode| -> Result<Vec<Written>, String> {
-        let mut device = NativeDevice::with_mode(mode);
+        let explained = |case: &Case, error: DeviceError| {
+            let at = panics::culprit(kernel, case, |shorter| run(mode, shorter).is_err());
+            let at = at.map_or_else(String::new, |at| format!("; {at}"));
+            format!("{} inputs: {error}{at}", case.class)
+        };
         prepared
             .cases
             .iter()
-            .map(|case| {
-                execute::dispatch(&mut device, &program, case)
-                    .map_err(|e| format!("{} inputs: {e}", case.class))
-            })
+            .map(|case| run(mode, case).map_err(|e| explained(case, e)))
             .collect()
     };
     let reference = natively(Mode::REFERENCE);

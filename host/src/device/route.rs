@@ -1,0 +1,38 @@
+//! How a kernel's SPIR-V reaches a Vulkan driver. What the kernel's description says of rounding
+//! decides, here and nowhere else: whoever runs a kernel on Vulkan asks [`Arithmetic::of`].
+
+use hankel_dsl::native::describe::Kernel;
+
+use super::Shader;
+
+/// What a driver may do with float arithmetic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// Contract, factor and reorder it.
+    Free,
+    /// Nothing of that. Only SPIR-V that reaches the driver as it is can ask for it: naga drops
+    /// `NoContraction`.
+    Pinned,
+}
+
+impl Arithmetic {
+    /// What `kernels`, which are part of one pipeline, allow: the strictest of them decides, since
+    /// wgpu wants both stages of a draw by the same way.
+    pub fn of<'a>(kernels: impl IntoIterator<Item = &'a Kernel>) -> Self {
+        let pinned = |kernel: &Kernel| kernel.pinned || kernel.exact;
+        if kernels.into_iter().any(pinned) {
+            Self::Pinned
+        } else {
+            Self::Free
+        }
+    }
+
+    /// The way that keeps it.
+    #[must_use]
+    pub const fn shader(self, spirv: &[u32]) -> Shader<'_> {
+        match self {
+            Self::Free => Shader::SpirvThroughNaga(spirv),
+            Self::Pinned => Shader::SpirvPassthrough(spirv),
+        }
+    }
+}
