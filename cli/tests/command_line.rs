@@ -479,7 +479,7 @@ fn a_linear_programme_judges_a_table() {
         .skip(1)
         .filter_map(|l| l.split(',').next()?.parse().ok())
         .collect();
-    assert_eq!(text.lines().next(), Some("lower,upper,margin"));
+    assert_eq!(text.lines().next(), Some("lower,upper,margin,residual"));
     assert!(
         (lower[0] - 0.64).abs() < 1e-9 && (lower[1] - 1.28).abs() < 1e-9,
         "{text}"

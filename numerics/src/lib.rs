@@ -7,6 +7,7 @@ pub mod families;
 pub mod judge;
 pub mod numbers;
 pub mod peer;
+pub mod published;
 pub mod report;
 pub mod speed;
 pub mod stress;

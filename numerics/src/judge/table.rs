@@ -57,8 +57,8 @@ struct Row {
 }
 
 /// Judges each row of a CSV table with columns `m0`, `m1`, … (as many as the judge has functions,
-/// and one) and `z`, in any order, and writes a table with the columns `lower`, `upper` and
-/// `margin`; gives the number of rows. `progress` gets the number of rows done so far, now and then.
+/// and one) and `z`, in any order, and writes a table with the columns `lower`, `upper`, `margin` and
+/// `residual`; gives the number of rows. `progress` gets the number of rows done so far, now and then.
 ///
 /// # Errors
 /// [`TableError`], which names the row for moments that no distribution has. Then no output is
@@ -97,7 +97,7 @@ pub fn table(
     let temporary = temporary(folder).map_err(|e| unwritable(&e))?;
     let mut writer = csv::Writer::from_writer(BufWriter::new(temporary));
     writer
-        .write_record(["lower", "upper", "margin"])
+        .write_record(["lower", "upper", "margin", "residual"])
         .map_err(|e| unwritable(&e))?;
 
     let mut done = 0;
@@ -127,7 +127,10 @@ pub fn table(
                 problem: error.to_string(),
             })?;
             writer
-                .write_record([judged.lower, judged.upper, judged.margin].map(|x| x.to_string()))
+                .write_record(
+                    [judged.lower, judged.upper, judged.margin, judged.residual]
+                        .map(|x| x.to_string()),
+                )
                 .map_err(|e| unwritable(&e))?;
         }
         progress(done);
