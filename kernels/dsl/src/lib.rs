@@ -62,7 +62,7 @@ mod texture;
 mod unroll;
 
 pub use glam;
-pub use hankel_macros::{Element, kernel, kernels};
+pub use hankel_macros::{Element, function, kernel, kernels, library};
 pub use memory::{Atomics, Buffer, Group};
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]
