@@ -23,6 +23,7 @@ pub mod diagnostics;
 mod error;
 pub mod files;
 pub mod finish;
+pub mod functions;
 pub mod headers;
 mod language;
 pub mod lint;
