@@ -264,6 +264,11 @@ fn built_in() -> KernelCrate {
     KernelCrate::from_entries(hankel_embedded::CRATE_NAME, hankel_shadows::entries())
 }
 
+/// The built-in crate's Cargo.toml, inside a checkout.
+pub fn built_in_manifest() -> Option<PathBuf> {
+    checkout().map(|root| root.join(BUILT_IN))
+}
+
 /// The checkout that the present folder belongs to.
 fn checkout() -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;

@@ -58,6 +58,52 @@ fn main() {
         );
     }
     code.push_str("];\n");
+    code.push_str(&texts(&sources));
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     std::fs::write(out.join("files.rs"), code).expect("OUT_DIR can be written");
+}
+
+/// The sources themselves: what libraries of functions are translated from.
+fn texts(sources: &source_hash::Sources) -> String {
+    let mut code = String::from(
+        "/// The sources of the built-in kernel crate, and of what it depends on by path.\n\
+         pub static SOURCES: &[Source] = &[\n",
+    );
+    for folder in &sources.folders {
+        let [name, version, licence] = ["name", "version", "license"].map(|key| field(folder, key));
+        let _ = writeln!(
+            code,
+            "    Source {{ name: {name:?}, version: {version:?}, licence: {licence:?}, files: &["
+        );
+        let own = sources.files.iter().filter_map(|file| {
+            let relative = file.strip_prefix(folder).ok()?;
+            let is_source = relative.extension()? == "rs" && relative.starts_with("src");
+            is_source.then(|| (relative.display().to_string().replace('\\', "/"), file))
+        });
+        for (relative, file) in own {
+            let path = file.display().to_string();
+            let _ = writeln!(code, "        ({relative:?}, include_str!({path:?})),");
+        }
+        code.push_str("    ] },\n");
+    }
+    code.push_str("];\n");
+    code
+}
+
+/// A field of a Cargo.toml, or of its workspace's.
+fn field(folder: &std::path::Path, key: &str) -> String {
+    let table = |folder: &std::path::Path| -> Option<toml::Table> {
+        std::fs::read_to_string(folder.join("Cargo.toml"))
+            .ok()?
+            .parse()
+            .ok()
+    };
+    let own = table(folder).and_then(|t| Some(t.get("package")?.get(key)?.as_str()?.to_owned()));
+    own.or_else(|| {
+        folder.ancestors().skip(1).find_map(|above| {
+            let workspace = table(above)?.get("workspace")?.clone();
+            Some(workspace.get("package")?.get(key)?.as_str()?.to_owned())
+        })
+    })
+    .unwrap_or_default()
 }

@@ -2,12 +2,17 @@ use std::cell::RefCell;
 
 use hankel_codegen::build::build;
 
-use super::print_json;
-use crate::args::{Build, Format};
+use super::{functions, print_json};
+use crate::args::{Build, Form, Format};
 use crate::failure::{Outcome, Result};
 use crate::session::Session;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
+    if args.form == Form::Functions {
+        let manifest = args.generate.source.manifest_path.as_deref();
+        let (prefix, out) = (&args.prefix, &args.out);
+        return functions::build(manifest, prefix, out, args.force, args.format, quiet);
+    }
     let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
     let request = session.request(&args.generate)?;
     // `build` knows codegen's errors only: one of this crate's waits here meanwhile.
