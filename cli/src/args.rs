@@ -109,12 +109,22 @@ Examples:
   hankel build --out shaders --target hlsl --shader-model 5.1 --kernel 'shade_*'
   hankel build --out shaders --set encoding=1 --kernel shade_hamburger
   hankel build --out shaders --manifest-path my-kernels/Cargo.toml
+  hankel build --form functions --out libraries
 
 The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. Files that are right already
-are left alone. A build that was stopped is finished by the next one.")]
+are left alone. A build that was stopped is finished by the next one.
+
+With --form functions it gets FORM/PREFIX_LIBRARY.EXTENSION, libraries of functions to include and call,
+and functions.json, for each form: wgsl, naga-oil, wesl, hlsl, glsl, godot, msl, slang, c, rust.")]
 pub struct Build {
     #[command(flatten)]
     pub generate: Generate,
+    /// What is generated: shaders with entry points, or libraries of functions.
+    #[arg(long, value_enum, default_value_t)]
+    pub form: Form,
+    /// What the names of a library begin with.
+    #[arg(long, value_name = "NAME", default_value = "hankel")]
+    pub prefix: String,
     /// Folder for what is generated.
     #[arg(long, value_name = "FOLDER", default_value = "shaders")]
     pub out: PathBuf,
@@ -132,6 +142,16 @@ pub struct Build {
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
+}
+
+/// What is generated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Form {
+    /// Shaders with entry points.
+    #[default]
+    Kernels,
+    /// Libraries of functions.
+    Functions,
 }
 
 #[derive(Debug, Args)]

@@ -122,7 +122,10 @@ impl From<codegen::Error> for Failure {
             | E::NoEntryPoint { .. }
             | E::Kernel(_)
             | E::Kernels(_) => Blame::Kernel,
-            E::DuplicateKernel { .. } | E::DuplicateLayout { .. } => Blame::Kernel,
+            E::DuplicateKernel { .. }
+            | E::DuplicateLayout { .. }
+            | E::Function(_)
+            | E::Api { .. } => Blame::Kernel,
             E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } | E::Busy { .. } => {
                 Blame::Machine
             }

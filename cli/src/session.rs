@@ -348,6 +348,11 @@ fn folder_of(manifest: &Path) -> &Path {
     }
 }
 
+/// The built-in crate's Cargo.toml, inside a checkout.
+pub fn built_in_manifest() -> Option<PathBuf> {
+    checkout().map(|root| root.join(BUILT_IN))
+}
+
 /// The checkout that the present folder belongs to.
 fn checkout() -> Option<PathBuf> {
     let here = std::env::current_dir().ok()?;

@@ -74,6 +74,7 @@ fn main() {
         );
     }
     code.push_str("];\n");
+    code.push_str(&texts(root));
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     std::fs::write(out.join("files.rs"), code).expect("OUT_DIR can be written");
 }
@@ -85,15 +86,11 @@ fn sources(root: &Path) -> Names {
     names
         .files
         .extend(["Cargo.toml".into(), "Cargo.lock".into()]);
-    let kernels = root.join("kernels");
-    for entry in std::fs::read_dir(&kernels).expect("kernels/ can be read") {
-        let entry = entry.expect("kernels/ can be read");
-        if entry.path().join("Cargo.toml").is_file() {
-            let name = format!("kernels/{}", entry.file_name().to_string_lossy());
-            names.files.insert(format!("{name}/Cargo.toml"));
-            names.files.insert(format!("{name}/build.rs"));
-            names.folders.insert(format!("{name}/src"));
-        }
+    for folder in crates(root) {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        names.files.insert(format!("kernels/{name}/Cargo.toml"));
+        names.files.insert(format!("kernels/{name}/build.rs"));
+        names.folders.insert(format!("kernels/{name}/src"));
     }
     names
 }
@@ -108,4 +105,74 @@ fn watch(inputs: &Inputs, folder: &Path) {
     for name in inputs.environment.keys() {
         println!("cargo::rerun-if-env-changed={name}");
     }
+}
+
+/// The sources themselves: what libraries of functions are translated from.
+fn texts(root: &Path) -> String {
+    let mut code = String::from(
+        "/// The sources of the built-in kernel crate, and of the other crates of kernels.\n\
+         pub static TEXTS: &[Source] = &[\n",
+    );
+    for folder in crates(root) {
+        let [name, version, licence] =
+            ["name", "version", "license"].map(|key| field(&folder, key));
+        let _ = writeln!(
+            code,
+            "    Source {{ name: {name:?}, version: {version:?}, licence: {licence:?}, files: &["
+        );
+        let mut files = Vec::new();
+        list(&folder.join("src"), &mut files);
+        files.sort();
+        for file in files {
+            let relative = file.strip_prefix(&folder).expect("it lies in the folder");
+            let (name, path) = (relative.display().to_string(), file.display().to_string());
+            let _ = writeln!(
+                code,
+                "        ({:?}, include_str!({path:?})),",
+                name.replace('\\', "/")
+            );
+        }
+        code.push_str("    ] },\n");
+    }
+    code.push_str("];\n");
+    code
+}
+
+/// Every `.rs` file below a folder.
+fn list(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("sources can be read") {
+        let path = entry.expect("sources can be read").path();
+        if path.is_dir() {
+            list(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The crates in `kernels/`.
+fn crates(root: &Path) -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> = std::fs::read_dir(root.join("kernels"))
+        .expect("kernels/ can be read")
+        .map(|entry| entry.expect("kernels/ can be read").path())
+        .filter(|folder| folder.join("Cargo.toml").is_file())
+        .collect();
+    all.sort();
+    all
+}
+
+/// A field of a Cargo.toml, or of its workspace's.
+fn field(folder: &Path, key: &str) -> String {
+    let table = |folder: &Path| -> Option<toml::Table> {
+        std::fs::read_to_string(folder.join("Cargo.toml")).ok()?.parse().ok()
+    };
+    let own = table(folder)
+        .and_then(|t| Some(t.get("package")?.get(key)?.as_str()?.to_owned()));
+    own.or_else(|| {
+        folder.ancestors().skip(1).find_map(|above| {
+            let workspace = table(above)?.get("workspace")?.clone();
+            Some(workspace.get("package")?.get(key)?.as_str()?.to_owned())
+        })
+    })
+    .unwrap_or_default()
 }

@@ -264,6 +264,25 @@ pub enum Error {
         /// What is wrong.
         problem: String,
     },
+    /// A function of a library has no form in other languages.
+    #[error("{0}")]
+    Function(#[from] crate::functions::Refusal),
+    /// A library's signatures changed, and its number did not.
+    #[error("library `{library}` has API {api} as before, but its signatures changed: {}", changes.join("; "))]
+    Api {
+        /// The library.
+        library: String,
+        /// Its number.
+        api: u32,
+        /// What changed.
+        changes: Vec<String>,
+    },
+    /// A crate without libraries.
+    #[error("`{name}` has no library of functions")]
+    NoLibrary {
+        /// The crate.
+        name: String,
+    },
     /// A crate cannot be made there.
     #[error("cannot make a kernel crate in {}: {problem}", path.display())]
     Scaffold {
@@ -327,6 +346,16 @@ impl Error {
                 "`hankel toolchain status` says which compiler is used and what is missing.".into()
             }
             Self::UnknownConstant { .. } => "Give the constant's name in the kernel.".into(),
+            Self::Function(_) => {
+                "Write it in the part of Rust that `#[function]`'s documentation names.".into()
+            }
+            Self::Api { api, .. } => {
+                format!(
+                    "Say `api: {}` in its `library!`, so that its users see it.",
+                    api + 1
+                )
+            }
+            Self::NoLibrary { .. } => "Name its functions in a `hankel_dsl::library!`.".into(),
             Self::Io { .. }
             | Self::NotAFile { .. }
             | Self::UnknownTarget { .. }

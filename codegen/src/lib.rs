@@ -26,6 +26,7 @@ pub mod finish;
 pub mod finished;
 mod folder;
 mod gather;
+pub mod functions;
 pub mod headers;
 pub mod inputs;
 mod language;

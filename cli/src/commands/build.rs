@@ -6,14 +6,19 @@ use hankel_codegen::Language;
 use hankel_codegen::build::{MANIFEST_FILE, build, check_output};
 use hankel_codegen::files::write_whole;
 
-use super::print_json;
-use crate::args::{Build, Format};
+use super::{functions, print_json};
+use crate::args::{Build, Form, Format};
 use crate::depfile;
 use crate::failure::{Failure, Outcome, Result};
 use crate::session::Session;
 use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
+    if args.form == Form::Functions {
+        let manifest = args.generate.source.manifest_path.as_deref();
+        let (prefix, out) = (&args.prefix, &args.out);
+        return functions::build(manifest, prefix, out, args.force, args.format, quiet);
+    }
     if args.watch {
         return watch(args, quiet);
     }

@@ -3,7 +3,7 @@ use std::path::Path;
 use hankel_codegen::build::generate;
 use hankel_codegen::check::{Config, check};
 
-use super::print_json;
+use super::{functions, print_json};
 use crate::args::{Check, Format};
 use crate::failure::{Failure, Outcome, Result};
 use crate::session::Session;
@@ -22,6 +22,10 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
             format!("{}: {problem}", args.folder.display()),
             "Give the folder that `hankel build --out` made and that is committed.",
         ));
+    }
+    if let Some(record) = hankel_codegen::functions::folder::read(&args.folder) {
+        let manifest = args.generate.source.manifest_path.as_deref();
+        return functions::check(manifest, &record.prefix, &args.folder, args.format, quiet);
     }
     let budget = match &args.budget {
         Some(file) => Config::read(file)?.budget,

@@ -6,6 +6,7 @@ pub mod check;
 pub mod completions;
 pub mod doctor;
 pub mod eval;
+pub mod functions;
 pub mod judge;
 pub mod list;
 pub mod new;

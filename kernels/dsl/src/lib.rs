@@ -67,7 +67,7 @@ mod workgroup;
 
 pub use atomics::{AtomicInteger, Atomics};
 pub use glam;
-pub use hankel_macros::{Element, cooperative, kernel, kernels};
+pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
 pub use memory::Buffer;
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]

@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "documented where hankel-dsl re-exports them")]
 
 mod element;
+mod function;
 mod general;
 mod host;
 mod kernel;
@@ -151,4 +152,34 @@ pub fn derive_element(item: TokenStream) -> TokenStream {
 pub fn kernels(input: TokenStream) -> TokenStream {
     let list = parse_macro_input!(input as list::List);
     list.expand().into()
+}
+
+/// Lets a function be in a [`library!`](macro@library): a text of it, in every language, that an engine
+/// includes and calls.
+///
+/// The function takes and gives scalars (`f32`, `u32`, `i32`, `bool`), glam's vectors, structures of
+/// these, and `impl Fn(…) -> …` for what the engine looks up itself; where it is generic over
+/// `R: Real`, the texts are of `f32`. Its body is written in a part of Rust that has a form in every
+/// language; `hankel build --form functions` refuses the rest with file, line and reason:
+///
+/// - `let` with patterns, assignments, `if`, `match` on what is known, blocks, closures;
+/// - arithmetic, comparisons, the methods of `Real`, conversions that lose nothing, bits of `u32`;
+/// - structures, tuples and arrays, indexed by what is known; methods and functions of any crate whose
+///   sources are at hand, which are put in place unless they have `#[function]`, too;
+/// - `unroll!` and `while i < end { …; i += 1; }`; macros of one's own.
+#[proc_macro_attribute]
+pub fn function(args: TokenStream, item: TokenStream) -> TokenStream {
+    let item = parse_macro_input!(item as syn::ItemFn);
+    function::function(&args.into(), &item)
+        .unwrap_or_else(|e| e.to_compile_error())
+        .into()
+}
+
+/// Names the functions and constants of a library of functions:
+/// `library!(shadows { api: 1, functions: [bounds::hamburger_bound], constants: [LEAST] });`. `api`
+/// rises when a signature changes, and `hankel check` fails if it does not.
+#[proc_macro]
+pub fn library(input: TokenStream) -> TokenStream {
+    let library = parse_macro_input!(input as function::Library);
+    library.expand().into()
 }

@@ -14,6 +14,7 @@ pub mod blur;
 pub mod bounds;
 pub mod depth;
 mod grid;
+pub mod library;
 pub mod moment_bounds;
 pub mod points;
 pub mod quantize;

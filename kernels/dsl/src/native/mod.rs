@@ -5,6 +5,7 @@ pub mod call;
 pub mod describe;
 #[doc(hidden)]
 pub mod exec;
+pub mod function;
 #[doc(hidden)]
 pub mod lanes;
 pub mod layout;

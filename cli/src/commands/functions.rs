@@ -1,0 +1,103 @@
+//! Libraries of functions: `hankel build --form functions`, and `hankel check` of such a folder.
+
+use std::path::Path;
+
+use hankel_codegen::Error;
+use hankel_codegen::functions::folder::Folder;
+use hankel_codegen::functions::source::CrateText;
+use hankel_codegen::functions::{crates, read};
+
+use super::print_json;
+use crate::args::Format;
+use crate::failure::{Failure, Outcome, Result};
+use crate::session::built_in_manifest;
+
+/// Translates the libraries of the crate at `manifest`, or of the built-in one. No kernel is
+/// compiled for it.
+fn folder(manifest: Option<&Path>, prefix: &str) -> Result<Folder> {
+    let manifest = match manifest {
+        Some(path) if path.is_dir() => Some(path.join("Cargo.toml")),
+        Some(path) => Some(path.to_owned()),
+        None => built_in_manifest(),
+    };
+    let texts = match manifest {
+        Some(manifest) => from_disk(&manifest)?,
+        None => embedded(),
+    };
+    let sha256 = crates::hash(&texts);
+    let libraries = read(&texts).map_err(Error::from)?;
+    if libraries.is_empty() {
+        let name = texts.first().map(|t| t.name.clone()).unwrap_or_default();
+        return Err(Error::NoLibrary { name }.into());
+    }
+    Ok(Folder::new(&libraries, prefix, &sha256)?)
+}
+
+fn from_disk(manifest: &Path) -> Result<Vec<CrateText>> {
+    if !manifest.is_file() {
+        return Err(Failure::input(
+            format!("{}: there is no such file", manifest.display()),
+            "Give the path of a kernel crate's Cargo.toml.",
+        ));
+    }
+    Ok(crates::texts(manifest)?)
+}
+
+/// The built-in crate's sources, as this program was compiled with them.
+fn embedded() -> Vec<CrateText> {
+    let own = |krate: &hankel_embedded::Source| CrateText {
+        name: krate.name.into(),
+        version: krate.version.into(),
+        licence: krate.licence.into(),
+        files: krate
+            .files
+            .iter()
+            .map(|(path, text)| ((*path).to_owned(), (*text).to_owned()))
+            .collect(),
+    };
+    let mut all: Vec<CrateText> = hankel_embedded::TEXTS.iter().map(own).collect();
+    all.sort_by_key(|krate| krate.name != hankel_embedded::CRATE_NAME);
+    all
+}
+
+/// Writes the libraries.
+pub fn build(
+    manifest: Option<&Path>,
+    prefix: &str,
+    out: &Path,
+    force: bool,
+    format: Format,
+    quiet: bool,
+) -> Result<Outcome> {
+    let report = folder(manifest, prefix)?.write(out, force)?;
+    if format == Format::Json {
+        print_json(&report);
+    } else if !quiet {
+        println!(
+            "{}: {} functions, {} files written, {} unchanged, {} removed",
+            out.display(),
+            report.functions,
+            report.written.len(),
+            report.unchanged,
+            report.removed.len()
+        );
+    }
+    Ok(Outcome::Fine)
+}
+
+/// Compares a committed folder of libraries with its sources.
+pub fn check(
+    manifest: Option<&Path>,
+    prefix: &str,
+    committed: &Path,
+    format: Format,
+    quiet: bool,
+) -> Result<Outcome> {
+    let differences = folder(manifest, prefix)?.check(committed)?;
+    if format == Format::Json {
+        print_json(&differences);
+    } else if !quiet || !differences.is_fine() {
+        println!("{differences}");
+    }
+    Ok(Outcome::of(differences.is_fine()))
+}

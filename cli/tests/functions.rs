@@ -1,0 +1,85 @@
+//! Libraries of functions from the command line.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn hankel(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hankel"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("hankel starts")
+}
+
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().expect("cli/ lies in the root").to_owned()
+}
+
+#[test]
+fn libraries_are_built_and_checked_inside_a_checkout_and_outside() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let out = elsewhere.path().join("libraries");
+    let out = out.to_str().unwrap();
+    // Outside, from the sources that are in the program.
+    let built = hankel(
+        &["build", "--form", "functions", "--out", out],
+        elsewhere.path(),
+    );
+    let words = String::from_utf8_lossy(&built.stdout).into_owned();
+    assert!(
+        built.status.success(),
+        "{words}{}",
+        String::from_utf8_lossy(&built.stderr)
+    );
+    assert!(words.contains(" functions, "), "{words}");
+    let hlsl = std::fs::read_to_string(Path::new(out).join("hlsl/hankel_shadows.hlsl")).unwrap();
+    assert!(hlsl.contains("float hankel_hamburger_bound(float4 moments, float depth)"));
+    // Inside, from those on disk: the same.
+    let checked = hankel(&["check", out], &root());
+    let words = String::from_utf8_lossy(&checked.stdout).into_owned();
+    assert_eq!(checked.status.code(), Some(0), "{words}");
+
+    std::fs::remove_file(Path::new(out).join("msl/hankel_shadows.h.metal")).unwrap();
+    let checked = hankel(&["check", out], &root());
+    assert_eq!(checked.status.code(), Some(1));
+    let words = String::from_utf8_lossy(&checked.stdout).into_owned();
+    assert!(
+        words.contains("msl/hankel_shadows.h.metal is missing"),
+        "{words}"
+    );
+}
+
+#[test]
+fn a_wrong_prefix_and_a_crate_without_libraries_are_misuse() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("x");
+    let out = out.to_str().unwrap();
+    let wrong = [
+        "build",
+        "--form",
+        "functions",
+        "--out",
+        out,
+        "--prefix",
+        "My-Engine",
+    ];
+    let wrong = hankel(&wrong, folder.path());
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("--prefix"));
+    let manifest = root().join("tests/conformance/Cargo.toml");
+    let manifest = manifest.to_str().unwrap();
+    let none = [
+        "build",
+        "--form",
+        "functions",
+        "--out",
+        out,
+        "--manifest-path",
+        manifest,
+    ];
+    let none = hankel(&none, folder.path());
+    assert_eq!(none.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&none.stderr).contains("library!"));
+    assert!(!Path::new(out).exists());
+}

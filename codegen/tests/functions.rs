@@ -1,0 +1,562 @@
+//! Libraries of functions: what is translated means what the Rust function means, what has no form is
+//! refused with its place, and a signature does not change behind its users' backs.
+
+use std::path::Path;
+use std::process::Command;
+
+use hankel_codegen::Error;
+use hankel_codegen::functions::folder::{Folder, read as read_record};
+use hankel_codegen::functions::ir::Library;
+use hankel_codegen::functions::print::Naming;
+use hankel_codegen::functions::source::CrateText;
+use hankel_codegen::functions::{FORMS, Refusal, read};
+use hankel_dsl::glam::{UVec2, Vec2, Vec3};
+use hankel_dsl::{Real, function, lit, to_i32, unroll};
+
+/// A crate of one file.
+fn krate(text: &str) -> CrateText {
+    CrateText {
+        name: "sample".into(),
+        version: "1.2.3".into(),
+        licence: "MIT".into(),
+        files: [("src/lib.rs".to_owned(), text.to_owned())].into(),
+    }
+}
+
+fn libraries(text: &str) -> Result<Vec<Library>, Refusal> {
+    read(&[krate(text)])
+}
+
+/// A library of one function `f`.
+fn one(body: &str) -> Result<Vec<Library>, Refusal> {
+    libraries(&format!(
+        "{body}\nhankel_dsl::library!(sample {{ api: 1, functions: [f] }});"
+    ))
+}
+
+fn text(libraries: &[Library], form: &str) -> String {
+    let naming = Naming {
+        prefix: "hankel".into(),
+        library: libraries[0].name.clone(),
+    };
+    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
+    form.text(&libraries[0], &naming, "0")
+}
+
+/// Functions, and their source.
+macro_rules! both {
+    ($($tokens:tt)*) => {
+        $($tokens)*
+        const SOURCE: &str = stringify!($($tokens)*);
+    };
+}
+
+both! {
+    #[derive(Clone, Copy)]
+    struct Pair<R> {
+        near: R,
+        far: R,
+    }
+
+    impl<R: Real> Pair<R> {
+        fn new(near: R, far: R) -> Self {
+            Self { near, far }
+        }
+
+        fn turned(self) -> Self {
+            let Self { near, far } = self;
+            Self { near: far, ..self }.with(near)
+        }
+
+        fn with(self, far: R) -> Self {
+            Self { far, ..self }
+        }
+    }
+
+    fn swapped<const N: usize>(mut x: [f32; N], first: &mut f32) -> [f32; N] {
+        let kept = x[0];
+        x[0] = x[N - 1];
+        x[N - 1] = kept;
+        *first += x[0];
+        x
+    }
+
+    macro_rules! series {
+        ($y:expr; $first:expr, $($next:expr),*) => {{
+            let mut sum = $y * lit!($first);
+            $( sum = (sum + lit!($next)) * $y; )*
+            sum
+        }};
+    }
+
+    fn horner<R: Real>(x: R) -> R {
+        series!(x; 1.0 / 6.0, -0.5, 1.0)
+    }
+
+    /// Order of operations, signs and brackets.
+    #[function]
+    pub fn order(a: f32, b: f32, c: f32) -> f32 {
+        let x = a - (b - c) - -a;
+        let y = a / (b / c) / c * (a * -b);
+        let z = -(a + b) * c - (a * (b * c) + (c + a));
+        x * 0.5 - (y - z * -2.0)
+    }
+
+    /// Structures, references, arrays and patterns.
+    #[function]
+    pub fn parts(v: Vec3, t: f32) -> Vec2 {
+        let pair = Pair::new(v.x, Real::max(v.y, t)).turned();
+        let mut first = t;
+        let [a, b, ..] = swapped([pair.near, pair.far, v.z], &mut first);
+        let (a, b) = (b, a);
+        let scale = |x: f32| x * first + a;
+        let m = Vec2::new(scale(a), scale(b)) * t - Vec2::splat(b);
+        m + Vec2::new(1.0, 2.0)
+    }
+
+    /// Loops whose turns are not told apart, and one with a count that is not known.
+    #[function]
+    pub fn loops(x: f32, turns: u32) -> f32 {
+        let mut v = x;
+        let mut w = x * x;
+        let mut i = 0;
+        while i < 7 {
+            let next = v * 0.75 + w * 0.125;
+            (v, w) = (w, next);
+            i += 1;
+        }
+        unroll!(_i in 0..4, {
+            v = (v + w) * 0.5;
+        });
+        unroll!(k in 1..4, {
+            w -= v * k as f32;
+        });
+        let mut j = 0_u32;
+        while j < turns & 15 {
+            w = w * 0.5 + j as f32;
+            j += 1;
+        }
+        v + w + horner(x)
+    }
+
+    /// Branches with statements and without.
+    #[function]
+    pub fn branches(x: f32, y: f32) -> f32 {
+        let mut sign = 1.0;
+        let size = if x < y {
+            sign = -1.0;
+            let d = y - x;
+            d * d
+        } else {
+            x - y
+        };
+        let is_odd = (x > 0.5) & !(y > 0.5) | (x < -0.5 && y < -0.5 || x == y);
+        let kind = if is_odd { 3_u32 } else { 5 };
+        size * sign + kind as f32
+    }
+
+    /// Bits and whole numbers.
+    #[function]
+    pub fn bits(word: u32, x: f32) -> UVec2 {
+        let whole = to_i32(Real::clamp(x, -100.0, 100.0));
+        let low = (word & 0xff) << 3 | word >> 29;
+        let mixed = word.wrapping_mul(747_796_405).wrapping_add(whole as u32) ^ x.to_bits();
+        UVec2::new(low | mixed & 0xf0f0, if whole < 3 { mixed } else { low })
+    }
+
+    /// Names that languages reserve.
+    #[function]
+    pub fn reserved(sample: f32, half: f32) -> f32 {
+        let mix = sample * half;
+        let discard = mix - half;
+        let near = discard * mix;
+        let out = near + sample;
+        out * near
+    }
+
+    /// Calls another function.
+    #[function]
+    pub fn calls(x: f32, y: f32) -> f32 {
+        let pair = parts(Vec3::new(x, y, x), order(x, y, x));
+        pair.x + branches(pair.y, y) - horner(y)
+    }
+}
+
+const LIBRARY: &str = "\nhankel_dsl::library!(sample { api: 1, functions: [order, parts, loops, \
+                       branches, bits, reserved, calls] });";
+
+/// Values that tell operations apart.
+fn values() -> Vec<f32> {
+    let mut all = vec![
+        0.0, 1.0, -1.0, 0.5, -0.5, 0.6, -0.6, 3.0, 1e-3, -77.25, 0.1, 1e6,
+    ];
+    let mut state = 1_u32;
+    for _ in 0..20 {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        all.push((state >> 8) as f32 / 8_388_608.0 - 1.0);
+    }
+    all
+}
+
+/// What the functions give natively, a line of bits for each call.
+fn natively() -> String {
+    let mut lines = Vec::new();
+    let bits = |x: f32| if x == 0.0 { 0 } else { x.to_bits() };
+    for &x in &values() {
+        for &y in &values() {
+            let z = x * y + 0.25;
+            let p = parts(Vec3::new(x, y, z), y);
+            let b = bits_of(x, y);
+            let all = [
+                bits(order(x, y, z)),
+                bits(p.x),
+                bits(p.y),
+                bits(loops(x, b)),
+                bits(branches(x, y)),
+                bits_function(b, y).x,
+                bits_function(b, y).y,
+                bits(reserved(x, y)),
+                bits(calls(x, y)),
+            ];
+            lines.push(all.map(|w| format!("{w:08x}")).join(" "));
+        }
+    }
+    lines.join("\n")
+}
+
+fn bits_function(word: u32, x: f32) -> UVec2 {
+    bits(word, x)
+}
+
+fn bits_of(x: f32, y: f32) -> u32 {
+    x.to_bits() ^ y.to_bits().rotate_left(7)
+}
+
+fn run(command: &mut Command) -> String {
+    let done = command
+        .output()
+        .unwrap_or_else(|e| panic!("{command:?}: {e}"));
+    let words = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{command:?}\n{words}");
+    String::from_utf8_lossy(&done.stdout).trim_end().to_owned()
+}
+
+fn same(name: &str, given: &str, expected: &str) {
+    // NaNs have any bits.
+    let nan = |w: &str| u32::from_str_radix(w, 16).is_ok_and(|b| f32::from_bits(b).is_nan());
+    assert_eq!(given.lines().count(), expected.lines().count(), "{name}");
+    for (i, (a, b)) in given.lines().zip(expected.lines()).enumerate() {
+        for (j, (x, y)) in a.split(' ').zip(b.split(' ')).enumerate() {
+            assert!(
+                x == y || (nan(x) && nan(y)),
+                "{name}: row {i}, value {j}: {x} for {y}"
+            );
+        }
+    }
+}
+
+#[test]
+fn c_and_rust_mean_what_the_source_means() {
+    let libraries = libraries(&format!("{SOURCE}{LIBRARY}")).unwrap_or_else(|e| panic!("{e}"));
+    let expected = natively();
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let list = |suffix: &str| {
+        let all: Vec<String> = values().iter().map(|v| format!("{v:?}{suffix}")).collect();
+        all.join(", ")
+    };
+
+    std::fs::write(at("hankel_sample.h"), text(&libraries, "c")).unwrap();
+    let program = format!(
+        "#include \"hankel_sample.h\"\n#include <stdio.h>\n\
+         static uint32_t of(float x) {{ return x == 0.0f ? 0u : hankel_bits_of(x); }}\n\
+         int main(void) {{\n    const float v[] = {{ {} }};\n    const int n = sizeof v / sizeof *v;\n\
+         \x20   for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) {{\n\
+         \x20       float x = v[i], y = v[j], z = x * y + 0.25f;\n\
+         \x20       uint32_t k = hankel_bits_of(y);\n\
+         \x20       uint32_t b = hankel_bits_of(x) ^ (k << 7 | k >> 25);\n\
+         \x20       hankel_float2 p = hankel_parts(hankel_make_float3(x, y, z), y);\n\
+         \x20       hankel_uint2 q = hankel_bits(b, y);\n\
+         \x20       printf(\"%08x %08x %08x %08x %08x %08x %08x %08x %08x\\n\", of(hankel_order(x, y, z)),\n\
+         \x20           of(p.x), of(p.y), of(hankel_loops(x, b)), of(hankel_branches(x, y)), q.x, q.y,\n\
+         \x20           of(hankel_reserved(x, y)), of(hankel_calls(x, y)));\n    }}\n    return 0;\n}}\n",
+        list("f")
+    );
+    std::fs::write(at("program.c"), program).unwrap();
+    let mut cc = Command::new("cc");
+    cc.args([
+        "-std=c99",
+        "-O2",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-pedantic",
+        "-o",
+    ]);
+    run(cc.args([at("c"), at("program.c")]).arg("-lm"));
+    same("C", &run(&mut Command::new(at("c"))), &expected);
+
+    std::fs::write(at("hankel_sample.rs"), text(&libraries, "rust")).unwrap();
+    let program = format!(
+        "mod hankel_sample;\nuse hankel_sample::*;\n\
+         fn of(x: f32) -> u32 {{ if x == 0.0 {{ 0 }} else {{ x.to_bits() }} }}\n\
+         fn main() {{\n    let v = [{}];\n    for x in v {{\n        for y in v {{\n\
+         \x20           let z = x * y + 0.25;\n\
+         \x20           let b = x.to_bits() ^ y.to_bits().rotate_left(7);\n\
+         \x20           let (p, q) = (parts([x, y, z], y), bits(b, y));\n\
+         \x20           let all = [of(order(x, y, z)), of(p[0]), of(p[1]), of(loops(x, b)),\n\
+         \x20               of(branches(x, y)), q[0], q[1], of(reserved(x, y)), of(calls(x, y))];\n\
+         \x20           println!(\"{{}}\", all.map(|w| format!(\"{{w:08x}}\")).join(\" \"));\n\
+         \x20       }}\n    }}\n}}\n",
+        list("_f32")
+    );
+    std::fs::write(at("program.rs"), program).unwrap();
+    let mut rustc = Command::new("rustc");
+    rustc.args(["--edition", "2024", "-O", "-A", "dead_code", "-o"]);
+    run(rustc.args([at("rust"), at("program.rs")]));
+    same("Rust", &run(&mut Command::new(at("rust"))), &expected);
+}
+
+#[test]
+fn what_has_no_form_is_refused_with_its_place() {
+    let cases = [
+        (
+            "pub fn f(x: f32) -> f32 {\n    x % 2.0\n}",
+            "src/lib.rs:3:5",
+            "floor",
+        ),
+        (
+            "pub fn f(x: f32) -> u32 {\n    x as u32\n}",
+            "src/lib.rs:3:5",
+            "to_i32",
+        ),
+        (
+            "pub fn f(x: u32) -> f32 {\n    let a = [1.0_f32, 2.0];\n    a[x as usize]\n}",
+            "src/lib.rs:4:7",
+            "usize",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    x.sin()\n}",
+            "src/lib.rs:3:5",
+            "`sin`",
+        ),
+        (
+            "pub fn f(x: f64) -> f32 {\n    0.0\n}",
+            "src/lib.rs:2:13",
+            "f64",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    for i in 0..3 {}\n    x\n}",
+            "src/lib.rs:3:5",
+            "while",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    if x < 1.0 {\n        return 2.0;\n    }\n    x\n}",
+            "src/lib.rs:3:5",
+            "return",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    helper(x)\n}\nfn helper(x: f32) -> f32 {\n    helper(x)\n}",
+            "src/lib.rs:6:5",
+            "circles",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    f(x)\n}",
+            "src/lib.rs:2",
+            "calls itself",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    unknown(x)\n}",
+            "src/lib.rs:3:5",
+            "not found",
+        ),
+        (
+            "pub fn f(x: u32, y: u32) -> u32 {\n    x / y\n}",
+            "src/lib.rs:3:5",
+            "quotient",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    unsafe { x }\n}",
+            "src/lib.rs:3:5",
+            "unsafe",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    let mut y = x;\n    while y < 1.0 {\n        y += 1.0;\n    }\n    y\n}",
+            "src/lib.rs:4:5",
+            "counts",
+        ),
+        (
+            "pub fn f(b1: f32) -> f32 {\n    b1\n}",
+            "src/lib.rs:2:10",
+            "digit",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    dbg!(x)\n}",
+            "src/lib.rs:3:5",
+            "dbg",
+        ),
+    ];
+    for (body, place, reason) in cases {
+        let refusal = match one(&format!("#[function]\n{body}")) {
+            Err(refusal) => refusal,
+            Ok(libraries) => panic!("{body}\nbecame\n{}", text(&libraries, "wgsl")),
+        };
+        assert!(
+            refusal.place.starts_with(place) && refusal.reason.contains(reason),
+            "{body}\n{refusal}"
+        );
+    }
+}
+
+#[test]
+fn a_list_that_names_nothing_is_refused() {
+    let text =
+        "fn f(x: f32) -> f32 { x }\nhankel_dsl::library!(sample { api: 1, functions: [f] });";
+    assert!(libraries(text).unwrap_err().reason.contains("#[function]"));
+    let text = "hankel_dsl::library!(sample { api: 1, functions: [g] });";
+    assert!(
+        libraries(text)
+            .unwrap_err()
+            .reason
+            .contains("no such function")
+    );
+    let text = "hankel_dsl::library!(sample { functions: [] });";
+    assert!(libraries(text).unwrap_err().reason.contains("api"));
+}
+
+#[test]
+fn text_is_as_a_person_writes_it() {
+    let source = "/// Doubles `x` \\[Knuth\\].\n#[function]\npub fn f(x: f32) -> f32 {\n    // Twice β².\n    \
+                  let y = x * 2.0;\n    y * y\n}";
+    let libraries = one(source).unwrap();
+    let wgsl = text(&libraries, "wgsl");
+    let function = "/// Doubles `x` [Knuth].\nfn hankel_f(x: f32) -> f32 {\n    // Twice beta^2.\n    \
+                    let y = x * 2.0;\n    return y * y;\n}\n";
+    assert!(wgsl.ends_with(function), "{wgsl}");
+    assert!(
+        wgsl.starts_with(
+            "// SPDX-License-Identifier: MIT\n// sample 1.2.3, library `sample`, API 1 "
+        )
+    );
+    let naga_oil = text(&libraries, "naga-oil");
+    assert!(naga_oil.starts_with("#define_import_path hankel::sample\n"));
+    let glsl = text(&libraries, "glsl");
+    assert!(
+        glsl.contains("highp float hankel_f(highp float x) {"),
+        "{glsl}"
+    );
+    assert!(!glsl.contains("#version"), "{glsl}");
+    let msl = text(&libraries, "msl");
+    assert!(
+        msl.contains("inline float f(float x) {\n    #pragma METAL fp contract(off)"),
+        "{msl}"
+    );
+}
+
+const LOOKUP: &str = "/// The mean of what is looked up.\n#[function]\npub fn f(count: u32, depth_at: impl \
+                      Fn(u32) -> f32) -> f32 {\n    let mut sum = depth_at(0);\n    let mut i = 1;\n    while i \
+                      < count {\n        sum += depth_at(i);\n        i += 1;\n    }\n    sum / count as f32\n}";
+
+#[test]
+fn what_the_host_looks_up_is_handed_in() {
+    let libraries = one(LOOKUP).unwrap();
+    // By a macro where there are no functions as values.
+    let glsl = text(&libraries, "glsl");
+    assert!(glsl.contains("#if defined(HANKEL_DEPTH_AT)\n"), "{glsl}");
+    assert!(glsl.contains("HANKEL_DEPTH_AT(i)"), "{glsl}");
+    assert!(
+        text(&libraries, "msl")
+            .contains("template <typename DepthAt>\ninline float f(uint count, DepthAt depth_at)")
+    );
+    assert!(!text(&libraries, "wgsl").contains("fn hankel_f"));
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("hankel_sample.h"), text(&libraries, "c")).unwrap();
+    let program = "#include \"hankel_sample.h\"\n#include <stdio.h>\n\
+                   static float at(void *context, uint32_t i) { return ((float *)context)[i]; }\n\
+                   int main(void) {\n    float depths[3] = { 1.0f, 2.0f, 6.0f };\n\
+                   \x20   printf(\"%g\", hankel_f(3u, at, depths));\n    return 0;\n}\n";
+    std::fs::write(at("program.c"), program).unwrap();
+    let mut cc = Command::new("cc");
+    cc.args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-o"]);
+    run(cc.args([at("c"), at("program.c")]).arg("-lm"));
+    assert_eq!(run(&mut Command::new(at("c"))), "3");
+}
+
+fn folder_of(body: &str, api: u32) -> Folder {
+    let text = format!(
+        "#[function]\n{body}\nhankel_dsl::library!(sample {{ api: {api}, functions: [f] }});"
+    );
+    Folder::new(&libraries(&text).unwrap(), "hankel", "0").unwrap()
+}
+
+#[test]
+fn a_changed_signature_needs_another_number() {
+    let out = tempfile::tempdir().unwrap();
+    let old = folder_of("pub fn f(x: f32) -> f32 { x }", 1);
+    let report = old.write(out.path(), false).unwrap();
+    assert_eq!((report.functions, report.unchanged), (1, 0));
+    assert_eq!(old.write(out.path(), false).unwrap().written.len(), 0);
+    assert!(old.check(out.path()).unwrap().is_fine());
+
+    // Another body is another text, and no more.
+    let body = folder_of("pub fn f(x: f32) -> f32 { x * 2.0 }", 1);
+    assert!(!body.check(out.path()).unwrap().is_fine());
+
+    let changed = folder_of("pub fn f(x: f32, y: f32) -> f32 { x * y }", 1);
+    for error in [
+        changed.write(out.path(), false).unwrap_err(),
+        changed.check(out.path()).unwrap_err(),
+    ] {
+        assert!(matches!(&error, Error::Api { api: 1, .. }), "{error}");
+        assert!(
+            error
+                .to_string()
+                .contains("`f` was (x: f32) -> f32 and is (x: f32, y: f32) -> f32")
+        );
+        assert!(error.advice().unwrap().contains("api: 2"));
+    }
+    assert!(
+        old.check(out.path()).unwrap().is_fine(),
+        "nothing was written"
+    );
+
+    let raised = folder_of("pub fn f(x: f32, y: f32) -> f32 { x * y }", 2);
+    raised.write(out.path(), false).unwrap();
+    assert!(raised.check(out.path()).unwrap().is_fine());
+    assert_eq!(read_record(out.path()).unwrap().libraries["sample"].api, 2);
+}
+
+#[test]
+fn what_hankel_did_not_write_stays() {
+    let out = tempfile::tempdir().unwrap();
+    let folder = folder_of("pub fn f(x: f32) -> f32 { x }", 1);
+    folder.write(out.path(), false).unwrap();
+    let file = out.path().join(Path::new("wgsl/hankel_sample.wgsl"));
+    std::fs::write(&file, "mine").unwrap();
+    assert!(matches!(
+        folder.write(out.path(), false),
+        Err(Error::InTheWay { .. })
+    ));
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
+    assert!(!folder.check(out.path()).unwrap().is_fine());
+    folder.write(out.path(), true).unwrap();
+    assert!(folder.check(out.path()).unwrap().is_fine());
+}
+
+#[test]
+fn a_prefix_is_a_name() {
+    let libraries = one("#[function]\npub fn f(x: f32) -> f32 { x }").unwrap();
+    for prefix in ["", "Hankel", "9x", "a__b", "a_", "float", "my-engine"] {
+        assert!(Folder::new(&libraries, prefix, "0").is_err(), "{prefix}");
+    }
+    let naming = Naming {
+        prefix: "my_engine".into(),
+        library: "sample".into(),
+    };
+    let hlsl = FORMS.iter().find(|f| f.name == "hlsl").unwrap();
+    let text = hlsl.text(&libraries[0], &naming, "0");
+    assert!(text.contains("float my_engine_f(float x)"), "{text}");
+    assert!(text.contains("#ifndef MY_ENGINE_SAMPLE_HLSL"), "{text}");
+}
