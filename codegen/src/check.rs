@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
+use hankel_system::input;
 use serde::{Deserialize, Serialize};
 
 use crate::build::{Generated, MANIFEST_FILE};
@@ -69,6 +70,9 @@ pub struct Budget {
     pub kernels: BTreeMap<String, Limits>,
 }
 
+/// Most bytes of a budget.
+const MAX_BYTES: u64 = 1 << 20;
+
 impl Config {
     /// Reads `hankel.toml`.
     ///
@@ -76,11 +80,12 @@ impl Config {
     ///
     /// The file cannot be read, or says something that is not known.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).during("read", path)?;
-        toml::from_str(&text).map_err(|error| Error::Budget {
+        let fail = |problem: String| Error::Budget {
             path: path.to_owned(),
-            problem: error.to_string().trim().to_owned(),
-        })
+            problem,
+        };
+        let text = input::read_text(path, MAX_BYTES).map_err(|error| fail(error.problem()))?;
+        toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))
     }
 }
 

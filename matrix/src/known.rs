@@ -1,9 +1,9 @@
 //! The list of known differences: which cells are known to fail, and why. An entry of whose cells
 //! none fails any more fails the run, so that the list never rots.
 
-use std::fs;
 use std::path::Path;
 
+use hankel_system::input;
 use serde::Deserialize;
 
 use crate::column::Column;
@@ -11,6 +11,9 @@ use crate::report::{Outcome, Report};
 
 /// Seed of the inputs that lists speak of: others may not meet a difference.
 pub const SEED: u64 = 1;
+
+/// Most bytes of a list.
+const MAX_BYTES: u64 = 16 << 20;
 
 /// The list.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -43,8 +46,7 @@ impl Known {
     /// # Errors
     /// In words: the file, the place, and what is wrong.
     pub fn read(file: &Path) -> Result<Self, String> {
-        let text =
-            fs::read_to_string(file).map_err(|e| format!("cannot read {}: {e}", file.display()))?;
+        let text = input::read_text(file, MAX_BYTES).map_err(|e| e.to_string())?;
         Self::parse(&text).map_err(|e| format!("{}: {e}", file.display()))
     }
 

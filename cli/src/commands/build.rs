@@ -2,9 +2,9 @@ use std::cell::RefCell;
 
 use hankel_codegen::build::build;
 
-use super::print_json;
 use crate::args::{Build, Format};
 use crate::failure::{Outcome, Result};
+use crate::print::{self, say};
 use crate::session::Session;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
@@ -26,13 +26,13 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     }
     let report = result?;
     if args.format == Format::Json {
-        print_json(&report);
+        print::json(&report);
         return Ok(Outcome::Fine);
     }
     if quiet {
         return Ok(Outcome::Fine);
     }
-    println!(
+    say!(
         "{}: {} kernels, {} files written, {} unchanged, {} removed",
         args.out.display(),
         report.kernels,
@@ -41,7 +41,7 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
         report.removed.len()
     );
     if !report.unsupported.is_empty() {
-        println!(
+        say!(
             "{} shaders have no form in a language; the manifest says why (for example {} in {}: {})",
             report.unsupported.len(),
             report.unsupported[0].0,

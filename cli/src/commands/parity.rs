@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use hankel_codegen::Language;
 use hankel_codegen::build::generate;
@@ -7,9 +8,9 @@ use hankel_codegen::translate::Options;
 use hankel_host::device::VulkanDevice;
 use hankel_host::parity::{Subject, Wgsl};
 
-use super::print_json;
 use crate::args::{Format, Parity};
 use crate::failure::{Outcome, Result};
+use crate::print::{self, say};
 use crate::progress::Progress;
 use crate::session::Session;
 
@@ -41,7 +42,10 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
             .map(|(bytes, entry_point)| (String::from_utf8_lossy(bytes).into_owned(), entry_point));
         codes.insert(name.as_str(), (spirv, wgsl));
     }
-    let krate = session.native(generated.manifest.kernels.keys())?;
+    let krate = session.native(
+        generated.manifest.kernels.keys(),
+        Duration::from_secs(args.limit),
+    )?;
     let subjects: Vec<Subject<'_>> = krate
         .entries
         .iter()
@@ -65,9 +69,9 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     });
     drop(progress);
     if args.format == Format::Json {
-        print_json(&report);
+        print::json(&report);
     } else {
-        println!("{report}");
+        say!("{report}");
     }
     Ok(Outcome::of(report.passed))
 }
