@@ -59,6 +59,12 @@ pub enum Command {
     Doctor(Doctor),
     /// Print a completion script for a shell.
     Completions(Completions),
+    /// A process that native kernels of another crate run in.
+    #[command(name = crate::session::WORKER, hide = true)]
+    KernelWorker {
+        /// The crate's plug-in.
+        library: PathBuf,
+    },
     /// A process that the matrix runs kernels in.
     #[command(name = "matrix-runner", hide = true)]
     MatrixRunner {
@@ -238,6 +244,11 @@ pub struct Parity {
     /// Seed of the generated inputs.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
+    /// Seconds that a kernel of another crate may run natively, and with --matrix a compiler or
+    /// device for one kernel.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120,
+          value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub limit: u64,
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
@@ -284,10 +295,6 @@ pub struct OfMatrix {
         conflicts_with = "absent"
     )]
     pub write_absent: Option<PathBuf>,
-    /// Seconds that a compiler or device may take for one kernel.
-    #[arg(long, value_name = "SECONDS", default_value_t = 120, requires = "matrix",
-          value_parser = clap::value_parser!(u64).range(1..=3600))]
-    pub limit: u64,
     /// Runs everything anew, as it is done where CI=true.
     #[arg(long, requires = "matrix")]
     pub no_cache: bool,
@@ -336,6 +343,10 @@ pub struct Eval {
     /// A uniform's field or a specialisation constant; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
+    /// Seconds that a kernel of another crate may run natively for 65536 rows.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120,
+          value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub limit: u64,
 }
 
 #[derive(Debug, Args)]
@@ -440,10 +451,10 @@ pub struct BenchBounds {
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=5))]
     pub n: Vec<u8>,
     /// Rows of each call [default: 1000000; with --quick 20000].
-    #[arg(long, value_name = "NUMBER", value_parser = at_least_sixteen)]
+    #[arg(long, value_name = "NUMBER", value_parser = rows)]
     pub samples: Option<usize>,
     /// Rounds in which everything has its turn [default: 5; with --quick 3].
-    #[arg(long, value_name = "NUMBER", value_parser = at_least_one)]
+    #[arg(long, value_name = "NUMBER", value_parser = rounds)]
     pub rounds: Option<usize>,
     /// Seed of the rows.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
@@ -492,7 +503,7 @@ pub struct Stress {
     pub family: Vec<String>,
     /// Rows of each family, order and precision; moment vectors for --singularities; regions for
     /// each strength for --biases [default: 10000; 400; 4000000].
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(16..))]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(16..=MOST_SAMPLES))]
     pub samples: Option<u64>,
     /// Only this precision.
     #[arg(long, value_enum)]
@@ -523,20 +534,30 @@ pub struct Stress {
     pub format: Format,
 }
 
-fn at_least(least: usize, text: &str) -> Result<usize, String> {
+/// Most samples that are drawn: results of all are kept in memory, some hundred bytes each.
+const MOST_SAMPLES: u64 = 10_000_000;
+
+/// Most rounds of a measurement.
+const MOST_ROUNDS: usize = 1000;
+
+fn within(least: usize, most: usize, text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
-        Ok(number) if number >= least => Ok(number),
-        Ok(_) => Err(format!("at least {least}")),
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        Ok(_) => Err(format!("from {least} to {most}")),
         Err(error) => Err(error.to_string()),
     }
 }
 
-fn at_least_one(text: &str) -> Result<usize, String> {
-    at_least(1, text)
+fn rounds(text: &str) -> Result<usize, String> {
+    within(1, MOST_ROUNDS, text)
 }
 
-fn at_least_sixteen(text: &str) -> Result<usize, String> {
-    at_least(hankel_numerics::speed::LEAST_ROWS, text)
+fn rows(text: &str) -> Result<usize, String> {
+    within(
+        hankel_numerics::speed::LEAST_ROWS,
+        MOST_SAMPLES as usize,
+        text,
+    )
 }
 
 /// An implementation to compare with.

@@ -1,6 +1,7 @@
 //! How a command ends, and its exit code.
 
 use std::fmt;
+use std::io::ErrorKind;
 
 use hankel_codegen as codegen;
 use hankel_host::crates::CrateError;
@@ -14,6 +15,9 @@ use hankel_numerics::judge::{JudgeError, TableError};
 use hankel_numerics::report::ReportError;
 use hankel_numerics::speed::SpeedError;
 use hankel_numerics::stress::StressError;
+use hankel_system::input::InputError;
+use hankel_system::output::OutputError;
+use hankel_system::text::visible;
 use miette::Diagnostic;
 
 /// How a command that ran to its end ends.
@@ -65,29 +69,26 @@ impl Failure {
             }
             source = cause.source();
         }
+        Self::say(blame, &message, help.as_deref())
+    }
+
+    /// Words of others are among them: they are shown without effect on the terminal.
+    fn say(blame: Blame, message: &str, help: Option<&str>) -> Self {
         Self {
             blame,
-            message,
-            help,
+            message: visible(message).into_owned(),
+            help: help.map(|help| visible(help).into_owned()),
         }
     }
 
     /// What the arguments, or files that they name, got wrong.
-    pub fn input(message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self {
-            blame: Blame::Input,
-            message: message.into(),
-            help: Some(help.into()),
-        }
+    pub fn input(message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        Self::say(Blame::Input, message.as_ref(), Some(help.as_ref()))
     }
 
     /// What the machine lacks.
-    pub fn machine(message: impl Into<String>, help: Option<String>) -> Self {
-        Self {
-            blame: Blame::Machine,
-            message: message.into(),
-            help,
-        }
+    pub fn machine(message: impl AsRef<str>, help: Option<String>) -> Self {
+        Self::say(Blame::Machine, message.as_ref(), help.as_deref())
     }
 
     pub const fn code(&self) -> u8 {
@@ -126,6 +127,8 @@ impl From<codegen::Error> for Failure {
             | E::DuplicateLayout { .. }
             | E::Function(_)
             | E::Api { .. } => Blame::Kernel,
+            // A file where a folder is wanted, or the other way round.
+            E::Io { source, .. } if is_misplaced(source.kind()) => Blame::Input,
             E::Io { .. } | E::Run { .. } | E::Stale { .. } | E::Bundle { .. } | E::Busy { .. } => {
                 Blame::Machine
             }
@@ -139,10 +142,41 @@ impl From<CrateError> for Failure {
     fn from(error: CrateError) -> Self {
         let blame = match &error {
             CrateError::Build { .. } => Blame::Kernel,
-            CrateError::NoCargo { .. } | CrateError::Plugin(_) => Blame::Machine,
+            CrateError::NoCargo { .. } => Blame::Machine,
             _ => Blame::Input,
         };
         Self::new(blame, &error, None)
+    }
+}
+
+/// Whether a path leads to something of another kind, or nowhere.
+fn is_misplaced(kind: ErrorKind) -> bool {
+    matches!(
+        kind,
+        ErrorKind::AlreadyExists
+            | ErrorKind::NotADirectory
+            | ErrorKind::IsADirectory
+            | ErrorKind::InvalidFilename
+    )
+}
+
+fn blame_of_input(error: &InputError) -> Blame {
+    match error.is_machine() {
+        true => Blame::Machine,
+        false => Blame::Input,
+    }
+}
+
+fn blame_of_output(error: &OutputError) -> Blame {
+    match error.is_machine() {
+        true => Blame::Machine,
+        false => Blame::Input,
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        Self::new(blame_of_output(&error), &error, None)
     }
 }
 
@@ -169,6 +203,9 @@ impl From<EvalError> for Failure {
     fn from(error: EvalError) -> Self {
         let blame = match &error {
             EvalError::Device(error) => blame_of(error),
+            EvalError::Row { .. } => Blame::Kernel,
+            EvalError::Input(error) => blame_of_input(error),
+            EvalError::Output(error) => blame_of_output(error),
             _ => Blame::Input,
         };
         Self::new(blame, &error, None)
@@ -177,7 +214,11 @@ impl From<EvalError> for Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
-        Self::new(Blame::Input, &error, None)
+        let blame = match &error {
+            SceneError::Read(error) => blame_of_input(error),
+            _ => Blame::Input,
+        };
+        Self::new(blame, &error, None)
     }
 }
 
@@ -187,7 +228,7 @@ impl From<FrameError> for Failure {
             FrameError::Scene(_) | FrameError::Sizes { .. } => Blame::Input,
             FrameError::Device { source, .. } => blame_of(source),
             FrameError::Kernel { .. } => Blame::Kernel,
-            FrameError::Write { .. } => Blame::Machine,
+            FrameError::Write(error) => blame_of_output(error),
         };
         Self::new(blame, &error, None)
     }
@@ -212,7 +253,11 @@ impl From<SpeedError> for Failure {
 
 impl From<ReportError> for Failure {
     fn from(error: ReportError) -> Self {
-        Self::new(Blame::Machine, &error, None)
+        let blame = match &error {
+            ReportError::Output(error) => blame_of_output(error),
+            _ => Blame::Machine,
+        };
+        Self::new(blame, &error, None)
     }
 }
 
@@ -259,6 +304,11 @@ impl From<JudgeError> for Failure {
 
 impl From<TableError> for Failure {
     fn from(error: TableError) -> Self {
-        Self::new(Blame::Input, &error, None)
+        let blame = match &error {
+            TableError::Input(error) => blame_of_input(error),
+            TableError::Output(error) => blame_of_output(error),
+            _ => Blame::Input,
+        };
+        Self::new(blame, &error, None)
     }
 }

@@ -7,10 +7,12 @@ mod args;
 mod commands;
 mod depfile;
 mod failure;
+mod print;
 mod progress;
 mod session;
 mod watch;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -19,10 +21,14 @@ use args::{Arguments, Command};
 use failure::Outcome;
 
 fn main() -> ExitCode {
-    // clap prints help and misuse itself, and exits with 0 or 2.
-    let arguments = Arguments::parse();
+    hankel_system::signals::watch();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(help_or_misuse) => return show(&help_or_misuse),
+    };
+    threads();
     let quiet = arguments.quiet;
-    let outcome = match arguments.command {
+    let outcome = session::check_lanes().and_then(|()| match arguments.command {
         Command::Build(a) => commands::build::run(&a, quiet),
         Command::Check(a) => commands::check::run(&a, quiet),
         Command::List(a) => commands::list::run(&a, quiet),
@@ -36,15 +42,45 @@ fn main() -> ExitCode {
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
         Command::Doctor(a) => commands::doctor::run(&a),
         Command::Completions(a) => commands::completions::run(&a),
+        Command::KernelWorker { library } => commands::eval::serve(&library),
         Command::MatrixRunner { which } => commands::parity::serve(&which),
-    };
+    });
+    print::finish();
     match outcome {
         Ok(Outcome::Fine) => ExitCode::SUCCESS,
         Ok(Outcome::CheckFailed) => ExitCode::from(1),
         Err(failure) => {
             let code = failure.code();
-            eprintln!("{:?}", miette::Report::new(failure));
+            print::note(format_args!("{:?}", miette::Report::new(failure)));
             ExitCode::from(code)
         }
     }
+}
+
+/// Makes the threads that everything parallel runs on. Where no more may be made, this one is all.
+fn threads() {
+    if rayon::ThreadPoolBuilder::new().build_global().is_err() {
+        let alone = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .use_current_thread();
+        // If even that fails, the first parallel step says so.
+        let _ = alone.build_global();
+    }
+}
+
+/// Prints clap's help, or what it has against the arguments: exit codes 0 and 2.
+fn show(message: &clap::Error) -> ExitCode {
+    let text = message.render();
+    if message.use_stderr() {
+        // With colours where the terminal has them; who closed the stream wants no message.
+        let _ = message.print();
+        return ExitCode::from(2);
+    }
+    if std::io::stdout().is_terminal() {
+        print::raw(text.ansi().to_string().as_bytes());
+    } else {
+        print::raw(text.to_string().as_bytes());
+    }
+    print::finish();
+    ExitCode::SUCCESS
 }

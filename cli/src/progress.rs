@@ -3,7 +3,10 @@
 use std::io::IsTerminal;
 use std::time::Duration;
 
+use hankel_system::text::visible;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::print::note;
 
 /// One line that says what goes on.
 pub struct Progress {
@@ -33,16 +36,16 @@ impl Progress {
     /// Something begins.
     pub fn begin(&self, what: &str) {
         if self.lines {
-            eprintln!("{what}");
+            note(format_args!("{}", visible(what)));
         }
         self.bar.enable_steady_tick(Duration::from_millis(120));
-        self.bar.set_message(what.to_owned());
+        self.bar.set_message(visible(what).into_owned());
     }
 
     /// A passing detail: shown on a terminal only.
     pub fn detail(&self, what: &str) {
         self.bar
-            .set_message(what.trim().chars().take(100).collect::<String>());
+            .set_message(visible(what.trim()).chars().take(100).collect::<String>());
     }
 
     /// `done` of `total`.
@@ -88,9 +91,9 @@ impl hankel_toolchain::Progress for Progress {
 
     fn line(&mut self, text: &str) {
         if self.lines {
-            eprintln!("{text}");
+            note(format_args!("{}", visible(text)));
         } else {
-            self.bar.println(text);
+            self.bar.println(visible(text));
         }
     }
 }

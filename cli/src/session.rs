@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::str::FromStr;
+use std::time::Duration;
 
 use hankel_codegen::build::{Modules, Request};
 use hankel_codegen::bundle::Bundle;
@@ -21,7 +22,9 @@ use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
 use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::lanes;
 use hankel_host::crates::{KernelCrate, Native};
+use hankel_host::worker::Worker;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
 use crate::args::Generate;
@@ -33,6 +36,12 @@ const BUILT_IN: &str = "kernels/shadows/Cargo.toml";
 
 /// The committed SPIR-V within a checkout.
 const COMMITTED: &str = "snapshots/spirv";
+
+/// The hidden command that runs kernels of another crate, see [`hankel_host::worker`].
+pub const WORKER: &str = "kernel-worker";
+
+/// How long a crate may take to describe its kernels.
+const DESCRIBING: Duration = Duration::from_secs(60);
 
 /// A kernel crate.
 pub struct Session {
@@ -48,6 +57,7 @@ pub struct Session {
 
 impl Session {
     /// The built-in crate as it was linked into this program, whatever has become of its sources.
+    /// Nothing is ever built for it.
     pub fn linked(quiet: bool) -> Self {
         Self {
             krate: built_in(),
@@ -79,9 +89,12 @@ impl Session {
         } else {
             let progress = Progress::new(quiet);
             progress.begin(&format!("Reading the kernels of {}", manifest.display()));
-            KernelCrate::load(&manifest, Native::Descriptions, &mut |line| {
-                progress.detail(line);
-            })?
+            KernelCrate::load(
+                &manifest,
+                Native::Descriptions,
+                &worker(DESCRIBING)?,
+                &mut |line| progress.detail(line),
+            )?
         };
         Ok(Self {
             krate,
@@ -119,8 +132,13 @@ impl Session {
         Ok([present(&inputs.files), present(&inputs.folders)].concat())
     }
 
-    /// The crate with the native code of the entry points called `names`.
-    pub fn native<'a>(&self, names: impl IntoIterator<Item = &'a String>) -> Result<KernelCrate> {
+    /// The crate with the native code of the entry points called `names`. What is not linked into
+    /// this program runs in processes of its own, a call no longer than `limit`.
+    pub fn native<'a>(
+        &self,
+        names: impl IntoIterator<Item = &'a String>,
+        limit: Duration,
+    ) -> Result<KernelCrate> {
         let Some(manifest) = self.manifest.as_ref().filter(|_| !self.linked) else {
             return Ok(self.krate.clone());
         };
@@ -136,9 +154,9 @@ impl Session {
             names.len(),
             self.krate.name
         ));
-        Ok(KernelCrate::load(manifest, native, &mut |line| {
-            progress.detail(line);
-        })?)
+        let worker = worker(limit)?;
+        let mut said = |line: &str| progress.detail(line);
+        Ok(KernelCrate::load(manifest, native, &worker, &mut said)?)
     }
 
     /// Descriptions of all entry points.
@@ -235,8 +253,11 @@ impl Session {
         let Some(manifest) = &self.manifest else {
             let reason = reason.take().unwrap_or_else(|| "there is none".into());
             return Err(Failure::machine(
-                format!("this program was built without SPIR-V of its own kernels: {reason}"),
-                Some("Run it inside of its repository, with rust-gpu's compiler installed.".into()),
+                format!("this program was built without the SPIR-V of its own kernels: {reason}"),
+                Some(
+                    "Run `cargo xtask spirv` in its repository, and build the program again."
+                        .into(),
+                ),
             ));
         };
         let committed = checkout().map(|root| root.join(COMMITTED));
@@ -311,7 +332,19 @@ impl Session {
     }
 }
 
-/// The kernels that are linked into this program.
+/// This program, to be started again for the kernels of other crates.
+fn worker(limit: Duration) -> Result<Worker> {
+    let program = std::env::current_exe()
+        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))?;
+    Ok(Worker {
+        program,
+        arguments: vec![WORKER.into()],
+        limit,
+    })
+}
+
+/// The kernels that are linked into this program. They are its own code, and every loop of them
+/// ends: they need no process of their own.
 fn built_in() -> KernelCrate {
     KernelCrate::from_entries(hankel_embedded::CRATE_NAME, hankel_shadows::entries())
 }
@@ -353,12 +386,35 @@ pub fn built_in_manifest() -> Option<PathBuf> {
     checkout().map(|root| root.join(BUILT_IN))
 }
 
-/// The checkout that the present folder belongs to.
+/// The checkout whose kernels are built without being named: the one that this program was built
+/// from, if the present folder lies in it. Code of any other folder is somebody else's, and runs
+/// only by `--manifest-path`.
 fn checkout() -> Option<PathBuf> {
-    let here = std::env::current_dir().ok()?;
-    here.ancestors()
-        .find(|folder| folder.join(BUILT_IN).is_file())
-        .map(Path::to_owned)
+    let here = std::env::current_dir().ok()?.canonicalize().ok()?;
+    own_checkout().filter(|root| here.starts_with(root))
+}
+
+/// The checkout that this program was built from, if it is still there and belongs to this user.
+pub fn own_checkout() -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?;
+    let root = root.canonicalize().ok()?;
+    let kernels = root.join(BUILT_IN);
+    let ours = is_ours(&root) && is_ours(kernels.parent()?) && is_ours(&kernels);
+    ours.then_some(root)
+}
+
+/// Whether a file or folder belongs to this user or the administrator, and not everybody may
+/// write it.
+#[cfg(unix)]
+fn is_ours(path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let owners = [rustix::process::geteuid().as_raw(), 0];
+    std::fs::metadata(path).is_ok_and(|m| owners.contains(&m.uid()) && m.mode() & 0o002 == 0)
+}
+
+#[cfg(not(unix))]
+fn is_ours(path: &Path) -> bool {
+    path.exists()
 }
 
 /// cargo's target folder for a crate.
@@ -406,4 +462,28 @@ fn constants(pairs: &[String]) -> Result<BTreeMap<String, u32>> {
         }
     }
     Ok(values)
+}
+
+/// Refuses a name of an instruction set that the lanes would pass over.
+pub fn check_lanes() -> Result<()> {
+    const VARIABLE: &str = "HANKEL_SIMD";
+    let Some(name) = std::env::var_os(VARIABLE).filter(|name| !name.is_empty()) else {
+        return Ok(());
+    };
+    let levels = lanes::levels();
+    let mut known: Vec<&str> = levels.iter().map(|(name, _)| *name).collect();
+    known.push(lanes::SCALAR);
+    if known.iter().any(|known| name == **known) {
+        return Ok(());
+    }
+    Err(Failure::input(
+        format!(
+            "{VARIABLE}={}: this processor has no such instruction set",
+            name.to_string_lossy()
+        ),
+        format!(
+            "Set it to one of these, or not at all: {}.",
+            known.join(", ")
+        ),
+    ))
 }

@@ -173,15 +173,8 @@ fn constants(kernel: &Kernel) -> impl Iterator<Item = &str> {
 /// Whether a name fits a pattern with `*` for any letters.
 #[must_use]
 pub fn matches(pattern: &str, name: &str) -> bool {
-    match pattern.split_once('*') {
-        None => pattern == name,
-        Some((head, tail)) => name.strip_prefix(head).is_some_and(|rest| {
-            rest.char_indices()
-                .map(|(place, _)| &rest[place..])
-                .chain([""])
-                .any(|rest| matches(tail, rest))
-        }),
-    }
+    // The second wildcard, for one letter, is not used: no name has this character.
+    wildmatch::WildMatchPattern::<'*', '\0'>::new(pattern).matches(name)
 }
 
 pub(crate) fn missing(kernel: &Kernel) -> Failure {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
+use hankel_system::input;
 use serde::{Deserialize, Serialize};
 
 use crate::build::Generated;
@@ -14,9 +15,6 @@ use crate::folder::{Folder, Found, STAGE, SUBFOLDERS};
 use crate::lint::Finding;
 use crate::manifest::KernelEntry;
 use crate::spirv;
-
-/// Size of the largest budget, in bytes.
-const MOST_BYTES: u64 = 1 << 20;
 
 /// Limits on a kernel's cost; see [`Cost`](crate::cost::Cost) for what is counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,6 +72,9 @@ pub struct Budget {
     pub kernels: BTreeMap<String, Limits>,
 }
 
+/// Most bytes of a budget.
+const MAX_BYTES: u64 = 1 << 20;
+
 impl Config {
     /// Reads `hankel.toml`.
     ///
@@ -81,17 +82,12 @@ impl Config {
     ///
     /// The file cannot be read, or says something that is not known.
     pub fn read(path: &Path) -> Result<Self> {
-        let wrong = |problem: String| Error::Budget {
+        let fail = |problem: String| Error::Budget {
             path: path.to_owned(),
             problem,
         };
-        let bytes = files::read(path, MOST_BYTES).map_err(|error| match error {
-            Error::Io { source, .. } => wrong(format!("it cannot be read: {source}")),
-            Error::NotAFile { kind, .. } => wrong(format!("it cannot be read: it is {kind}")),
-            other => other,
-        })?;
-        let text = std::str::from_utf8(&bytes).map_err(|_| wrong("it is not UTF-8".into()))?;
-        toml::from_str(text).map_err(|error| wrong(error.to_string().trim().to_owned()))
+        let text = input::read_text(path, MAX_BYTES).map_err(|error| fail(error.problem()))?;
+        toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))
     }
 }
 

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
+use hankel_system::process::Program;
 use rspirv::spirv::Capability;
 use rustc_codegen_spirv_types::{CompileResult, ModuleResult, SpirvTarget, TargetSpecVersion};
 use semver::Version;
@@ -236,15 +237,12 @@ fn run(
 ) -> Result<String> {
     let mut cargo = cargo(compiler, version, manifest, folder, target_dir)?;
     let program = PathBuf::from(cargo.get_program());
-    let mut child = cargo
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|source| Error::Run {
-            program: program.clone(),
-            source,
-        })?;
-    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+    cargo.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut running = Program::start(&mut cargo).map_err(|source| Error::Run {
+        program: program.clone(),
+        source,
+    })?;
+    let (stdout, stderr) = (running.child.stdout.take(), running.child.stderr.take());
     let (messages, said) = std::thread::scope(|scope| {
         let said = scope.spawn(move || {
             let mut said = String::new();
@@ -270,7 +268,7 @@ fn run(
             said.join().unwrap_or_default(),
         )
     });
-    let status = child
+    let status = running
         .wait()
         .map_err(|source| Error::Run { program, source })?;
     if !status.success() {

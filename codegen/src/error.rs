@@ -423,6 +423,9 @@ impl<T> During<T> for io::Result<T> {
     }
 }
 
+/// Bytes of stack of a tool: naga calls itself for every level of an expression.
+pub(crate) const STACK: usize = 64 << 20;
+
 /// Runs a tool that may panic; a panic's message becomes the error. Nothing is printed.
 pub(crate) fn guarded<T>(
     tool: impl FnOnce() -> Result<T, Failure>,
@@ -431,7 +434,8 @@ pub(crate) fn guarded<T>(
 ) -> Result<T, Failure> {
     quiet_panics();
     QUIET.with(|quiet| quiet.set(quiet.get() + 1));
-    let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(tool));
+    let tool = std::panic::AssertUnwindSafe(|| stacker::grow(STACK, tool));
+    let result = std::panic::catch_unwind(tool);
     QUIET.with(|quiet| quiet.set(quiet.get() - 1));
     result.unwrap_or_else(|payload| {
         let message = payload

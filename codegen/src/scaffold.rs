@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use hankel_system::temporary::Folder;
+
 use crate::VERSION;
 use crate::error::{During, Error, Result};
 use crate::files::write_whole;
@@ -17,13 +19,10 @@ pub enum Dsl {
 }
 
 impl Dsl {
-    /// The checkout's DSL if `start` or a folder above it is a checkout, else this version.
-    pub fn find(start: &Path) -> Self {
-        start
-            .ancestors()
-            .map(|folder| folder.join("kernels/dsl"))
-            .find(|dsl| dsl.join("Cargo.toml").is_file())
-            .map_or_else(|| Self::Version(VERSION.into()), Self::Path)
+    /// From the registry, in this version.
+    #[must_use]
+    pub fn published() -> Self {
+        Self::Version(VERSION.into())
     }
 }
 
@@ -52,8 +51,11 @@ pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
             "`{name}` is no name for a crate: use small letters, digits, - and _, a letter first"
         )));
     }
-    if ["test", "core", "std", "alloc", "hankel-dsl"].contains(&name.as_str()) {
+    if OTHER_CRATES.contains(&name.as_str()) || name == "hankel" || name.starts_with("hankel-") {
         return Err(fail(format!("`{name}` is another crate's name")));
+    }
+    if KEYWORDS.contains(&name.as_str()) {
+        return Err(fail(format!("`{name}` is a word of Rust's own")));
     }
     match std::fs::read_dir(&folder_path) {
         Ok(entries) => {
@@ -83,14 +85,39 @@ pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
             .replace("@LIBRARY@", &library)
             .replace("@DSL@", &dependency)
     };
-    let mut written = Vec::new();
+    // The folder appears whole or, on a full disk, not at all.
+    let above = folder_path.parent().unwrap_or(&folder_path);
+    std::fs::create_dir_all(above).during("create", above)?;
+    let work = Folder::within(above).during("write to", above)?;
+    let made = work.join(&name);
     for (file, text) in FILES {
-        let path = folder_path.join(file);
-        write_whole(&path, fill(text).as_bytes())?;
-        written.push(path);
+        write_whole(&made.join(file), fill(text).as_bytes())?;
     }
-    Ok(written)
+    std::fs::rename(&made, &folder_path).during("create", &folder_path)?;
+    Ok(FILES.map(|(file, _)| folder_path.join(file)).to_vec())
 }
+
+/// Names that cargo refuses or warns of.
+const OTHER_CRATES: &[&str] = &[
+    "test",
+    "core",
+    "std",
+    "alloc",
+    "proc_macro",
+    "proc-macro",
+    "deps",
+    "build",
+    "examples",
+];
+
+/// Keywords of Rust, which no library can be called.
+const KEYWORDS: &[&str] = &[
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate",
+    "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl",
+    "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
+    "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
+    "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
+];
 
 /// The way from one folder to another; the other itself where they share nothing.
 fn relative(from: &Path, to: &Path) -> PathBuf {

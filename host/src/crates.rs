@@ -9,11 +9,12 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use hankel_dsl::native::describe::Kernel;
-use hankel_dsl::native::plugin::{Plugin, PluginError};
 use hankel_dsl::native::{Call, CallError, Entry};
+use hankel_system::process::Program as Running;
 use serde::Deserialize;
 
 use crate::device::{Program, Shader};
+use crate::worker::{Worker, Workers};
 
 /// A kernel crate with its native code.
 #[derive(Clone, Debug)]
@@ -146,9 +147,14 @@ pub enum CrateError {
         /// The compiler's words.
         diagnostics: String,
     },
-    /// What was built is no plug-in.
-    #[error(transparent)]
-    Plugin(#[from] PluginError),
+    /// What was built has no kernels, or cannot be asked for them.
+    #[error("`{package}`: {problem}")]
+    Plugin {
+        /// The package.
+        package: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// No kernel of that name.
     #[error("`{crate_name}` has no kernel `{name}`; it has: {known}")]
     NoKernel {
@@ -172,26 +178,31 @@ impl KernelCrate {
 
     /// Builds the crate at `manifest` (its `Cargo.toml`) for this machine with cargo, into
     /// `hankel/native` under cargo's own target folder, and loads it; entry points that `native`
-    /// leaves out cannot be run ([`CallError::NotBuilt`]). The crate is trusted: its code runs in
-    /// this process. `progress` gets cargo's lines as they come.
+    /// leaves out cannot be run ([`CallError::NotBuilt`]). The crate's code runs in processes of
+    /// `worker`, never in this one. `progress` gets cargo's lines as they come.
     ///
     /// # Errors
     /// See [`CrateError`].
     pub fn load(
         manifest: &Path,
         native: Native<'_>,
+        worker: &Worker,
         progress: &mut dyn FnMut(&str),
     ) -> Result<Self, CrateError> {
         let package = Package::find(manifest)?;
         let library = package.build(native, progress)?;
-        let plugin = Arc::new(load_copy(&library)?);
-        let entries = plugin
-            .kernels()
-            .iter()
+        let (workers, kernels) =
+            Workers::load(worker, &library).map_err(|problem| CrateError::Plugin {
+                package: package.name.clone(),
+                problem,
+            })?;
+        let workers = Arc::new(workers);
+        let entries = kernels
+            .into_iter()
             .enumerate()
             .map(|(i, kernel)| {
-                let plugin = Arc::clone(&plugin);
-                KernelEntry::new(kernel.clone(), move |call| plugin.run(i, call))
+                let (workers, described) = (Arc::clone(&workers), kernel.clone());
+                KernelEntry::new(kernel, move |call| workers.run(i, &described, call))
             })
             .collect();
         Ok(Self {
@@ -219,25 +230,6 @@ impl KernelCrate {
                     .join(", "),
             })
     }
-}
-
-/// Loads a copy of the library under a name of its own: the loader hands out the library that it
-/// already has when it sees a path again, but cargo puts every build of a crate at the same path.
-fn load_copy(library: &Path) -> Result<Plugin, PluginError> {
-    let fail = |e: std::io::Error| PluginError {
-        path: library.to_owned(),
-        problem: format!("it cannot be copied: {e}"),
-    };
-    let folder = library.parent().unwrap_or(Path::new("."));
-    let copy = tempfile::Builder::new()
-        .prefix(".plugin-")
-        .suffix(std::env::consts::DLL_SUFFIX)
-        .tempfile_in(folder)
-        .map_err(fail)?
-        .into_temp_path();
-    std::fs::copy(library, &copy).map_err(fail)?;
-    // What is loaded stays, though the file goes.
-    Plugin::load(&copy)
 }
 
 /// A package with a library, as cargo describes it.
@@ -415,7 +407,8 @@ impl Package {
         progress: &mut dyn FnMut(&str),
     ) -> Result<PathBuf, CrateError> {
         let target_dir = self.target_dir.join("hankel").join("native");
-        let mut child = cargo()
+        let mut command = cargo();
+        command
             .args(["rustc", "--lib", "--release", "--crate-type", "cdylib"])
             .args(["--message-format", "json", "--manifest-path"])
             .arg(&self.manifest)
@@ -424,11 +417,10 @@ impl Package {
             .arg("--")
             .args(native.flags())
             .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(|e| no_cargo(&e))?;
+            .stderr(Stdio::piped());
+        let mut cargo = Running::start(&mut command).map_err(|e| no_cargo(&e))?;
         // Both pipes are drained at once: either could fill up while the other is waited for.
-        let mut stdout = child.stdout.take();
+        let mut stdout = cargo.child.stdout.take();
         let messages = std::thread::spawn(move || {
             let mut text = Vec::new();
             if let Some(out) = &mut stdout {
@@ -438,14 +430,14 @@ impl Package {
             text
         });
         let mut words = String::new();
-        if let Some(stderr) = child.stderr.take() {
+        if let Some(stderr) = cargo.child.stderr.take() {
             for line in BufReader::new(stderr).lines().map_while(Result::ok) {
                 progress(&line);
                 words.push_str(&line);
                 words.push('\n');
             }
         }
-        let status = child.wait().map_err(|e| no_cargo(&e))?;
+        let status = cargo.wait().map_err(|e| no_cargo(&e))?;
         let messages = messages.join().unwrap_or_default();
         let mut diagnostics = String::new();
         let mut library = None;

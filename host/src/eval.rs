@@ -6,11 +6,14 @@
 
 use std::collections::HashMap;
 use std::fmt;
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use hankel_dsl::native::CallError;
+use hankel_dsl::native::call::Ending;
 use hankel_dsl::native::describe::{Kernel, Output, Precision, Range, Role, Scalar, Stage};
+use hankel_system::input::{self, InputError, Lines};
+use hankel_system::output::{self, OutputError};
 
 use crate::crates::{KernelCrate, KernelEntry};
 use crate::device::{Bind, Device, DeviceError, Shader};
@@ -50,14 +53,12 @@ pub enum EvalError {
         /// What is wrong, and what may be set.
         problem: String,
     },
-    /// A file that cannot be read or written.
-    #[error("{}: {problem}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
+    /// The input cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The output cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// Columns that do not fit the kernel.
     #[error("{}: {problem}", path.display())]
     Columns {
@@ -79,6 +80,20 @@ pub enum EvalError {
         column: Option<String>,
         /// What is wrong.
         problem: String,
+    },
+    /// A row that the kernel does not come back from.
+    #[error("{}: row {row}: kernel `{kernel}`: its process {how}, at {inputs}", path.display())]
+    Row {
+        /// The file.
+        path: PathBuf,
+        /// Row, from 1, without the header.
+        row: u64,
+        /// The kernel.
+        kernel: String,
+        /// How its process ended.
+        how: Ending,
+        /// The row's values by name.
+        inputs: String,
     },
     /// The device's words.
     #[error(transparent)]
@@ -538,37 +553,23 @@ pub fn run(
 ) -> Result<u64, EvalError> {
     let table = Table::new(&job.entry.kernel)?;
     let (uniforms, constants) = table.settings(job.settings)?;
-    let unreadable = |e: &dyn fmt::Display| EvalError::File {
-        path: job.input.into(),
-        problem: e.to_string(),
-    };
-    let file = File::open(job.input).map_err(|e| unreadable(&e))?;
-    if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(unreadable(&"it is a folder"));
-    }
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
         .trim(csv::Trim::All)
-        .from_reader(BufReader::new(file));
-    let header = reader.headers().map_err(|e| unreadable(&e))?.clone();
+        .from_reader(input::open_table(job.input)?);
+    let unreadable = |e: csv::Error| InputError::Io {
+        path: job.input.into(),
+        source: e.into(),
+    };
+    let header = reader.headers().map_err(unreadable)?.clone();
     let columns = table.columns(job.input, &header)?;
 
-    let unwritable = |e: &dyn fmt::Display| EvalError::File {
-        path: job.output.into(),
-        problem: e.to_string(),
-    };
-    let folder = match job.output.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    if job.output.is_dir() {
-        return Err(unwritable(&"it is a folder"));
-    }
-    let temporary = temporary(folder).map_err(|e| unwritable(&e))?;
-    let mut writer = csv::Writer::from_writer(BufWriter::new(temporary));
+    let unwritable = |e: csv::Error| OutputError::write(job.output, e);
+    let output = output::Output::create(job.output, &[job.input])?;
+    let mut writer = csv::Writer::from_writer(output);
     writer
         .write_record(table.outputs.iter().map(|c| &c.name))
-        .map_err(|e| unwritable(&e))?;
+        .map_err(unwritable)?;
 
     let mut rows = 0;
     let mut record = csv::StringRecord::new();
@@ -592,7 +593,8 @@ pub fn run(
         if count == 0 {
             break;
         }
-        let results = run_chunk(device, job, &table, &chunk, &constants, count)?;
+        let results = run_chunk(device, job, &table, &chunk, &constants, count)
+            .map_err(|error| of_row(error, job.input, rows + 1))?;
         let mut text = String::new();
         for element in results.chunks_exact(table.output_bytes) {
             for column in &table.outputs {
@@ -601,40 +603,23 @@ pub fn run(
                 let number = Number::read(column.scalar, &element[column.place.1..]);
                 // Writing to a string does not fail.
                 let _ = write!(text, "{number}");
-                writer.write_field(&text).map_err(|e| unwritable(&e))?;
+                writer.write_field(&text).map_err(unwritable)?;
             }
-            writer
-                .write_record(None::<&[u8]>)
-                .map_err(|e| unwritable(&e))?;
+            writer.write_record(None::<&[u8]>).map_err(unwritable)?;
         }
         rows += count as u64;
         progress(rows);
     }
-    let mut buffered = writer.into_inner().map_err(|e| unwritable(&e.error()))?;
-    buffered.flush().map_err(|e| unwritable(&e))?;
-    let temporary = buffered.into_inner().map_err(|e| unwritable(&e.error()))?;
-    temporary
-        .persist(job.output)
-        .map_err(|e| unwritable(&e.error))?;
+    writer
+        .into_inner()
+        .map_err(|e| OutputError::write(job.output, e.into_error()))?
+        .commit()?;
     Ok(rows)
-}
-
-/// A temporary file beside the output, with the permissions that a new file has.
-fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".hankel-").suffix(".csv");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // What the umask leaves of it.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
 }
 
 /// The next record; false at the end.
 fn read(
-    reader: &mut csv::Reader<BufReader<File>>,
+    reader: &mut csv::Reader<Lines>,
     record: &mut csv::StringRecord,
     path: &Path,
     row: u64,
@@ -658,8 +643,8 @@ fn read(
 /// The line on which a record begins. The reader counts the empty lines before it as part of it;
 /// they are looked up again only for an error.
 fn line_of(path: &Path, position: &csv::Position) -> u64 {
-    let skipped = || -> std::io::Result<u64> {
-        let mut file = BufReader::new(File::open(path)?);
+    let skipped = || -> io::Result<u64> {
+        let mut file = BufReader::new(input::open(path).map_err(io::Error::other)?);
         file.seek(SeekFrom::Start(position.byte()))?;
         let empty = file
             .bytes()
@@ -667,7 +652,7 @@ fn line_of(path: &Path, position: &csv::Position) -> u64 {
             .take_while(|b| matches!(b, b'\n' | b'\r'));
         Ok(empty.filter(|&b| b == b'\n').count() as u64)
     };
-    // A file that vanished meanwhile leaves the reader's own count.
+    // A pipe, or a file that vanished meanwhile, leaves the reader's own count.
     position.line() + skipped().unwrap_or(0)
 }
 
@@ -706,6 +691,27 @@ fn append(
         number.write(&mut chunk[argument][starts[argument] + offset..]);
     }
     Ok(())
+}
+
+/// Names the row that a kernel does not come back from; `first` is that of the piece that ran.
+fn of_row(error: EvalError, path: &Path, first: u64) -> EvalError {
+    match error {
+        EvalError::Device(DeviceError::Native {
+            kernel,
+            source:
+                CallError::Ended {
+                    how,
+                    culprit: Some(culprit),
+                },
+        }) => EvalError::Row {
+            path: path.into(),
+            row: first + culprit.element as u64,
+            kernel,
+            how,
+            inputs: culprit.inputs,
+        },
+        other => other,
+    }
 }
 
 fn run_chunk(

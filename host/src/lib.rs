@@ -8,3 +8,4 @@ pub mod frame;
 pub mod inputs;
 pub mod parity;
 pub mod scene;
+pub mod worker;

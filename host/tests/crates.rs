@@ -2,9 +2,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use hankel_host::crates::{CrateError, KernelCrate, Native};
 use hankel_host::device::{Bind, Device, NativeDevice};
+use hankel_host::worker::Worker;
 
 /// A folder for a crate, emptied but for its build.
 fn folder(name: &str) -> PathBuf {
@@ -32,8 +34,17 @@ fn manifest(folder: &Path, rest: &str) -> PathBuf {
     path
 }
 
+/// Kernels run in processes of this program, a call for a second at most.
+fn worker() -> Worker {
+    Worker {
+        program: env!("CARGO_BIN_EXE_hankel-host-worker").into(),
+        arguments: Vec::new(),
+        limit: Duration::from_millis(1000),
+    }
+}
+
 fn refused(manifest: &Path) -> CrateError {
-    KernelCrate::load(manifest, Native::Descriptions, &mut |_| {}).unwrap_err()
+    KernelCrate::load(manifest, Native::Descriptions, &worker(), &mut |_| {}).unwrap_err()
 }
 
 #[test]
@@ -60,18 +71,34 @@ fn a_kernel_crate_is_built_loaded_and_run() {
          /// Reads beyond the end.\n#[kernel(compute, threads(64))]\n\
          pub fn beyond(#[index] i: u32, #[storage] table: Buffer<'_, f32>) -> f32 {\n\
          table.get(i + table.len())\n}\n\
-         hankel_dsl::kernels![parabola, beyond];\n",
+         /// Never ends for 77.\n#[kernel(compute, threads(64))]\n\
+         pub fn endless(#[element] x: f32) -> f32 {\n\
+         while x == 77.0 { core::hint::black_box(x); }\nx\n}\n\
+         fn deep(n: u32) -> u32 {\n\
+         let a = core::hint::black_box([n; 1024]);\n\
+         if n == 0 { 0 } else { deep(n - 1) + a[5] }\n}\n\
+         /// Takes more stack than there is for 55.\n#[kernel(compute, threads(64))]\n\
+         pub fn bottomless(#[element] x: f32) -> f32 {\n\
+         if x == 55.0 { deep(1 << 20) as f32 } else { x }\n}\n\
+         /// All are fine alone.\n#[kernel(compute, threads(64))]\n\
+         pub fn slow(#[element] x: f32) -> f32 {\n\
+         let mut y = x;\nfor _ in 0..20_000_000 { y = core::hint::black_box(y * 0.5); }\ny\n}\n\
+         hankel_dsl::kernels![parabola, beyond, endless, bottomless, slow];\n",
     );
     let mut lines = Vec::new();
-    let described = KernelCrate::load(&manifest, Native::Descriptions, &mut |_| {}).unwrap();
+    let described =
+        KernelCrate::load(&manifest, Native::Descriptions, &worker(), &mut |_| {}).unwrap();
     let selected = ["parabola".to_string()];
-    let one = KernelCrate::load(&manifest, Native::Of(&selected), &mut |_| {}).unwrap();
-    let loaded =
-        KernelCrate::load(&manifest, Native::All, &mut |l| lines.push(l.to_string())).unwrap();
+    let one = KernelCrate::load(&manifest, Native::Of(&selected), &worker(), &mut |_| {}).unwrap();
+    let mut line = |l: &str| lines.push(l.to_string());
+    let loaded = KernelCrate::load(&manifest, Native::All, &worker(), &mut line).unwrap();
     assert!(lines.iter().any(|l| l.contains("Finished")), "{lines:?}");
     assert_eq!(loaded.name, "parabola");
     let text = loaded.entry("parabla").unwrap_err().to_string();
-    assert!(text.contains("parabola, parabola_f64, beyond"), "{text}");
+    assert!(
+        text.contains("parabola, parabola_f64, beyond, endless"),
+        "{text}"
+    );
 
     let mut device = NativeDevice::new();
     let points: Vec<u8> = (0..100).flat_map(|i| (i as f32).to_le_bytes()).collect();
@@ -127,6 +154,42 @@ fn a_kernel_crate_is_built_loaded_and_run() {
         .dispatch(&entry.program(None, &[]), &[Bind::Buffer(out)])
         .unwrap_err();
     assert!(error.to_string().contains("table, output"), "{error}");
+
+    // A kernel that does not come back is an outcome with its input, and the end of its process
+    // alone.
+    for (kernel, words) in [
+        (
+            "endless",
+            &["was ended after 1 s", "at element 77", "x = 77"][..],
+        ),
+        (
+            "bottomless",
+            &["overflowed its stack", "at element 55", "x = 55"],
+        ),
+        ("slow", &["was ended after 1 s"]),
+    ] {
+        let began = Instant::now();
+        let entry = loaded.entry(kernel).unwrap();
+        let error = device
+            .dispatch(
+                &entry.program(None, &[]),
+                &[Bind::Bytes(&points), Bind::Buffer(out)],
+            )
+            .unwrap_err()
+            .to_string();
+        for words in words {
+            assert!(error.contains(words), "{kernel}: {error}");
+        }
+        assert_eq!(error.contains("at element"), kernel != "slow", "{error}");
+        assert!(began.elapsed() < Duration::from_secs(20), "{kernel}");
+    }
+    let entry = loaded.entry("parabola").unwrap();
+    device
+        .dispatch(
+            &entry.program(None, &[]),
+            &[Bind::Bytes(&points), Bind::Buffer(out)],
+        )
+        .unwrap();
 }
 
 #[test]

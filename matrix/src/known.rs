@@ -2,9 +2,9 @@
 //! cell that fails otherwise than the list says fails the run, and so does one that fails no more, so
 //! that the list never rots.
 
-use std::fs;
 use std::path::Path;
 
+use hankel_system::input;
 use serde::Deserialize;
 
 use crate::column::Column;
@@ -12,6 +12,9 @@ use crate::report::{Cell, Outcome, Report};
 
 /// Seed of the inputs that lists speak of: others may not meet a difference, or a greater one.
 pub const SEED: u64 = 1;
+
+/// Most bytes of a list.
+const MAX_BYTES: u64 = 16 << 20;
 
 /// The list.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -95,8 +98,7 @@ impl Known {
     /// # Errors
     /// In words: the file, the place, and what is wrong.
     pub fn read(file: &Path) -> Result<Self, String> {
-        let text =
-            fs::read_to_string(file).map_err(|e| format!("cannot read {}: {e}", file.display()))?;
+        let text = input::read_text(file, MAX_BYTES).map_err(|e| e.to_string())?;
         Self::parse(&text).map_err(|e| format!("{}: {e}", file.display()))
     }
 

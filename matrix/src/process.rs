@@ -1,13 +1,14 @@
 //! Programs of others: started with a time limit, in a process group of their own, with all that
 //! they say kept.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::io::{BufRead, BufReader, Write};
+use std::process::{ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+pub use hankel_system::process::Finished;
+use hankel_system::process::{Log, Program};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -60,105 +61,22 @@ impl Failure {
     }
 }
 
-/// What is kept of a program's words: the end of them.
-const KEPT: usize = 64 * 1024;
-
-/// Text that grows in another thread.
-#[derive(Clone, Debug, Default)]
-struct Log(Arc<Mutex<String>>);
-
-impl Log {
-    fn text(&self) -> String {
-        let text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        text.trim_end().to_owned()
-    }
-
-    fn push(&self, more: &str) {
-        let mut text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        text.push_str(more);
-        if text.len() > KEPT {
-            let mut cut = text.len() - KEPT;
-            while !text.is_char_boundary(cut) {
-                cut += 1;
-            }
-            text.drain(..cut);
+impl From<hankel_system::process::Failure> for Failure {
+    fn from(failure: hankel_system::process::Failure) -> Self {
+        use hankel_system::process::Failure as F;
+        match failure {
+            F::System { .. } => Self::refused(failure.to_string()),
+            F::TimedOut {
+                program,
+                seconds,
+                words,
+            } => Self::TimedOut {
+                program,
+                seconds,
+                log: words,
+            },
         }
     }
-
-    fn follow(&self, mut from: impl Read + Send + 'static) -> thread::JoinHandle<()> {
-        let log = self.clone();
-        thread::spawn(move || {
-            let mut bytes = [0; 4096];
-            while let Ok(n @ 1..) = from.read(&mut bytes) {
-                log.push(&String::from_utf8_lossy(&bytes[..n]));
-            }
-        })
-    }
-}
-
-/// What a program that ended by itself left.
-#[derive(Clone, Debug)]
-pub struct Finished {
-    /// Its exit status.
-    pub status: ExitStatus,
-    /// What it wrote to standard output.
-    pub stdout: String,
-    /// What it wrote to standard error.
-    pub stderr: String,
-}
-
-impl Finished {
-    /// All that it wrote.
-    #[must_use]
-    pub fn words(&self) -> String {
-        format!("{}\n{}", self.stdout.trim_end(), self.stderr.trim_end())
-            .trim()
-            .to_owned()
-    }
-
-    /// Whether a signal ended it, and which.
-    #[must_use]
-    pub fn crash(&self) -> Option<String> {
-        (self.status.code().is_none()).then(|| describe(self.status))
-    }
-}
-
-/// `exit status: 1`, `signal: 11 (SIGSEGV)`.
-fn describe(status: ExitStatus) -> String {
-    status.to_string()
-}
-
-/// Starts a program in a group of its own.
-fn start(command: &mut Command, program: &str) -> Result<Child, Failure> {
-    #[cfg(unix)]
-    std::os::unix::process::CommandExt::process_group(command, 0);
-    command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|e| Failure::refused(format!("cannot start {program}: {e}")))
-}
-
-/// Ends a program and what it started.
-fn kill(child: &mut Child) {
-    if cfg!(unix) {
-        // The group's number is the program's. What fails here has ended already.
-        let _ = Command::new("kill")
-            .args(["-KILL", "--", &format!("-{}", child.id())])
-            .stderr(Stdio::null())
-            .status();
-    }
-    let _ = child.kill();
-    let _ = child.wait();
-}
-
-fn name(command: &Command) -> String {
-    let program = std::path::Path::new(command.get_program());
-    program
-        .file_name()
-        .unwrap_or(command.get_program())
-        .to_string_lossy()
-        .into_owned()
 }
 
 /// Runs a program to its end.
@@ -167,53 +85,13 @@ fn name(command: &Command) -> String {
 /// [`Failure::TimedOut`]; [`Failure::Refused`] if it cannot be started. Its exit status is for the
 /// caller to judge.
 pub fn run(command: &mut Command, limit: Duration) -> Result<Finished, Failure> {
-    let program = name(command);
-    let mut child = start(command.stdin(Stdio::null()), &program)?;
-    let (out, err) = (Log::default(), Log::default());
-    let readers: Vec<_> = [
-        child.stdout.take().map(|s| out.follow(s)),
-        child.stderr.take().map(|s| err.follow(s)),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    let began = Instant::now();
-    let mut pause = Duration::from_millis(1);
-    let status = loop {
-        // What it has started may hold its pipes after its own end.
-        let ended = match child.try_wait() {
-            Ok(status) => status.filter(|_| readers.iter().all(|r| r.is_finished())),
-            Err(e) => {
-                kill(&mut child);
-                return Err(Failure::refused(format!("cannot wait for {program}: {e}")));
-            }
-        };
-        match ended {
-            Some(status) => break status,
-            None if began.elapsed() < limit => thread::sleep(pause),
-            None => {
-                kill(&mut child);
-                return Err(Failure::TimedOut {
-                    program,
-                    seconds: limit.as_secs(),
-                    log: format!("{}\n{}", out.text(), err.text()).trim().to_owned(),
-                });
-            }
-        }
-        pause = (pause * 2).min(Duration::from_millis(20));
-    };
-    Ok(Finished {
-        status,
-        stdout: out.text(),
-        stderr: err.text(),
-    })
+    Ok(hankel_system::process::run(command, limit)?)
 }
 
 /// A program that answers one job after the other, see [`crate::job`].
 #[derive(Debug)]
 pub struct Runner {
-    program: String,
-    child: Child,
+    program: Program,
     input: Option<ChildStdin>,
     lines: Receiver<String>,
     log: Log,
@@ -227,14 +105,21 @@ impl Runner {
     /// # Errors
     /// It ends or says something else first.
     pub fn start(command: &mut Command, limit: Duration) -> Result<Self, Failure> {
-        let program = name(command);
-        let mut child = start(command.stdin(Stdio::piped()), &program)?;
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut program = Program::start(command).map_err(|e| {
+            let name = hankel_system::process::name(command);
+            Failure::refused(format!("cannot start {name}: {e}"))
+        })?;
         let log = Log::default();
-        if let Some(stderr) = child.stderr.take() {
-            log.follow(stderr);
+        if let Some(stderr) = program.child.stderr.take() {
+            log.follow(stderr)
+                .map_err(|e| Failure::refused(format!("cannot follow a program: {e}")))?;
         }
         let (sender, lines) = channel();
-        if let Some(stdout) = child.stdout.take() {
+        if let Some(stdout) = program.child.stdout.take() {
             thread::spawn(move || {
                 for line in BufReader::new(stdout).lines() {
                     let Ok(line) = line else { break };
@@ -245,9 +130,8 @@ impl Runner {
             });
         }
         let mut runner = Self {
+            input: program.child.stdin.take(),
             program,
-            input: child.stdin.take(),
-            child,
             lines,
             log,
             ready: String::new(),
@@ -282,7 +166,7 @@ impl Runner {
         let Some(message) = reply.error else {
             return Ok(());
         };
-        let program = self.program.clone();
+        let program = self.program.name().to_owned();
         Err(match reply.kind {
             Kind::Refused => Failure::Refused { message },
             Kind::Lacks => Failure::Lacks { what: message },
@@ -301,7 +185,7 @@ impl Runner {
 
     /// Whether it still runs.
     pub fn lives(&mut self) -> bool {
-        matches!(self.child.try_wait(), Ok(None))
+        matches!(self.program.try_wait(), Ok(None))
     }
 
     /// Waits for a line that `take` takes; other lines are kept as words.
@@ -322,9 +206,9 @@ impl Runner {
                     self.log.push(&format!("{line}\n"));
                 }
                 Err(RecvTimeoutError::Timeout) => {
-                    kill(&mut self.child);
+                    self.program.kill();
                     return Err(Failure::TimedOut {
-                        program: self.program.clone(),
+                        program: self.program.name().to_owned(),
                         seconds: limit.as_secs(),
                         log: self.log.text(),
                     });
@@ -338,20 +222,14 @@ impl Runner {
     fn crashed(&mut self) -> Failure {
         self.input = None;
         // It may still be on its way out.
-        let until = Instant::now() + Duration::from_secs(2);
-        let status = loop {
-            match self.child.try_wait() {
-                Ok(Some(status)) => break Some(status),
-                Ok(None) if Instant::now() < until => thread::sleep(Duration::from_millis(10)),
-                _ => break None,
-            }
-        };
+        let status = self.program.wait_for(Duration::from_secs(2));
+        let status = status.ok().flatten();
         if status.is_none() {
-            kill(&mut self.child);
+            self.program.kill();
         }
         Failure::Crashed {
-            program: self.program.clone(),
-            how: status.map_or_else(|| "it closed its output".into(), describe),
+            program: self.program.name().to_owned(),
+            how: status.map_or_else(|| "it closed its output".into(), |s| s.to_string()),
             log: self.log.text(),
         }
     }
@@ -361,14 +239,7 @@ impl Drop for Runner {
     fn drop(&mut self) {
         // A runner ends when its input does; a moment for it to tidy up.
         self.input = None;
-        let until = Instant::now() + Duration::from_secs(3);
-        while Instant::now() < until {
-            match self.child.try_wait() {
-                Ok(None) => thread::sleep(Duration::from_millis(5)),
-                _ => return,
-            }
-        }
-        kill(&mut self.child);
+        let _ = self.program.wait_for(Duration::from_secs(3));
     }
 }
 
@@ -386,31 +257,12 @@ mod tests {
     const LONG: Duration = Duration::from_secs(20);
 
     #[test]
-    fn words_and_status_are_kept() {
-        let done = run(&mut shell("echo out; echo err >&2; exit 3"), LONG).unwrap();
-        assert_eq!(done.status.code(), Some(3));
-        assert_eq!((done.stdout.as_str(), done.stderr.as_str()), ("out", "err"));
-        assert_eq!(done.crash(), None);
-        let dead = run(&mut shell("kill -SEGV $$"), LONG).unwrap();
-        assert!(dead.crash().unwrap().contains("11"), "{dead:?}");
-    }
-
-    #[test]
-    fn a_hanging_program_is_ended_with_what_it_started() {
-        // It waits for what it started, or leaves it behind with the pipes open.
-        for script in ["echo begun; sleep 60 & wait", "echo begun; sleep 60 &"] {
-            let began = Instant::now();
-            let error = run(&mut shell(script), SHORT).unwrap_err();
-            assert!(began.elapsed() < LONG);
-            assert!(
-                matches!(&error, Failure::TimedOut { log, .. } if log == "begun"),
-                "{error:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_missing_program_is_an_error() {
+    fn a_program_that_hangs_or_is_missing_is_a_failure() {
+        let error = run(&mut shell("echo begun; sleep 60"), SHORT).unwrap_err();
+        assert!(
+            matches!(&error, Failure::TimedOut { log, .. } if log == "begun"),
+            "{error:?}"
+        );
         let error = run(&mut Command::new("no-such-program"), LONG).unwrap_err();
         assert!(error.to_string().contains("no-such-program"), "{error}");
     }

@@ -7,8 +7,10 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread;
 use std::time::Duration;
 
+use hankel_system::temporary::Folder;
 use serde::{Deserialize, Serialize};
 
 use crate::process::run;
@@ -48,7 +50,10 @@ const DXC_SHA256: &str = "fb549976da7abff1ee56bdfa4f5ab156b95e971d4270b5b4447b61
 /// The driver around that library.
 const DXC_DRIVER: &str = include_str!("dxc.cpp");
 
-/// How long a tool may take to say its version, or to be made.
+/// How long a tool may take to say its version.
+const PROBE: Duration = Duration::from_secs(10);
+
+/// How long the driver of DXC's library may take to be made.
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// Where one is, or what would install it.
@@ -215,6 +220,33 @@ impl Tools {
         Self { folder }
     }
 
+    /// Looks for several at a time: one that hangs delays none of the others.
+    #[must_use]
+    pub fn statuses(&self, wanted: &[Tool]) -> Vec<Status> {
+        thread::scope(|scope| {
+            let probes: Vec<_> = wanted
+                .iter()
+                .map(|&tool| {
+                    let name = "probe".to_owned();
+                    let probe = thread::Builder::new().name(name);
+                    // Without a thread, in turn.
+                    probe
+                        .spawn_scoped(scope, move || self.status(tool))
+                        .map_err(|_| tool)
+                })
+                .collect();
+            probes
+                .into_iter()
+                .map(|probe| match probe {
+                    Ok(thread) => thread
+                        .join()
+                        .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+                    Err(tool) => self.status(tool),
+                })
+                .collect()
+        })
+    }
+
     /// Looks for one.
     #[must_use]
     pub fn status(&self, tool: Tool) -> Status {
@@ -375,8 +407,8 @@ impl Tools {
     fn make_driver(&self, driver: &Path) -> Result<(), String> {
         let compiler = program(&["c++", "g++", "clang++", "clang++-19"], "CXX")
             .ok_or("there is no C++ compiler for the driver of DXC's library: install g++")?;
-        let work = tempfile::tempdir_in(&self.folder).map_err(|e| e.to_string())?;
-        let (source, made) = (work.path().join("dxc.cpp"), work.path().join("dxc"));
+        let work = Folder::within(&self.folder).map_err(|e| e.to_string())?;
+        let (source, made) = (work.join("dxc.cpp"), work.join("dxc"));
         fs::write(&source, DXC_DRIVER).map_err(|e| e.to_string())?;
         let mut command = Command::new(&compiler);
         command.args(["-O1", "-std=c++17", "-o"]);
@@ -405,7 +437,7 @@ impl Tools {
             Dxc::Library { driver, library } => {
                 let mut command = Command::new(&driver);
                 command.args([library.as_os_str(), "--version".as_ref()]);
-                let done = run(&mut command, LIMIT).map_err(|e| e.to_string())?;
+                let done = run(&mut command, PROBE).map_err(|e| e.to_string())?;
                 if !done.status.success() {
                     return Err(done.words());
                 }
@@ -446,7 +478,7 @@ fn in_path(name: &Path) -> Option<PathBuf> {
 
 /// The first line that names a version.
 fn version(program: &Path, arguments: &[&str]) -> Result<String, String> {
-    let done = run(Command::new(program).args(arguments), LIMIT).map_err(|e| e.to_string())?;
+    let done = run(Command::new(program).args(arguments), PROBE).map_err(|e| e.to_string())?;
     let words = done.words();
     words
         .lines()

@@ -1,7 +1,7 @@
 //! Reports as people and programs get them.
 
 use hankel_numerics::report::{
-    Axis, Cell, Column, Plot, Report, ReportError, Series, Style, Table, write_whole,
+    Axis, Cell, Column, Plot, Report, ReportError, Series, Style, Table,
 };
 
 fn sample() -> Report {
@@ -173,18 +173,9 @@ fn plots_of_nothing_and_of_one_point_are_drawn() {
 fn a_file_stands_where_the_folder_should() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
-    write_whole(&file, b"x").unwrap();
-    assert_eq!(std::fs::read(&file).unwrap(), b"x");
+    std::fs::write(&file, "x").unwrap();
     let error = sample().write(&file, "bounds").unwrap_err();
-    assert!(matches!(&error, ReportError::Io { path, .. } if *path == file));
-    assert!(error.to_string().contains("--out"));
-}
-
-#[test]
-fn existing_files_are_replaced_as_a_whole() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("file");
-    write_whole(&file, b"a long first version").unwrap();
-    write_whole(&file, b"short").unwrap();
-    assert_eq!(std::fs::read(&file).unwrap(), b"short");
+    assert!(matches!(&error, ReportError::Output(error) if !error.is_machine()));
+    assert!(error.to_string().contains("should be a folder"), "{error}");
+    assert_eq!(std::fs::read(&file).unwrap(), b"x");
 }

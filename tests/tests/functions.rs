@@ -17,7 +17,6 @@ use hankel_codegen::Language;
 use hankel_codegen::functions::ir::Library;
 use hankel_codegen::functions::print::Naming;
 use hankel_codegen::functions::{self, FORMS, crates};
-use hankel_codegen::source_hash::hash;
 use hankel_codegen::translate::Place;
 use hankel_dsl::native::call::{Arg, CallError};
 use hankel_dsl::native::describe::{
@@ -41,8 +40,8 @@ fn root() -> PathBuf {
 
 /// The built-in library, translated from its sources.
 static LIBRARY: LazyLock<Library> = LazyLock::new(|| {
-    let sources = hash(&root().join("kernels/shadows/Cargo.toml")).expect("the sources are there");
-    let texts = crates::texts(&sources).expect("the sources can be read");
+    let manifest = root().join("kernels/shadows/Cargo.toml");
+    let texts = crates::texts(&manifest).expect("the sources can be read");
     let mut libraries = functions::read(&texts).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(libraries.len(), 1);
     libraries.remove(0)

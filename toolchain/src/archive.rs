@@ -1,9 +1,11 @@
 //! Toolchains as one file: `.tar.zst`, entries relative to the sysroot.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
+use hankel_system::input;
+use hankel_system::output::Output;
 use sha2::Digest;
 
 use crate::cache::{Staging, check_space};
@@ -20,6 +22,9 @@ const EXPANSION: u64 = 6;
 
 /// zstd's level for packing: it is done once and read often.
 const LEVEL: i32 = 19;
+
+/// Most bytes of a `SHA256SUMS` file.
+const MAX_SUMS: u64 = 16 << 20;
 
 /// Bytes between two reports of progress.
 const REPORT_EVERY: u64 = 1 << 20;
@@ -44,14 +49,14 @@ pub(crate) fn expected_sha256(options: &Options, archive: &Path) -> Result<Strin
     }
     let name = archive.file_name().unwrap_or_default().to_string_lossy();
     let sums = archive.with_file_name("SHA256SUMS");
-    match fs::read_to_string(&sums) {
+    match input::read_text(&sums, MAX_SUMS) {
         Ok(text) => {
             if let Some(sum) = in_sums(&text, &name) {
                 return checked_syntax(sum);
             }
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        Err(error) => return Err(error).during("read", &sums),
+        Err(error) if error.is_missing() => {}
+        Err(error) => return Err(error.into()),
     }
     let known = pinned::ARCHIVES.iter().find(|(known, _)| *known == name);
     match known {
@@ -112,9 +117,9 @@ pub(crate) fn unpack(
     staging: &Staging<'_>,
     progress: &mut dyn Progress,
 ) -> Result<()> {
-    let file = File::open(archive).during("open", archive)?;
+    let file = input::open(archive)?;
     let total = file.metadata().during("read", archive)?.len();
-    let needed = total * EXPANSION;
+    let needed = total.saturating_mul(EXPANSION);
     check_space(options, staging.path(), needed)?;
     let reporting = Reporting {
         inner: file,
@@ -258,18 +263,14 @@ pub fn pack(toolchain: &Toolchain, folder: &Path, progress: &mut dyn Progress) -
     fs::create_dir_all(folder).during("create", folder)?;
     let name = format!("{}.tar.zst", pinned::name());
     let path = folder.join(&name);
-    let partial = folder.join(format!(".{name}.partial"));
-    let result = write_archive(&toolchain.root, &partial, progress);
-    let (sha256, bytes) = match result {
-        Ok(written) => written,
-        Err(error) => {
-            let _ = fs::remove_file(&partial);
-            return Err(error);
-        }
-    };
-    fs::rename(&partial, &path).during("create", &path)?;
+    let output = Output::create(&path, &[])?;
     let sums = folder.join("SHA256SUMS");
-    let text = fs::read_to_string(&sums).unwrap_or_default();
+    let text = match input::read_text(&sums, MAX_SUMS) {
+        Ok(text) => text,
+        Err(error) if error.is_missing() => String::new(),
+        Err(error) => return Err(error.into()),
+    };
+    let (sha256, bytes) = write_archive(&toolchain.root, output, progress)?;
     let mut lines: Vec<String> = text
         .lines()
         .filter(|line| in_sums(line, &name).is_none())
@@ -277,7 +278,7 @@ pub fn pack(toolchain: &Toolchain, folder: &Path, progress: &mut dyn Progress) -
         .chain([format!("{sha256}  {name}")])
         .collect();
     lines.sort_by(|a, b| a.get(64..).cmp(&b.get(64..)));
-    fs::write(&sums, lines.join("\n") + "\n").during("write", &sums)?;
+    Output::create(&sums, &[])?.finish((lines.join("\n") + "\n").as_bytes())?;
     Ok(Packed {
         path,
         sha256,
@@ -305,16 +306,20 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
-fn write_archive(root: &Path, path: &Path, progress: &mut dyn Progress) -> Result<(String, u64)> {
+fn write_archive(
+    root: &Path,
+    output: Output,
+    progress: &mut dyn Progress,
+) -> Result<(String, u64)> {
     progress.step("pack", 1, 1);
     let files = entries(root)?;
     let mut total = 0;
     for file in &files {
         total += fs::symlink_metadata(file).during("read", file)?.len();
     }
-    let file = BufWriter::new(File::create(path).during("create", path)?);
+    let path = &output.path().to_owned();
     let writer = HashingWriter {
-        inner: file,
+        inner: output,
         hash: sha2::Sha256::new(),
         bytes: 0,
     };
@@ -330,8 +335,8 @@ fn write_archive(root: &Path, path: &Path, progress: &mut dyn Progress) -> Resul
         progress.advance(done, Some(total));
     }
     let encoder = tar.into_inner().during("write", path)?;
-    let mut writer = encoder.finish().during("write", path)?;
-    writer.flush().during("write", path)?;
+    let writer = encoder.finish().during("write", path)?;
+    writer.inner.commit()?;
     Ok((hex(writer.hash), writer.bytes))
 }
 

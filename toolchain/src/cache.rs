@@ -92,7 +92,13 @@ impl Locked {
             let name = name.to_string_lossy();
             if name.starts_with(".new-") || name.starts_with(".old-") {
                 let path = entry.path();
-                fs::remove_dir_all(&path).during("remove", &path)?;
+                let folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+                let removed = if folder {
+                    fs::remove_dir_all(&path)
+                } else {
+                    fs::remove_file(&path)
+                };
+                removed.during("remove", &path)?;
             }
         }
         Ok(())
@@ -102,6 +108,7 @@ impl Locked {
     pub(crate) fn staging(&self) -> Result<Staging<'_>> {
         let path = self.cache.folder.join(format!(".new-{}", pinned::name()));
         fs::create_dir(&path).during("create", &path)?;
+        hankel_system::signals::remember(&path);
         Ok(Staging { locked: self, path })
     }
 }
@@ -143,6 +150,7 @@ impl Drop for Staging<'_> {
     fn drop(&mut self) {
         // After `publish` it is gone already. What cannot be removed now is swept later.
         let _ = fs::remove_dir_all(&self.path);
+        hankel_system::signals::forget(&self.path);
     }
 }
 

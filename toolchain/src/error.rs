@@ -17,6 +17,14 @@ pub enum Error {
         source: std::io::Error,
     },
 
+    /// A file that was given cannot be read.
+    #[error(transparent)]
+    Input(#[from] hankel_system::input::InputError),
+
+    /// A file that was asked for cannot be written.
+    #[error(transparent)]
+    Output(#[from] hankel_system::output::OutputError),
+
     /// Nothing usable is there, and nothing was given to install it from.
     #[error(
         "no rust-gpu compiler is installed in {} and none was given\n\
@@ -92,8 +100,8 @@ pub enum Error {
 
     /// An archive cannot be decompressed or its entries not be read.
     #[error(
-        "{} is truncated or not a .tar.zst archive: {source}\n\
-         help: fetch it again, or pack it again with `hankel toolchain pack`",
+        "{} cannot be unpacked: {source}\n\
+         help: it may be truncated, or no .tar.zst archive: fetch it again, or pack it again with `hankel toolchain pack`",
         path.display()
     )]
     Archive {

@@ -2,10 +2,12 @@
 //! callback, and the end of it into the error if they fail.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
+
+use hankel_system::process::Program;
 
 use crate::error::{During, Error, Result};
 
@@ -15,21 +17,8 @@ const TAIL_LINES: usize = 12;
 /// Characters of each that it quotes: some command lines are very long.
 const TAIL_WIDTH: usize = 240;
 
-/// Times that a busy program is tried again.
-const BUSY_RETRIES: u32 = 50;
-
-/// Kills the program when the caller unwinds, so that nothing goes on writing into a
-/// folder that nobody watches.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        if let Ok(None) = self.0.try_wait() {
-            let _ = self.0.kill();
-            let _ = self.0.wait();
-        }
-    }
-}
+/// How long a program may take to say something about itself.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Runs `command` to its end and gives every line that it prints to `each`.
 pub(crate) fn run(
@@ -42,15 +31,13 @@ pub(crate) fn run(
     let (reader, writer) = std::io::pipe().during("open a pipe for", log)?;
     let program = PathBuf::from(command.get_program());
     let twin = writer.try_clone().during("open a pipe for", log)?;
-    let child = command
-        .stdin(Stdio::null())
-        .stdout(writer)
-        .stderr(twin)
-        .spawn()
+    // It ends when the caller unwinds, so that nothing goes on writing into a folder that nobody
+    // watches.
+    let running = Program::start(command.stdin(Stdio::null()).stdout(writer).stderr(twin))
         .during("run", &program);
     // The command keeps the write ends: without this the reader would never see the end.
     command.stdout(Stdio::null()).stderr(Stdio::null());
-    let mut running = Running(child?);
+    let mut running = running?;
     let mut tail: Vec<String> = Vec::new();
     for line in BufReader::new(reader).split(b'\n') {
         let line = line.during("read the output of", &program)?;
@@ -65,7 +52,7 @@ pub(crate) fn run(
             tail.push(line.chars().take(TAIL_WIDTH).collect());
         }
     }
-    let status = running.0.wait().during("wait for", &program)?;
+    let status = running.wait().during("wait for", &program)?;
     if status.success() {
         return Ok(());
     }
@@ -78,25 +65,25 @@ pub(crate) fn run(
 }
 
 /// What `command` prints on its standard output, if it succeeds.
-///
-/// A program that was written a moment ago may be refused as busy: another thread's
-/// child process has inherited the file while it was open and not let go of it yet.
 pub(crate) fn output(command: &mut Command) -> Option<String> {
-    command.stdin(Stdio::null()).stderr(Stdio::null());
-    let busy = |error: &std::io::Error| error.kind() == ErrorKind::ExecutableFileBusy;
-    let mut output = command.output();
-    for _ in 0..BUSY_RETRIES {
-        if !output.as_ref().is_err_and(busy) {
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-        output = command.output();
-    }
-    let output = output.ok()?;
-    output
-        .status
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let mut running = Program::start(command).ok()?;
+    let mut text = Vec::new();
+    running.child.stdout.take()?.read_to_end(&mut text).ok()?;
+    let status = running.wait().ok()?;
+    status
         .success()
-        .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+        .then(|| String::from_utf8_lossy(&text).into_owned())
+}
+
+/// What a program says about itself in a line or two, if it says so soon.
+pub(crate) fn ask(command: &mut Command) -> Option<String> {
+    let done = hankel_system::process::run(command, PATIENCE).ok()?;
+    let text = done.stdout.trim();
+    (done.status.success() && !text.is_empty()).then(|| text.to_owned())
 }
 
 /// Where `program` is in `PATH`.
@@ -171,6 +158,7 @@ mod tests {
             .to_string();
         assert!(error.contains("hankel-no-such-program"), "{error}");
         assert_eq!(output(&mut command), None);
+        assert_eq!(ask(&mut command), None);
         std::fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -192,13 +192,22 @@ fn source(options: &Options) -> Way {
 /// every file of an installed toolchain, asks programs for their versions, and uses no
 /// network.
 pub fn status(options: &Options) -> Status {
-    let ways = vec![
-        explicit(options),
-        cache(options),
-        archive(options),
-        rustup(),
-        source(options),
-    ];
+    // At the same time: a program that hangs delays none of the others.
+    let ways = std::thread::scope(|scope| {
+        let ways = [
+            scope.spawn(|| explicit(options)),
+            scope.spawn(|| cache(options)),
+            scope.spawn(|| archive(options)),
+            scope.spawn(rustup),
+            scope.spawn(|| source(options)),
+        ];
+        ways.into_iter()
+            .map(|way| {
+                way.join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            })
+            .collect::<Vec<_>>()
+    });
     let state = |origin| {
         ways.iter()
             .find(|way| way.origin == origin)

@@ -107,7 +107,7 @@ impl Toolchain {
             version_of(&rustc)
         };
         let Some(rustc_version) = version else {
-            return Err("its bin/rustc does not run on this machine".to_owned());
+            return Err("its bin/rustc does not run on this machine, or says nothing".to_owned());
         };
         let rust_gpu_version = rust_gpu_in(&rustc_version).unwrap_or("unknown").to_owned();
         if rust_gpu_version != "unknown" && rust_gpu_version != pinned::RUST_GPU_VERSION {
@@ -179,8 +179,7 @@ fn rust_gpu_in(version: &str) -> Option<&str> {
 }
 
 fn ask_version(rustc: &Path) -> Option<String> {
-    let version = process::output(Command::new(rustc).arg("--version"))?;
-    Some(version.trim().to_owned())
+    process::ask(Command::new(rustc).arg("--version"))
 }
 
 /// A program's file and its time stamp, and what it said.
@@ -199,9 +198,7 @@ pub(crate) fn version_of(rustc: &Path) -> Option<String> {
     {
         return Some(version.clone());
     }
-    let version = process::output(Command::new(rustc).arg("--version"))?
-        .trim()
-        .to_owned();
+    let version = ask_version(rustc)?;
     if let Ok(mut known) = known.lock() {
         known.insert(key, version.clone());
     }

@@ -8,6 +8,7 @@ use hankel_numerics::accuracy::table_1;
 use hankel_numerics::peer::default_python;
 use hankel_numerics::report::{Column, Table};
 use hankel_numerics::speed::{self, Program};
+use hankel_system::output;
 
 use super::{command_line, deliver};
 use crate::args::{Bench, BenchBounds, BenchCommand, Format, Rival};
@@ -26,6 +27,9 @@ pub fn run(args: &Bench, quiet: bool) -> Result<Outcome> {
 }
 
 fn bounds(args: &BenchBounds, quiet: bool) -> Result<Outcome> {
+    if let Some(folder) = &args.out {
+        output::folder(folder)?;
+    }
     let mut options = if args.quick {
         speed::Options::quick()
     } else {

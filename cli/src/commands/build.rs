@@ -4,12 +4,13 @@ use std::time::SystemTime;
 
 use hankel_codegen::Language;
 use hankel_codegen::build::{MANIFEST_FILE, build, check_output};
-use hankel_codegen::files::write_whole;
+use hankel_system::output::Output;
 
-use super::{functions, print_json};
+use super::functions;
 use crate::args::{Build, Form, Format};
 use crate::depfile;
 use crate::failure::{Failure, Outcome, Result};
+use crate::print::{self, say};
 use crate::session::Session;
 use crate::watch::Edits;
 
@@ -49,7 +50,7 @@ fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
         });
         match built {
             Ok(inputs) => edits.add(&inputs, &sources),
-            Err(failure) => eprintln!("{:?}", miette::Report::new(failure)),
+            Err(failure) => print::note(format_args!("{:?}", miette::Report::new(failure))),
         }
         edits.wait()?;
     }
@@ -71,18 +72,18 @@ fn once(args: &Build, session: &Session, quiet: bool) -> Result<Outcome> {
     let report = build(&request, &session.modules()?, &args.out, args.force)?;
     if let Some(file) = &args.depfile {
         let text = depfile::rule(&args.out.join(MANIFEST_FILE), &session.inputs()?);
-        write_whole(file, text.as_bytes())?;
+        Output::create(file, &[])?.finish(text.as_bytes())?;
         // Make compares times: a manifest that stays as it was must not be older than its inputs.
         touch(&args.out.join(MANIFEST_FILE))?;
     }
     if args.format == Format::Json {
-        print_json(&report);
+        print::json(&report);
         return Ok(Outcome::Fine);
     }
     if quiet {
         return Ok(Outcome::Fine);
     }
-    println!(
+    say!(
         "{}: {} kernels, {} files written, {} unchanged, {} removed",
         args.out.display(),
         report.kernels,
@@ -96,7 +97,7 @@ fn once(args: &Build, session: &Session, quiet: bool) -> Result<Outcome> {
         kernels.push(kernel.as_str());
     }
     for ((language, why), kernels) in missing {
-        println!("no {language} of {}: {why}", kernels.join(", "));
+        say!("no {language} of {}: {why}", kernels.join(", "));
     }
     Ok(Outcome::Fine)
 }

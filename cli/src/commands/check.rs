@@ -3,9 +3,10 @@ use std::path::Path;
 use hankel_codegen::build::generate;
 use hankel_codegen::check::{Config, check};
 
-use super::{functions, print_json};
+use super::functions;
 use crate::args::{Check, Format};
 use crate::failure::{Failure, Outcome, Result};
+use crate::print::{self, say};
 use crate::session::Session;
 
 /// The budget that is used without being named.
@@ -41,9 +42,9 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
     let generated = generate(&request, &session.modules()?)?;
     let report = check(&generated, &args.folder, &budget)?;
     if args.format == Format::Json {
-        print_json(&report);
+        print::json(&report);
     } else if !quiet || !report.is_fine() {
-        println!("{report}");
+        say!("{report}");
     }
     Ok(Outcome::of(report.is_fine()))
 }

@@ -1,14 +1,14 @@
 use hankel_matrix::tools::{Status, Tool};
 
-use super::print_json;
 use crate::args::{Doctor, Format};
 use crate::failure::{Outcome, Result};
+use crate::print::{self, say};
 
 pub fn run(args: &Doctor) -> Result<Outcome> {
     let tools = super::parity::tools();
-    let all: Vec<Status> = Tool::ALL.into_iter().map(|t| tools.status(t)).collect();
+    let all = tools.statuses(&Tool::ALL);
     if args.format == Format::Json {
-        print_json(&all);
+        print::json(&all);
     } else {
         for status in &all {
             print(status);
@@ -27,9 +27,9 @@ fn print(status: &Status) {
         (_, Some(problem)) => format!("cannot be used: {problem}"),
         (None, None) => "not installed".into(),
     };
-    println!("{}: {found}", status.name);
-    println!("    {}; licence: {}", status.purpose, status.licence);
+    say!("{}: {found}", status.name);
+    say!("    {}; licence: {}", status.purpose, status.licence);
     if !status.is_there() {
-        println!("    {}", status.install);
+        say!("    {}", status.install);
     }
 }

@@ -1,9 +1,13 @@
+use std::path::Path;
+use std::time::Duration;
+
 use hankel_dsl::native::describe;
 use hankel_host::device::{Arithmetic, Backend, open};
 use hankel_host::eval::{Job, parse_setting, select};
 
 use crate::args::{Eval, Precision};
-use crate::failure::{Outcome, Result};
+use crate::failure::{Failure, Outcome, Result};
+use crate::print::say;
 use crate::progress::Progress;
 use crate::session::Session;
 
@@ -14,7 +18,7 @@ pub fn run(args: &Eval, quiet: bool) -> Result<Outcome> {
         Precision::F64 => describe::Precision::F64,
     });
     let name = &select(&session.krate, &args.kernel, precision)?.kernel.name;
-    let krate = session.native([name])?;
+    let krate = session.native([name], Duration::from_secs(args.limit))?;
     let entry = krate.entry(name)?;
     let settings = args
         .set
@@ -41,11 +45,22 @@ pub fn run(args: &Eval, quiet: bool) -> Result<Outcome> {
     })?;
     drop(progress);
     if !quiet {
-        println!(
+        say!(
             "{rows} rows through {} on {}",
             entry.kernel.name,
             device.name()
         );
     }
+    Ok(Outcome::Fine)
+}
+
+/// Runs kernels of another crate for the process that started this one.
+pub fn serve(library: &Path) -> Result<Outcome> {
+    hankel_host::worker::serve(library).map_err(|error| {
+        Failure::machine(
+            format!("the process that asked for kernels is gone: {error}"),
+            None,
+        )
+    })?;
     Ok(Outcome::Fine)
 }

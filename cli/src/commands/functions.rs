@@ -7,9 +7,9 @@ use hankel_codegen::functions::folder::Folder;
 use hankel_codegen::functions::source::CrateText;
 use hankel_codegen::functions::{crates, read};
 
-use super::print_json;
 use crate::args::Format;
 use crate::failure::{Failure, Outcome, Result};
+use crate::print::{self, say};
 use crate::session::built_in_manifest;
 
 /// Translates the libraries of the crate at `manifest`, or of the built-in one. No kernel is
@@ -71,9 +71,9 @@ pub fn build(
 ) -> Result<Outcome> {
     let report = folder(manifest, prefix)?.write(out, force)?;
     if format == Format::Json {
-        print_json(&report);
+        print::json(&report);
     } else if !quiet {
-        println!(
+        say!(
             "{}: {} functions, {} files written, {} unchanged, {} removed",
             out.display(),
             report.functions,
@@ -95,9 +95,9 @@ pub fn check(
 ) -> Result<Outcome> {
     let differences = folder(manifest, prefix)?.check(committed)?;
     if format == Format::Json {
-        print_json(&differences);
+        print::json(&differences);
     } else if !quiet || !differences.is_fine() {
-        println!("{differences}");
+        say!("{differences}");
     }
     Ok(Outcome::of(differences.is_fine()))
 }

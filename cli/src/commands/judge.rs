@@ -2,6 +2,7 @@ use hankel_numerics::judge::{DepthFunction, Judge, JudgeError, Range, table};
 
 use crate::args::Judge as Args;
 use crate::failure::{Failure, Outcome, Result};
+use crate::print::say;
 use crate::progress::Progress;
 
 pub fn run(args: &Args, quiet: bool) -> Result<Outcome> {
@@ -17,7 +18,7 @@ pub fn run(args: &Args, quiet: bool) -> Result<Outcome> {
     })?;
     drop(progress);
     if !quiet {
-        println!("{rows} rows judged by a linear programme");
+        say!("{rows} rows judged by a linear programme");
     }
     Ok(Outcome::Fine)
 }

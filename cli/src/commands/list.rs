@@ -4,9 +4,9 @@ use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::describe::{BuiltIn, Kernel, Output, Precision, Role, Stage, Type};
 
-use super::print_json;
 use crate::args::{Format, List};
 use crate::failure::{Outcome, Result};
+use crate::print::{self, say};
 use crate::session::Session;
 
 pub fn run(args: &List, quiet: bool) -> Result<Outcome> {
@@ -18,12 +18,18 @@ pub fn run(args: &List, quiet: bool) -> Result<Outcome> {
     );
     let generated = generate(&request, &session.modules()?)?;
     if args.format == Format::Json {
-        print_json(&generated.manifest.kernels);
+        print::json(&generated.manifest.kernels);
         return Ok(Outcome::Fine);
     }
-    println!(
+    say!(
         "{:<26} {:<9} {:>10} {:>10} {:>8} {:>7} {:>7}  summary",
-        "kernel", "stage", "operations", "arithmetic", "branches", "memory", "texture"
+        "kernel",
+        "stage",
+        "operations",
+        "arithmetic",
+        "branches",
+        "memory",
+        "texture"
     );
     for kernel in &session.kernels() {
         let Some(entry) = generated.manifest.kernels.get(&kernel.name) else {
@@ -49,7 +55,7 @@ fn row(kernel: &Kernel, entry: &KernelEntry) {
         Stage::Fragment => "fragment".into(),
     };
     let c = &entry.cost;
-    println!(
+    say!(
         "{:<26} {:<9} {:>10} {:>10} {:>8} {:>7} {:>7}  {}",
         kernel.name,
         stage,
@@ -64,13 +70,13 @@ fn row(kernel: &Kernel, entry: &KernelEntry) {
 
 fn bindings(kernel: &Kernel) {
     if let Some(p) = kernel.precision {
-        println!(
+        say!(
             "    precision {}",
             if p == Precision::F32 { "f32" } else { "f64" }
         );
     }
     if kernel.exact {
-        println!("    arithmetic as it is written: neither contracted nor reordered");
+        say!("    arithmetic as it is written: neither contracted nor reordered");
     }
     for p in &kernel.params {
         let what = match &p.role {
@@ -134,7 +140,7 @@ fn bindings(kernel: &Kernel) {
                 if *atomic { ", atomic" } else { "" }
             ),
         };
-        println!("    {:<12} {what}", p.name);
+        say!("    {:<12} {what}", p.name);
     }
     for o in &kernel.outputs {
         let what = match o {
@@ -150,7 +156,7 @@ fn bindings(kernel: &Kernel) {
             Output::Varying { location, ty } => format!("varying {location}: {}", spell(ty)),
             Output::Target { location, ty } => format!("target {location}: {}", spell(ty)),
         };
-        println!("    {:<12} {what}", "output");
+        say!("    {:<12} {what}", "output");
     }
 }
 

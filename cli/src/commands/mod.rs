@@ -17,11 +17,10 @@ pub mod toolchain;
 
 use std::path::Path;
 
-use hankel_numerics::report::Report;
-use serde::Serialize;
-
 use crate::args::Format;
 use crate::failure::Result;
+use crate::print::{self, say};
+use hankel_numerics::report::Report;
 
 /// Writes a report's files where a folder is given for them, and prints it.
 fn deliver(
@@ -36,26 +35,17 @@ fn deliver(
         None => Vec::new(),
     };
     match format {
-        Format::Json => print_json(report),
+        Format::Json => print::json(report),
         Format::Text => {
-            println!("{report}");
+            say!("{report}");
             if !quiet {
                 for path in paths {
-                    println!("{}", path.display());
+                    say!("{}", path.display());
                 }
             }
         }
     }
     Ok(())
-}
-
-/// Prints a report as JSON.
-fn print_json(report: &impl Serialize) {
-    match serde_json::to_string_pretty(report) {
-        Ok(text) => println!("{text}"),
-        // A map with keys that are no text: none of the reports has one.
-        Err(error) => eprintln!("the report has no JSON form: {error}"),
-    }
 }
 
 /// The command line as it was typed, as near as a program can know, for reports.

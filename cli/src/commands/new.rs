@@ -1,30 +1,19 @@
-use std::path::Path;
-
 use hankel_codegen::scaffold::{Dsl, scaffold};
 
 use crate::args::New;
 use crate::failure::{Outcome, Result};
+use crate::print::say;
+use crate::session::own_checkout;
 
 pub fn run(args: &New, quiet: bool) -> Result<Outcome> {
-    let start = std::path::absolute(&args.path).unwrap_or_else(|_| args.path.clone());
-    let files = scaffold(&args.path, &dsl(&start))?;
+    // A DSL found in some folder above would be somebody else's code.
+    let dsl =
+        own_checkout().map_or_else(Dsl::published, |root| Dsl::Path(root.join("kernels/dsl")));
+    let files = scaffold(&args.path, &dsl)?;
     if !quiet {
         for file in files {
-            println!("{}", file.display());
+            say!("{}", file.display());
         }
     }
     Ok(Outcome::Fine)
-}
-
-/// The DSL of the checkout around `start`, or of the one that this program was built from, or else
-/// the published one.
-fn dsl(start: &Path) -> Dsl {
-    match Dsl::find(start) {
-        Dsl::Version(version) => Path::new(env!("CARGO_MANIFEST_DIR"))
-            .parent()
-            .map(|root| root.join("kernels/dsl"))
-            .filter(|dsl| dsl.join("Cargo.toml").is_file())
-            .map_or(Dsl::Version(version), Dsl::Path),
-        found => found,
-    }
 }

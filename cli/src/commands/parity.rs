@@ -1,10 +1,10 @@
 use std::collections::BTreeSet;
 use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use hankel_codegen::Language;
 use hankel_codegen::build::generate;
-use hankel_codegen::files::write_whole;
 use hankel_codegen::translate::Options;
 use hankel_host::device::VulkanDevice;
 use hankel_matrix::absent::Absent;
@@ -14,10 +14,11 @@ use hankel_matrix::known::Known;
 use hankel_matrix::run::Request;
 use hankel_matrix::subject::Subject;
 use hankel_matrix::tools::Tools;
+use hankel_system::output;
 
-use super::print_json;
 use crate::args::{Format, Parity};
 use crate::failure::{Failure, Outcome, Result};
+use crate::print::{self, say};
 use crate::progress::Progress;
 use crate::session::Session;
 
@@ -29,6 +30,7 @@ const KNOWN: &str = include_str!("../../../snapshots/known-differences.toml");
 
 pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let own = &args.of_matrix;
+    let limit = Duration::from_secs(args.limit);
     let (columns, required) = if args.matrix {
         let required = if own.require.iter().any(|r| r == "all") {
             Column::ALL.into()
@@ -60,6 +62,18 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     }
     .transpose()
     .map_err(|e| Failure::input(e, "Mend the table of absent cells."))?;
+    // Whether reports can be written shows before the long work starts.
+    let files: Vec<&Path> = [&own.write_absent, &own.json, &own.html, &own.markdown]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    let inputs: Vec<&Path> = [&own.known, &own.absent]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    let mut outputs = output::create_all(&files, &inputs)?.into_iter();
     let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
     let options = Options {
         shader_model: SHADER_MODEL.parse()?,
@@ -69,7 +83,7 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let targets = targets.into_iter().collect();
     let request = session.request_for(args.kernels.clone(), targets, options);
     let generated = generate(&request, &session.modules()?)?;
-    let krate = session.native(generated.manifest.kernels.keys())?;
+    let krate = session.native(generated.manifest.kernels.keys(), limit)?;
     let subjects = Subject::all(&generated, &krate.entries);
 
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
@@ -78,7 +92,7 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let request = Request {
         columns,
         seed: args.seed,
-        limit: Duration::from_secs(own.limit),
+        limit,
         tools: tools(),
         runner: vec![this.into_os_string(), OsString::from("matrix-runner")],
         cache: cache.filter(|_| !own.no_cache && !in_ci()),
@@ -96,23 +110,30 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let report = hankel_matrix::run::run(&request, &subjects, &|what| progress.detail(what))
         .map_err(|e| Failure::machine(e.to_string(), None))?;
     drop(progress);
-    if let Some(file) = &own.write_absent {
-        write(file, Absent::of(&report).text().as_bytes())?;
+    // In the order in which the files were opened.
+    let mut write = |text: String| -> Result<()> {
+        match outputs.next() {
+            Some(output) => Ok(output.finish(text.as_bytes())?),
+            None => Ok(()),
+        }
+    };
+    if own.write_absent.is_some() {
+        write(Absent::of(&report).text())?;
     }
-    if let Some(file) = &own.json {
+    if own.json.is_some() {
         let text = serde_json::to_string_pretty(&report)
             .map_err(|e| Failure::machine(format!("the report has no JSON form: {e}"), None))?;
-        write(file, text.as_bytes())?;
+        write(text)?;
     }
-    if let Some(file) = &own.html {
-        write(file, hankel_matrix::html::page(&report).as_bytes())?;
+    if own.html.is_some() {
+        write(hankel_matrix::html::page(&report))?;
     }
-    if let Some(file) = &own.markdown {
-        write(file, report.markdown().as_bytes())?;
+    if own.markdown.is_some() {
+        write(report.markdown())?;
     }
     match args.format {
-        Format::Json => print_json(&report),
-        Format::Text => println!("{report}"),
+        Format::Json => print::json(&report),
+        Format::Text => say!("{report}"),
     }
     Ok(Outcome::of(report.passed))
 }
@@ -152,8 +173,4 @@ fn columns_named(names: &[String]) -> Result<Vec<Column>> {
     all.sort();
     all.dedup();
     Ok(all)
-}
-
-fn write(file: &std::path::Path, bytes: &[u8]) -> Result<()> {
-    write_whole(file, bytes).map_err(|e| Failure::machine(e.to_string(), None))
 }

@@ -2,13 +2,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hankel_host::device::Backend;
-use hankel_host::frame::{Difference, Plan, Rendering, Timing, compare, render};
-use hankel_host::scene::Scene;
+use hankel_host::frame::{Difference, Picture, Plan, Rendering, Timing, compare, render};
+use hankel_host::scene::{Geometry, Scene};
+use hankel_system::output::{self, Output};
 use serde::Serialize;
 
-use super::print_json;
 use crate::args::{Format, Render};
 use crate::failure::{Outcome, Result};
+use crate::print::{self, say};
 use crate::progress::Progress;
 use crate::session::Session;
 
@@ -28,7 +29,20 @@ struct Report<'a> {
 
 pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
     let scene = Scene::read(&args.scene)?;
-    let session = Session::open(None, quiet)?;
+    let pictures = if args.compare {
+        let (vulkan, difference) = (beside(&args.out, "vulkan"), beside(&args.out, "difference"));
+        vec![args.out.clone(), vulkan, difference]
+    } else {
+        vec![args.out.clone()]
+    };
+    let mut inputs = vec![args.scene.as_path()];
+    if let Geometry::Model { file, .. } = &scene.geometry {
+        inputs.push(file);
+    }
+    let places: Vec<&Path> = pictures.iter().map(PathBuf::as_path).collect();
+    // Whether they can be written shows before the long work starts.
+    let outputs = output::create_all(&places, &inputs)?;
+    let session = Session::linked(quiet);
     let mut progress = Progress::new(quiet || args.format == Format::Json);
     if !args.compare {
         let backend = Backend::from(args.backend);
@@ -38,21 +52,23 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         };
         let rendering = render(&scene, backend, &shaders, &mut progress)?;
         drop(progress);
-        rendering.picture.save(&args.out)?;
-        print(args, quiet, vec![args.out.clone()], &[&rendering], None);
+        save([&rendering.picture], outputs)?;
+        print(args, quiet, pictures, &[&rendering], None);
         return Ok(Outcome::Fine);
     }
     let shaders = session.all_words()?;
     let comparison = compare(&scene, &shaders, args.amplify, &mut progress)?;
     drop(progress);
-    let (vulkan, difference) = (beside(&args.out, "vulkan"), beside(&args.out, "difference"));
-    comparison.native.picture.save(&args.out)?;
-    comparison.vulkan.picture.save(&vulkan)?;
-    comparison.difference.picture.save(&difference)?;
+    let made = [
+        &comparison.native.picture,
+        &comparison.vulkan.picture,
+        &comparison.difference.picture,
+    ];
+    save(made, outputs)?;
     print(
         args,
         quiet,
-        vec![args.out.clone(), vulkan, difference],
+        pictures,
         &[&comparison.native, &comparison.vulkan],
         Some(&comparison.difference),
     );
@@ -68,6 +84,13 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         );
     }
     Ok(Outcome::of(share <= limit))
+}
+
+fn save<const N: usize>(pictures: [&Picture; N], outputs: Vec<Output>) -> Result<()> {
+    for (picture, output) in pictures.into_iter().zip(outputs) {
+        picture.save(output)?;
+    }
+    Ok(())
 }
 
 /// `scan.png` and `vulkan` to `scan-vulkan.png`.
@@ -87,7 +110,7 @@ fn print(
 ) {
     let first = renderings[0];
     if args.format == Format::Json {
-        print_json(&Report {
+        print::json(&Report {
             pictures,
             devices: renderings.iter().map(|r| r.device.as_str()).collect(),
             triangles: first.triangles,
@@ -101,28 +124,28 @@ fn print(
     if quiet {
         return;
     }
-    println!("{}", first.plan);
+    say!("{}", first.plan);
     for r in renderings {
-        println!(
+        say!(
             "{}: {:.2} s, {} triangles",
             r.device,
             r.seconds(),
             r.triangles
         );
         for t in &r.timings {
-            println!("  {:<16} {:>8.1} ms", t.name, t.seconds * 1e3);
+            say!("  {:<16} {:>8.1} ms", t.name, t.seconds * 1e3);
         }
     }
     if let Some(difference) = difference {
-        println!("difference: {difference}");
+        say!("difference: {difference}");
         if let Some(edges) = first.edges {
-            println!(
+            say!(
                 "{:.2} % of the pixels lie on edges, where rounding decides",
                 edges * 100.0
             );
         }
     }
     for p in &pictures {
-        println!("{}", p.display());
+        say!("{}", p.display());
     }
 }

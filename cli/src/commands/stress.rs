@@ -8,6 +8,7 @@ use hankel_numerics::families::{ORDERS, Precision};
 use hankel_numerics::peer::default_python;
 use hankel_numerics::report::Report;
 use hankel_numerics::stress::{self, BackendError, Native};
+use hankel_system::output;
 
 use super::{command_line, deliver};
 use crate::args::{self, Format, Rival, Stress};
@@ -19,6 +20,9 @@ use crate::session::Session;
 const SINGULARITIES: u64 = 100;
 
 pub fn run(args: &Stress, quiet: bool) -> Result<Outcome> {
+    if let Some(folder) = &args.out {
+        output::folder(folder)?;
+    }
     let progress = Progress::new(quiet || args.format == Format::Json);
     progress.begin("Measuring bounds");
     let (report, passed) = if args.biases {

@@ -1,8 +1,8 @@
 use hankel_toolchain::{Method, Options, Toolchain, install, pack, status};
 
-use super::print_json;
 use crate::args::{Format, ToolchainCommand, ToolchainInstall, ToolchainPack, ToolchainStatus};
 use crate::failure::{Failure, Outcome, Result};
+use crate::print::{self, say};
 use crate::progress::Progress;
 
 pub fn run(args: &crate::args::Toolchain, quiet: bool) -> Result<Outcome> {
@@ -17,9 +17,9 @@ pub fn run(args: &crate::args::Toolchain, quiet: bool) -> Result<Outcome> {
 fn show(args: &ToolchainStatus) -> Result<Outcome> {
     let status = status(&Options::from_env());
     if args.format == Format::Json {
-        print_json(&status);
+        print::json(&status);
     } else {
-        println!("{status}");
+        say!("{status}");
     }
     Ok(Outcome::of(status.used.is_some()))
 }
@@ -39,7 +39,7 @@ fn add(args: &ToolchainInstall, quiet: bool) -> Result<Outcome> {
     let toolchain = install(&options, method, &mut progress)?;
     drop(progress);
     if !quiet {
-        println!("{}", describe(&toolchain));
+        say!("{}", describe(&toolchain));
     }
     Ok(Outcome::Fine)
 }
@@ -55,7 +55,7 @@ fn share(args: &ToolchainPack, quiet: bool) -> Result<Outcome> {
     let mut progress = Progress::new(quiet);
     let packed = pack(&toolchain, &args.folder, &mut progress)?;
     drop(progress);
-    println!("{}  {}", packed.sha256, packed.path.display());
+    say!("{}  {}", packed.sha256, packed.path.display());
     Ok(Outcome::Fine)
 }
 

@@ -18,6 +18,7 @@
 //!   error.
 
 mod cleanup;
+mod extent;
 mod glsl;
 mod hlsl;
 mod msl;
@@ -292,7 +293,20 @@ impl Ir {
         let bytes = spirv::bytes(&spirv::store(&spirv));
         let mut module = guarded(|| parse(&bytes, name), name, Step::Parse)?;
         cleanup::restore_sampling(&mut module, &dropped.sampling);
-        let info = guarded(|| validate(&module, name), name, Step::Check)?;
+        let check = || {
+            let info = validate(&module, name)?;
+            match extent::check(&module, &info) {
+                Ok(()) => Ok(info),
+                Err(message) => Err(Failure {
+                    kernel: name.into(),
+                    step: Step::Check,
+                    construct: None,
+                    message,
+                    panicked: false,
+                }),
+            }
+        };
+        let info = guarded(check, name, Step::Check)?;
         let raw = Self {
             module,
             info,

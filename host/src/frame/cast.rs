@@ -9,6 +9,8 @@
 //!
 //! The tree's crate has its own series of `glam`; points cross over as arrays.
 
+use std::collections::HashSet;
+
 use hankel_dsl::glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -30,6 +32,8 @@ pub const SAMPLES: [[f64; 2]; 4] = [
 /// Triangles that rays can be cast at.
 pub struct Caster<'a> {
     mesh: &'a Mesh,
+    /// What the tree's numbers mean.
+    triangles: Vec<u32>,
     tree: Bvh2,
 }
 
@@ -141,16 +145,29 @@ impl<'a> Caster<'a> {
         let slack = mesh.bounds().map_or(0.0, |b| {
             4e-6 * (b.low.abs().max(b.high.abs()).max_element())
         });
-        let boxes: Vec<Aabb> = (0..mesh.triangles.len())
-            .map(|i| {
-                let [a, b, c] = mesh.corners(i);
+        // Of triangles in the same place, a ray meets the first: the others only cost time, each
+        // one in each ray.
+        let mut places = HashSet::with_capacity(mesh.triangles.len());
+        let is_new = |i: &u32| {
+            let corners = mesh.corners(*i as usize);
+            places.insert(corners.map(|p| p.to_array().map(f32::to_bits)))
+        };
+        let triangles: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_new).collect();
+        let boxes: Vec<Aabb> = triangles
+            .iter()
+            .map(|&i| {
+                let [a, b, c] = mesh.corners(i as usize);
                 let (low, high) = (a.min(b).min(c) - slack, a.max(b).max(c) + slack);
                 Aabb::new(low.to_array().into(), high.to_array().into())
             })
             .collect();
         let mut time = std::time::Duration::ZERO;
         let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut time);
-        Self { mesh, tree }
+        Self {
+            mesh,
+            triangles,
+            tree,
+        }
     }
 
     /// The first triangle that a segment meets.
@@ -168,7 +185,7 @@ impl<'a> Caster<'a> {
         let mut near = RayHit::none();
         near.t = ray.tmax;
         self.tree.ray_traverse(ray, &mut near, |_, slot| {
-            let triangle = self.tree.primitive_indices[slot];
+            let triangle = self.triangles[self.tree.primitive_indices[slot] as usize];
             let Some(t) = segment.meet(self.mesh.corners(triangle as usize)) else {
                 return f32::INFINITY;
             };

@@ -1,6 +1,6 @@
 //! What can go wrong on the way to a picture.
 
-use std::path::PathBuf;
+use hankel_system::output::OutputError;
 
 use crate::device::DeviceError;
 use crate::scene::SceneError;
@@ -28,13 +28,8 @@ pub enum FrameError {
         problem: String,
     },
     /// A picture that cannot be written.
-    #[error("{}: {source}", file.display())]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] OutputError),
     /// Pictures of different sizes.
     #[error("pictures of {left:?} and {right:?} pixels cannot be compared: render both alike")]
     Sizes {

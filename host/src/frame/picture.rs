@@ -1,9 +1,7 @@
 //! Pictures: from linear light to PNG, and how two of them differ.
 
-use std::io::Write;
-use std::path::Path;
-
 use hankel_dsl::glam::Vec4;
+use hankel_system::output::{Output, OutputError};
 
 use super::error::{FrameError, Result};
 
@@ -42,38 +40,15 @@ impl Picture {
         }
     }
 
-    /// Writes a PNG file: whole or not at all.
+    /// Writes a PNG file.
     ///
     /// # Errors
     /// [`FrameError::Write`].
-    pub fn save(&self, file: &Path) -> Result<()> {
-        let fail = |e: std::io::Error| FrameError::Write {
-            file: file.to_path_buf(),
-            source: e,
-        };
-        let folder = match file.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut temporary = tempfile::Builder::new()
-            .prefix(".picture")
-            .tempfile_in(folder)
-            .map_err(fail)?;
-        temporary
-            .write_all(&self.png().map_err(|e| fail(e.into()))?)
-            .map_err(fail)?;
-        // A temporary file is for its owner alone; a picture is an ordinary file.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            let mode = std::fs::metadata(file).map_or(0o644, |m| m.permissions().mode());
-            temporary
-                .as_file()
-                .set_permissions(std::fs::Permissions::from_mode(mode))
-                .map_err(fail)?;
-        }
-        temporary.persist(file).map_err(|e| fail(e.error))?;
-        Ok(())
+    pub fn save(&self, output: Output) -> Result<()> {
+        let png = self
+            .png()
+            .map_err(|e| OutputError::write(output.path(), e))?;
+        Ok(output.finish(&png)?)
     }
 
     fn png(&self) -> std::result::Result<Vec<u8>, png::EncodingError> {
@@ -219,7 +194,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("p.png");
         let picture = grey(&[1, 2, 250]);
-        picture.save(&file).unwrap();
+        picture.save(Output::create(&file, &[]).unwrap()).unwrap();
         let mut reader =
             png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&file).unwrap()))
                 .read_info()
@@ -227,8 +202,5 @@ mod tests {
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut bytes).unwrap();
         assert_eq!(bytes, picture.pixels.as_flattened());
-        let missing = picture.save(&folder.path().join("none/p.png")).unwrap_err();
-        assert!(missing.to_string().contains("none/p.png"));
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use hankel_system::input::InputError;
+
 /// A place in a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -24,13 +26,8 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// A file that cannot be read.
-    #[error("{}: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] InputError),
     /// Text that is no scene: bad TOML, an unknown field, a value of the wrong type.
     #[error("{place}: {problem}")]
     Syntax {

@@ -47,6 +47,7 @@ use std::path::{Path, PathBuf};
 use hankel_dsl::glam::Vec3;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
+use hankel_system::input;
 use serde::Deserialize;
 
 pub use error::{Place, Result, SceneError};
@@ -234,6 +235,8 @@ impl Default for Shadow {
 }
 
 impl Scene {
+    /// Most bytes of a scene file.
+    pub const MAX_BYTES: u64 = 1 << 20;
     /// Most pixels along an edge of the picture.
     pub const MAX_OUTPUT: u32 = 4096;
     /// Most texels along an edge of the map.
@@ -249,11 +252,7 @@ impl Scene {
     /// [`SceneError::Read`], [`SceneError::Syntax`], [`SceneError::Value`]. The model is not read
     /// yet.
     pub fn read(file: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(file).map_err(|source| SceneError::Read {
-            file: file.to_path_buf(),
-            source,
-        })?;
-        Self::parse(&text, file)
+        Self::parse(&input::read_text(file, Self::MAX_BYTES)?, file)
     }
 
     /// Reads a scene from text; `file` is for messages and where relative paths count from.

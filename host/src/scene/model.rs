@@ -1,7 +1,6 @@
 //! glTF models: the triangles of the default scene, in world space, in their materials' base colour.
 //! Textures, skins, cameras and animations are passed over.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
@@ -9,6 +8,7 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Semantic};
 use hankel_dsl::glam::{Affine3A, Mat4, Vec3};
+use hankel_system::input;
 
 use super::FAR_OFF;
 use super::error::{Result, SceneError};
@@ -17,6 +17,9 @@ use super::mesh::Mesh;
 /// Most triangles of a model: more would not fit the index buffers of a common device.
 pub const MAX_TRIANGLES: usize = 10_000_000;
 
+/// Most bytes of a model, with all the files that it names.
+const MAX_BYTES: u64 = 2 << 30;
+
 /// Loads the default scene (else the first) of a `.gltf` or `.glb` file. Normals that are missing
 /// are computed, smooth over shared vertices.
 ///
@@ -24,13 +27,11 @@ pub const MAX_TRIANGLES: usize = 10_000_000;
 /// [`SceneError::Read`] and [`SceneError::Model`]; [`SceneError::Empty`] for a model without
 /// triangles.
 pub fn load(file: &Path) -> Result<Mesh> {
-    let bytes = fs::read(file).map_err(|source| SceneError::Read {
-        file: file.to_path_buf(),
-        source,
-    })?;
+    let bytes = input::read(file, MAX_BYTES)?;
     Loader {
         file,
         mesh: Mesh::default(),
+        room: MAX_BYTES - bytes.len() as u64,
     }
     .load(&bytes)
 }
@@ -38,6 +39,8 @@ pub fn load(file: &Path) -> Result<Mesh> {
 struct Loader<'a> {
     file: &'a Path,
     mesh: Mesh,
+    /// Bytes that may still be read.
+    room: u64,
 }
 
 impl Loader<'_> {
@@ -80,10 +83,10 @@ impl Loader<'_> {
             }
         }
         let document = gltf::Document::from_json(root).map_err(bad)?;
-        let buffers = document
-            .buffers()
-            .map(|b| self.buffer(&b, &mut blob))
-            .collect::<Result<Vec<_>>>()?;
+        let mut buffers = Vec::new();
+        for b in document.buffers() {
+            buffers.push(self.buffer(&b, &mut blob)?);
+        }
         let scene = document
             .default_scene()
             .or_else(|| document.scenes().next());
@@ -135,7 +138,7 @@ impl Loader<'_> {
         Ok(self.mesh)
     }
 
-    fn buffer(&self, buffer: &gltf::Buffer<'_>, blob: &mut Option<Vec<u8>>) -> Result<Vec<u8>> {
+    fn buffer(&mut self, buffer: &gltf::Buffer<'_>, blob: &mut Option<Vec<u8>>) -> Result<Vec<u8>> {
         let index = buffer.index();
         let data = match buffer.source() {
             gltf::buffer::Source::Bin => match blob.take() {
@@ -154,7 +157,7 @@ impl Loader<'_> {
         Ok(data)
     }
 
-    fn uri(&self, uri: &str, index: usize) -> Result<Vec<u8>> {
+    fn uri(&mut self, uri: &str, index: usize) -> Result<Vec<u8>> {
         if let Some(data) = uri.strip_prefix("data:") {
             let Some((_, text)) = data.split_once(";base64,") else {
                 return self.fail(format!("buffer {index}: a data URI must be base64"));
@@ -172,7 +175,10 @@ impl Loader<'_> {
             .parent()
             .unwrap_or(Path::new(""))
             .join(name.as_ref());
-        fs::read(&path).or_else(|e| self.fail(format!("buffer {index}: {}: {e}", path.display())))
+        let data =
+            input::read(&path, self.room).or_else(|e| self.fail(format!("buffer {index}: {e}")))?;
+        self.room -= data.len() as u64;
+        Ok(data)
     }
 
     fn primitive(

@@ -185,8 +185,9 @@ impl Reader<'_> {
     }
 
     fn direction(&self, field: &str, given: &Spanned<[f32; 3]>) -> Result<Vec3> {
-        let d = self.point(field, given)?.try_normalize();
-        d.map_or_else(
+        // In double precision, in which the square of no single one vanishes.
+        let d = self.point(field, given)?.as_dvec3().try_normalize();
+        d.map(|d| d.as_vec3()).map_or_else(
             || {
                 self.refuse(
                     given.span(),

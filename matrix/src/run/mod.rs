@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use hankel_dsl::native::describe::Stage;
 use hankel_host::parity::numbers::Numbers;
-use rayon::prelude::*;
+use hankel_system::temporary::Folder;
 
 use crate::absent::Absent;
 use crate::cache::Cache;
@@ -79,17 +79,14 @@ pub fn run(
         let what = what.to_owned();
         move |source| Error { what, source }
     };
-    let work = tempfile::tempdir().map_err(io("making a folder for the work"))?;
+    let work = Folder::new().map_err(io("making a folder for the work"))?;
 
     progress("looking for compilers and drivers");
     let wanted: Vec<Tool> = Tool::ALL
         .into_iter()
         .filter(|t| request.columns.iter().any(|c| c.tools().contains(t)))
         .collect();
-    let tools: Vec<Status> = wanted
-        .par_iter()
-        .map(|&tool| request.tools.status(tool))
-        .collect();
+    let tools: Vec<Status> = request.tools.statuses(&wanted);
 
     progress("running the reference");
     let ready = references(request, subjects, work.path()).map_err(io("writing inputs"))?;

@@ -1,10 +1,9 @@
 //! The judge on the rows of a table.
 
-use std::fmt;
-use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use hankel_system::input::{self, InputError};
+use hankel_system::output::{Output, OutputError};
 use rayon::prelude::*;
 
 use super::{Judge, JudgeError, Judged};
@@ -15,14 +14,12 @@ const ROWS: usize = 1024;
 /// Why a table was not judged.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// A file that cannot be read or written.
-    #[error("{}: {problem}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
+    /// The input cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The output cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// Columns other than the moments and the query.
     #[error("{}: {problem}; the columns must be: {wanted}", path.display())]
     Columns {
@@ -69,36 +66,22 @@ pub fn table(
     output: &Path,
     progress: &mut dyn FnMut(u64),
 ) -> Result<u64, TableError> {
-    let file_error = |path: &Path, e: &dyn fmt::Display| TableError::File {
-        path: path.into(),
-        problem: e.to_string(),
-    };
-    let unreadable = |e: &dyn fmt::Display| file_error(input, e);
-    let unwritable = |e: &dyn fmt::Display| file_error(output, e);
-
-    let file = File::open(input).map_err(|e| unreadable(&e))?;
-    if file.metadata().is_ok_and(|m| m.is_dir()) {
-        return Err(unreadable(&"it is a folder"));
-    }
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
         .trim(csv::Trim::All)
-        .from_reader(BufReader::new(file));
-    let header = reader.headers().map_err(|e| unreadable(&e))?.clone();
+        .from_reader(input::open_table(input)?);
+    let unreadable = |e: csv::Error| InputError::Io {
+        path: input.into(),
+        source: e.into(),
+    };
+    let header = reader.headers().map_err(unreadable)?.clone();
     let places = places(judge, input, &header)?;
 
-    let folder = match output.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    if output.is_dir() {
-        return Err(unwritable(&"it is a folder"));
-    }
-    let temporary = temporary(folder).map_err(|e| unwritable(&e))?;
-    let mut writer = csv::Writer::from_writer(BufWriter::new(temporary));
+    let unwritable = |e: csv::Error| OutputError::write(output, e);
+    let mut writer = csv::Writer::from_writer(Output::create(output, &[input])?);
     writer
         .write_record(["lower", "upper", "margin", "residual"])
-        .map_err(|e| unwritable(&e))?;
+        .map_err(unwritable)?;
 
     let mut done = 0;
     let mut records = reader.into_records();
@@ -131,30 +114,15 @@ pub fn table(
                     [judged.lower, judged.upper, judged.margin, judged.residual]
                         .map(|x| x.to_string()),
                 )
-                .map_err(|e| unwritable(&e))?;
+                .map_err(unwritable)?;
         }
         progress(done);
     }
-    let mut buffered = writer.into_inner().map_err(|e| unwritable(&e.error()))?;
-    buffered.flush().map_err(|e| unwritable(&e))?;
-    let temporary = buffered.into_inner().map_err(|e| unwritable(&e.error()))?;
-    temporary
-        .persist(output)
-        .map_err(|e| unwritable(&e.error))?;
+    writer
+        .into_inner()
+        .map_err(|e| OutputError::write(output, e.into_error()))?
+        .commit()?;
     Ok(done)
-}
-
-/// A temporary file beside the output, with the permissions that a new file has.
-fn temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".hankel-").suffix(".csv");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // What the umask leaves of it.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
 }
 
 /// For each column of the file the moment that it holds; the query comes after the last.

@@ -7,11 +7,12 @@
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{ChildStdin, ChildStdout, Command, Stdio};
 
+use hankel_system::process::Program;
+use hankel_system::temporary::Folder;
 use serde::Deserialize;
 use serde_json::json;
-use tempfile::TempDir;
 
 use crate::families::{Format, Precision, Row};
 
@@ -73,11 +74,11 @@ pub enum Quantity {
 
 /// A process that runs `diffmoments`.
 pub struct Peer {
-    child: Child,
+    process: Program,
     requests: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
     messages: std::fs::File,
-    folder: TempDir,
+    folder: Folder,
     loaded: Option<Loaded>,
     /// Version of the package.
     pub version: String,
@@ -110,23 +111,24 @@ impl Peer {
     /// There is no such interpreter, or it has no `diffmoments` or no `numpy`.
     pub fn start(python: impl AsRef<OsStr>) -> Result<Self, PeerError> {
         let python = PathBuf::from(python.as_ref());
-        let folder = tempfile::tempdir()?;
+        let folder = Folder::new()?;
         let messages = folder.path().join("messages");
-        let mut child = Command::new(&python)
+        let mut command = Command::new(&python);
+        command
             .args(["-c", SCRIPT])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(std::fs::File::create(&messages)?)
-            .spawn()
-            .map_err(|source| PeerError::Start {
-                python: python.clone(),
-                source,
-            })?;
-        let (Some(requests), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
+            .stderr(std::fs::File::create(&messages)?);
+        let mut process = Program::start(&mut command).map_err(|source| PeerError::Start {
+            python: python.clone(),
+            source,
+        })?;
+        let pipes = (process.child.stdin.take(), process.child.stdout.take());
+        let (Some(requests), Some(answers)) = pipes else {
             unreachable!("both streams are piped")
         };
         let mut peer = Self {
-            child,
+            process,
             requests: Some(requests),
             answers: BufReader::new(answers),
             messages: std::fs::File::open(&messages)?,
@@ -326,8 +328,7 @@ impl Drop for Peer {
     fn drop(&mut self) {
         // The end of its input ends it, after the call that it is in.
         drop(self.requests.take());
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.process.kill();
     }
 }
 

@@ -13,7 +13,7 @@ mod write;
 pub use pareto::pareto_front;
 pub use svg::PlotError;
 pub use table::{Cell, Column, Form, Table};
-pub use write::{ReportError, write_whole};
+pub use write::ReportError;
 
 use std::fmt;
 

@@ -1,9 +1,9 @@
-//! Files that are there whole or not at all.
+//! A report as a folder of files.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use hankel_system::output::{self, OutputError};
 
 use super::{PlotError, Report, html};
 
@@ -11,13 +11,8 @@ use super::{PlotError, Report, html};
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// A file or folder that cannot be written.
-    #[error("{path}: {source}; give a folder that can be written, with `--out`")]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// The system's words.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// A plot that cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -32,42 +27,6 @@ pub enum ReportError {
     /// A report that JSON cannot hold.
     #[error("the report has no JSON form: {0}")]
     Json(#[from] serde_json::Error),
-}
-
-/// Writes a file by way of a sibling that takes its place once it is complete.
-///
-/// # Errors
-///
-/// The folder cannot be written.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    sibling(path, bytes)?
-        .persist(path)
-        .map(drop)
-        .map_err(|error| ReportError::Io {
-            path: path.to_owned(),
-            source: error.error,
-        })
-}
-
-fn sibling(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, ReportError> {
-    let at = |source| ReportError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    // Readable as any other file would be; temporary ones are their owner's alone.
-    #[cfg(unix)]
-    let builder = {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666))
-    };
-    let mut file = builder.tempfile_in(folder).map_err(at)?;
-    file.write_all(bytes).map_err(at)?;
-    Ok(file)
 }
 
 impl Report {
@@ -101,27 +60,18 @@ impl Report {
         for (plot, svg) in self.plots.iter().zip(drawn) {
             files.push((format!("{name}-{}.svg", plot.id), svg.into_bytes()));
         }
-        std::fs::create_dir_all(folder).map_err(|source| ReportError::Io {
-            path: folder.to_owned(),
-            source,
-        })?;
-        let complete: Vec<(PathBuf, NamedTempFile)> = files
-            .into_iter()
-            .map(|(name, bytes)| {
-                let path = folder.join(name);
-                let file = sibling(&path, &bytes)?;
-                Ok((path, file))
-            })
-            .collect::<Result<_, ReportError>>()?;
-        complete
-            .into_iter()
-            .map(|(path, file)| match file.persist(&path) {
-                Ok(_) => Ok(path),
-                Err(error) => Err(ReportError::Io {
-                    path,
-                    source: error.error,
-                }),
-            })
-            .collect()
+        output::folder(folder)?;
+        let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.join(name)).collect();
+        let places: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+        let mut outputs = output::create_all(&places, &[])?;
+        for (output, (_, bytes)) in outputs.iter_mut().zip(&files) {
+            output
+                .write_all(bytes)
+                .map_err(|e| OutputError::write(output.path(), e))?;
+        }
+        for output in outputs {
+            output.commit()?;
+        }
+        Ok(paths)
     }
 }

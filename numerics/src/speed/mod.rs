@@ -24,6 +24,7 @@ use std::time::Instant;
 
 use hankel_dsl::native::lanes::{SCALAR, level_name, levels};
 use hankel_dsl::native::{CallError, Mode};
+use hankel_system::temporary::Folder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -470,7 +471,7 @@ impl Run<'_> {
         if self.workers.is_empty() {
             return Ok(contestants);
         }
-        let folder = tempfile::tempdir()?;
+        let folder = Folder::new()?;
         for worker in &mut self.workers {
             worker.clear()?;
         }

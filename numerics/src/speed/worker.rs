@@ -7,9 +7,10 @@
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{ChildStdin, ChildStdout, Command, Stdio};
 
 use hankel_dsl::native::Mode;
+use hankel_system::process::Program as Process;
 use serde::{Deserialize, Serialize};
 
 use super::SpeedError;
@@ -99,7 +100,7 @@ fn answer(request: Request, kernels: &mut Vec<Native>) -> Result<Answer, SpeedEr
 
 /// A process that measures on one instruction set.
 pub struct Worker {
-    child: Child,
+    _process: Process,
     requests: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
     /// The instruction set.
@@ -108,20 +109,21 @@ pub struct Worker {
 
 impl Worker {
     pub fn start(program: &Program, level: &'static str) -> Result<Self, SpeedError> {
-        let mut child = Command::new(&program.path)
+        let mut command = Command::new(&program.path);
+        command
             .args(&program.arguments)
             .env("HANKEL_SIMD", level)
             .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(|error| {
-                SpeedError::Worker(level, format!("{}: {error}", program.path.display()))
-            })?;
-        let (Some(requests), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
+            .stdout(Stdio::piped());
+        let mut process = Process::start(&mut command).map_err(|error| {
+            SpeedError::Worker(level, format!("{}: {error}", program.path.display()))
+        })?;
+        let pipes = (process.child.stdin.take(), process.child.stdout.take());
+        let (Some(requests), Some(answers)) = pipes else {
             unreachable!("both streams are piped")
         };
         Ok(Self {
-            child,
+            _process: process,
             requests: Some(requests),
             answers: BufReader::new(answers),
             level,
@@ -174,13 +176,5 @@ impl Worker {
             Err(_) if line.is_empty() => Err(failed("it ended".into())),
             Err(_) => Err(failed(format!("it said: {}", line.trim()))),
         }
-    }
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        drop(self.requests.take());
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }

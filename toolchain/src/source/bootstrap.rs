@@ -45,7 +45,7 @@ fn sysroot(asked: &str) -> Option<PathBuf> {
     let mut rustup = Command::new("rustup");
     // A missing toolchain is reported, not downloaded.
     rustup.env("RUSTUP_AUTO_INSTALL", "0");
-    let text = process::output(rustup.args(["run", asked, "rustc", "--print=sysroot"]))?;
+    let text = process::ask(rustup.args(["run", asked, "rustc", "--print=sysroot"]))?;
     Some(PathBuf::from(text.trim()))
 }
 
@@ -62,7 +62,7 @@ impl Bootstrap {
         let exe = std::env::consts::EXE_SUFFIX;
         let rustc = root.join(format!("bin/rustc{exe}"));
         let cargo = root.join(format!("bin/cargo{exe}"));
-        let Some(version) = process::output(Command::new(&rustc).arg("--version")) else {
+        let Some(version) = process::ask(Command::new(&rustc).arg("--version")) else {
             return Err(format!("{wanted} (`{asked}` has no working bin/rustc)"));
         };
         if !cargo.is_file() {

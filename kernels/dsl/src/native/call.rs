@@ -183,12 +183,53 @@ pub enum CallError {
         /// Its words.
         message: String,
     },
+    /// The process that the kernel ran in ended before the call did.
+    #[error("its process {how}{}", culprit.as_ref().map_or_else(String::new, |c| std::format!(", {c}")))]
+    Ended {
+        /// How.
+        how: Ending,
+        /// The element that is enough for that, if one is.
+        culprit: Option<Culprit>,
+    },
     /// The kernel itself panicked: an index out of range, most likely.
     #[error("the kernel panicked: {message}")]
     Panic {
         /// The panic's message.
         message: String,
     },
+}
+
+/// How a process ended that ran a kernel.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Ending {
+    /// It was ended after its time.
+    #[error("was ended after {seconds} s: does a loop never end?")]
+    TimedOut {
+        /// The limit.
+        seconds: u64,
+    },
+    /// It ran out of stack.
+    #[error("overflowed its stack of {mebibytes} MiB")]
+    Stack {
+        /// The limit.
+        mebibytes: u32,
+    },
+    /// It crashed.
+    #[error("{how}")]
+    Crashed {
+        /// Its exit code or signal, and what it said last.
+        how: String,
+    },
+}
+
+/// An element of a map that ends the process by itself.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("at element {element} (counted from 0): {inputs}")]
+pub struct Culprit {
+    /// Which, counted from 0.
+    pub element: usize,
+    /// The values of its inputs: `depth = 0.5, moments.b1 = 0.25`.
+    pub inputs: String,
 }
 
 /// Runs a kernel natively.

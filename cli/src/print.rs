@@ -1,0 +1,96 @@
+//! The standard streams. A reader that is gone ends the command without a word, as it ends other
+//! tools; a disk that is full is an error. What others wrote is shown without effect on the
+//! terminal.
+
+use std::fmt;
+use std::io::{self, ErrorKind, Write};
+
+use hankel_system::signals;
+use hankel_system::text::visible;
+use serde::Serialize;
+
+/// Exit code of a full disk.
+const FULL: i32 = 3;
+
+/// A line of the result, on the standard output stream.
+macro_rules! say {
+    ($($arg:tt)*) => { $crate::print::line(format_args!($($arg)*)) };
+}
+pub(crate) use say;
+
+/// See [`say`].
+pub fn line(text: fmt::Arguments<'_>) {
+    let text = text.to_string();
+    raw(format!("{}\n", visible(&text)).as_bytes());
+}
+
+/// A result in JSON.
+pub fn json(value: &impl Serialize) {
+    match serde_json::to_string_pretty(value) {
+        // JSON itself leaves some characters that steer a terminal.
+        Ok(text) => raw(format!("{}\n", steered(&text)).as_bytes()),
+        // A map with keys that are no text: none of the reports has one.
+        Err(error) => note(format_args!("the report has no JSON form: {error}")),
+    }
+}
+
+/// The same JSON, with characters that steer a terminal in JSON's own spelling.
+fn steered(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for c in json.chars() {
+        let mut buffer = [0; 4];
+        if visible(c.encode_utf8(&mut buffer)).len() == c.len_utf8() {
+            text.push(c);
+        } else {
+            // None of them lies beyond the first 65 536.
+            text.push_str(&format!("\\u{:04x}", u32::from(c)));
+        }
+    }
+    text
+}
+
+/// Bytes as they are, on the standard output stream.
+pub fn raw(bytes: &[u8]) {
+    if let Err(error) = io::stdout().lock().write_all(bytes) {
+        lost(&error);
+    }
+}
+
+/// Hands over what is still in memory: to be called last.
+pub fn finish() {
+    if let Err(error) = io::stdout().lock().flush() {
+        lost(&error);
+    }
+}
+
+/// A line on the standard error stream. Who closed that does not want to be told.
+pub fn note(text: fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+fn lost(error: &io::Error) -> ! {
+    if error.kind() == ErrorKind::BrokenPipe {
+        signals::end_of_pipe();
+    }
+    note(format_args!(
+        "Error: cannot write to the standard output stream: {error}"
+    ));
+    signals::exit(FULL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_stays_json() {
+        let text = "a\u{1b}[2J\u{9b}b\u{202e}ü\n".to_string();
+        let json = steered(&serde_json::to_string(&text).unwrap());
+        assert!(
+            json.chars()
+                .all(|c| visible(&c.to_string()).len() == c.len_utf8()),
+            "{json}"
+        );
+        assert_eq!(serde_json::from_str::<String>(&json).unwrap(), text);
+    }
+}

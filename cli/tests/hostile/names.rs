@@ -1,0 +1,156 @@
+//! Names, texts and values that mean something to somebody else.
+
+use std::fs;
+
+use crate::desk::{Desk, run};
+
+/// Colours, titles, a cleared screen: nothing of what others wrote steers the terminal.
+#[test]
+fn text_of_others_does_not_steer_the_terminal() {
+    const ESCAPE: &str = "\u{1b}[31m";
+    let desk = Desk::new();
+    desk.write("rows.csv", format!("{ESCAPE}b1,b2,depth\n0.5,0.3,0.2\n"));
+    desk.write("cell.csv", format!("b1,b2,depth\n0.5,{ESCAPE},0.2\n"));
+    desk.write(
+        "scene.toml",
+        format!("[geometry]\nprocedural = \"box\"\n\"{ESCAPE}\" = 1\n"),
+    );
+    let model = format!("{{\"asset\":{{\"version\":\"{ESCAPE}\"}}}}");
+    desk.write("model.gltf", model);
+    desk.write(
+        "budget.toml",
+        format!("[budget]\n\"\\u001b[31m\" = 1 # {ESCAPE}\n"),
+    );
+    desk.hankel("build --out s --kernel vsm").code(0);
+    let wgsl = desk.path("s/wgsl/vsm.wgsl");
+    fs::write(&wgsl, format!("// {ESCAPE}\n")).expect("the desk can be written");
+    desk.write(
+        "bin/glslangValidator",
+        format!("#!/bin/sh\necho '{ESCAPE} 1'\n"),
+    );
+    let status = std::process::Command::new("chmod")
+        .args(["+x", "bin/glslangValidator"])
+        .current_dir(desk.path("."))
+        .status();
+    assert!(status.expect("chmod runs").success());
+    let path = format!("{}:/usr/bin:/bin", desk.path("bin").display());
+    let mut kernel = desk.command("list --kernel");
+    kernel.arg(format!("{ESCAPE}x"));
+    let mut commands = vec![kernel];
+    for line in [
+        "eval vsm --input rows.csv --output o.csv",
+        "eval vsm --input cell.csv --output o.csv",
+        "render scene.toml --out p.png",
+        "check s --kernel vsm",
+        "check s --kernel vsm --format json",
+        "check s --kernel vsm --budget budget.toml",
+        "doctor",
+        "doctor --format json",
+    ] {
+        let mut command = desk.command(line);
+        command.env("PATH", &path);
+        commands.push(command);
+    }
+    for mut command in commands {
+        let done = run(&mut command);
+        let bytes = [done.0.stdout.clone(), done.0.stderr.clone()].concat();
+        assert!(
+            !bytes.contains(&0x1b),
+            "{command:?}: {}{}",
+            done.out(),
+            done.err()
+        );
+        let said = format!("{}{}", done.out(), done.err());
+        assert!(
+            said.contains("u{1b}") || said.contains("u001b"),
+            "{command:?}: {said}"
+        );
+    }
+}
+
+#[test]
+fn a_pattern_of_many_wildcards_is_matched_at_once() {
+    let desk = Desk::new();
+    let pattern = format!("{}a*b*c*zz", "*".repeat(40));
+    desk.hankel(&format!("list --kernel {pattern}"))
+        .fails(2, &["no kernel is named"]);
+    let out = desk
+        .hankel("list --kernel **v*s*m** --kernel quantize*4*unit")
+        .code(0)
+        .out();
+    for name in ["vsm", "quantize_4_unit", "dequantize_4_unit"] {
+        assert_eq!(
+            out.contains(&format!("\n{name} ")),
+            !name.starts_with('d'),
+            "{out}"
+        );
+    }
+}
+
+#[test]
+fn what_is_set_is_used_or_refused() {
+    let desk = Desk::new();
+    run(desk
+        .command("list --kernel vsm")
+        .env("HANKEL_SIMD", "avx9000"))
+    .fails(2, &["HANKEL_SIMD=avx9000", "scalar"]);
+    run(desk
+        .command("list --kernel vsm")
+        .env("HANKEL_SIMD", "scalar"))
+    .code(0);
+    for (set, words) in [
+        ("--set encoding=1 --set encoding=2", "set twice"),
+        ("--set encoding=4294967296", "larger than 4294967295"),
+        ("--set encoding=-1", "0 or more"),
+        ("--set encoding", "no `=`"),
+    ] {
+        desk.hankel(&format!("build --out s --kernel shade_hamburger {set}"))
+            .fails(2, &[words]);
+    }
+}
+
+#[test]
+fn names_of_crates_are_names() {
+    let desk = Desk::new();
+    for name in [
+        "fn",
+        "self",
+        "gen",
+        "hankel-macros",
+        "hankel",
+        "core",
+        "proc-macro",
+    ] {
+        desk.hankel(&format!("new {name}"))
+            .fails(2, &[&format!("`{name}`")]);
+    }
+    assert_eq!(desk.names(), [""; 0]);
+    // There may be an empty folder.
+    fs::create_dir(desk.path("mine")).expect("the desk");
+    desk.hankel("new mine").code(0);
+    assert_eq!(desk.names(), ["mine"]);
+    assert!(desk.path("mine/src/lib.rs").is_file());
+}
+
+/// The smallest direction that a float can say is one.
+#[test]
+fn a_short_direction_is_a_direction() {
+    let desk = Desk::new();
+    desk.write(
+        "scene.toml",
+        "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\ntarget = [0.0, 0.5, 0.0]\n\
+         [light]\ndirection = [1e-30, -1e-30, 1e-30]\n[output]\nwidth = 16\nheight = 9\n",
+    );
+    desk.hankel("render scene.toml --out p.png").code(0);
+}
+
+#[test]
+fn a_file_where_a_folder_belongs_is_misuse() {
+    let desk = Desk::new();
+    desk.write("file", "");
+    desk.hankel("build --out file --kernel vsm")
+        .fails(2, &["file"]);
+    desk.hankel("check file --kernel vsm").fails(2, &["file"]);
+    desk.hankel("new file/crate-of-mine").code(2);
+    assert_eq!(desk.read("file"), "");
+}

@@ -1,0 +1,106 @@
+//! Where output goes, and what was there before.
+
+use std::fs;
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
+use std::thread;
+
+use crate::desk::Desk;
+
+const ROWS: &str = "b1,b2,depth\n0.5,0.3,0.2\n";
+const SCENE: &str = "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\n\
+target = [0.0, 0.5, 0.0]\n[light]\ndirection = [-1.0, -2.0, -0.5]\n[output]\nwidth = 16\nheight = 9\n";
+
+const EVAL: &str = "eval vsm --input rows.csv --output";
+
+#[test]
+fn devices_pipes_links_and_modes_stay_what_they_are() {
+    let desk = Desk::new();
+    desk.write("rows.csv", ROWS);
+    // A device, named by a link.
+    symlink("/dev/null", desk.path("null")).expect("a link");
+    desk.hankel(&format!("{EVAL} null")).code(0);
+    assert!(desk.path("null").is_symlink());
+    assert!(
+        fs::metadata("/dev/null")
+            .expect("a device")
+            .file_type()
+            .is_char_device()
+    );
+    // A pipe.
+    let fifo = desk.fifo("fifo");
+    let reader = thread::spawn(move || fs::read_to_string(fifo).expect("a pipe"));
+    desk.hankel(&format!("{EVAL} fifo")).code(0);
+    assert!(reader.join().expect("the reader").starts_with("shadow\n"));
+    // What is open already.
+    let out = desk
+        .hankel(&format!("--quiet {EVAL} /dev/stdout"))
+        .code(0)
+        .out();
+    assert!(out.starts_with("shadow\n"), "{out}");
+    // A mode, through a link.
+    let kept = desk.write("kept.csv", "old");
+    fs::set_permissions(&kept, fs::Permissions::from_mode(0o600)).expect("a mode");
+    symlink("kept.csv", desk.path("link.csv")).expect("a link");
+    desk.hankel(&format!("{EVAL} link.csv")).code(0);
+    assert!(desk.path("link.csv").is_symlink());
+    assert!(desk.read("kept.csv").starts_with("shadow\n"));
+    assert_eq!(fs::metadata(&kept).expect("a file").mode() & 0o777, 0o600);
+}
+
+#[test]
+fn inputs_are_not_overwritten() {
+    let desk = Desk::new();
+    desk.write("rows.csv", ROWS);
+    desk.write("scene.toml", SCENE);
+    fs::hard_link(desk.path("rows.csv"), desk.path("same.csv")).expect("a link");
+    for line in [
+        format!("{EVAL} rows.csv"),
+        format!("{EVAL} same.csv"),
+        "judge --functions z,z^2 --input rows.csv --output ./rows.csv".into(),
+        "render scene.toml --out scene.toml".into(),
+    ] {
+        desk.hankel(&line).fails(2, &["is read", "another name"]);
+    }
+    desk.hankel("parity --matrix --kernel vsm --column native --json r --html ./r")
+        .fails(2, &["two outputs"]);
+    assert_eq!(
+        (desk.read("rows.csv"), desk.read("scene.toml")),
+        (ROWS.into(), SCENE.into())
+    );
+}
+
+/// Before the work, which would be lost.
+#[test]
+fn outputs_that_cannot_be_written_are_found_first() {
+    let desk = Desk::new();
+    desk.write("scene.toml", SCENE);
+    desk.write("file", "");
+    for line in [
+        "render scene.toml --out no/o.png",
+        "render scene.toml --out . --compare",
+        "bench bounds --out file --samples 10000000 --rounds 1000",
+        "bench bounds --out /dev/null/x --samples 10000000 --rounds 1000",
+        "stress --out file --samples 10000000",
+        "parity --matrix --html .",
+        "parity --matrix --json no/r.json",
+    ] {
+        desk.hankel(line).code(2);
+    }
+    assert_eq!(desk.names(), ["file", "scene.toml"]);
+}
+
+#[test]
+fn a_full_disk_is_the_machines_fault() {
+    let desk = Desk::new();
+    desk.write("rows.csv", ROWS);
+    desk.write("scene.toml", SCENE);
+    desk.write("moments.csv", "m0,m1,m2,z\n1,0.5,0.34,0.9\n");
+    for line in [
+        "eval vsm --input rows.csv --output /dev/full",
+        "judge --functions z,z^2 --input moments.csv --output /dev/full",
+        "render scene.toml --out /dev/full",
+        "parity --matrix --kernel vsm --column native --json /dev/full",
+    ] {
+        desk.hankel(line).fails(3, &["/dev/full"]);
+    }
+}

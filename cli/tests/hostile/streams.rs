@@ -1,0 +1,71 @@
+//! Standard streams that are closed or full.
+
+use std::fs::File;
+use std::os::unix::process::ExitStatusExt;
+use std::process::Stdio;
+
+use crate::desk::{Desk, Run};
+
+const SIGPIPE: i32 = 13;
+
+/// Commands that print, without the long work of some.
+const PRINT: [&str; 8] = [
+    "list",
+    "list --format json",
+    "build --out s --kernel vsm",
+    "new crate-of-mine",
+    "completions bash",
+    "toolchain status",
+    "parity --kernel vsm",
+    "--help",
+];
+
+#[test]
+fn a_reader_that_is_gone_ends_a_command_without_a_word() {
+    for line in PRINT {
+        let desk = Desk::new();
+        let mut command = desk.command(line);
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let output = command.stdout(writer).stderr(Stdio::piped()).output();
+        let run = Run(output.expect("it starts"));
+        run.ended_by(SIGPIPE);
+        assert_eq!(run.err(), "", "{line}");
+    }
+}
+
+#[test]
+fn a_full_disk_is_told() {
+    for line in PRINT {
+        let desk = Desk::new();
+        let mut command = desk.command(line);
+        let full = File::options()
+            .write(true)
+            .open("/dev/full")
+            .expect("a device");
+        let output = command.stdout(full).stderr(Stdio::piped()).output();
+        Run(output.expect("it starts")).fails(3, &["standard output", "No space left"]);
+    }
+}
+
+#[test]
+fn an_error_stream_that_is_closed_or_full_changes_nothing() {
+    for line in ["list --kernel nosuch", "frobnicate", "check nowhere"] {
+        let desk = Desk::new();
+        let (reader, closed) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let full = File::options()
+            .write(true)
+            .open("/dev/full")
+            .expect("a device");
+        for stderr in [Stdio::from(closed), Stdio::from(full)] {
+            let status = desk
+                .command(line)
+                .stderr(stderr)
+                .stdout(Stdio::null())
+                .status();
+            let status = status.expect("it starts");
+            assert_eq!((status.code(), status.signal()), (Some(2), None), "{line}");
+        }
+    }
+}

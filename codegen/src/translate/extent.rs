@@ -1,0 +1,206 @@
+//! How long and how deeply nested a text will be, before it is written.
+//!
+//! naga's writers spell out constants of arrays and structures number by number at every use, and
+//! initial zeros of variables too: a module of a few kilobytes can ask for gigabytes of text. They
+//! also call themselves for every level of an expression or a block, and a deep one would take
+//! their stack. Both are refused here, with what is to blame.
+
+use naga::valid::ModuleInfo;
+use naga::{
+    AddressSpace, Arena, ArraySize, Block, Expression, Function, Handle, Module, Statement, Type,
+    TypeInner,
+};
+
+/// Most numbers in the constants of a text: tens of megabytes of it.
+pub(crate) const MOST_NUMBERS: u64 = 4_000_000;
+
+/// Most levels of an expression within an expression or a block within a block: the writers' stack
+/// ([`crate::error::STACK`]) has 32 KiB for each.
+pub(crate) const MOST_LEVELS: u32 = 2000;
+
+/// Refuses what would be too long or too deep.
+pub(super) fn check(module: &Module, info: &ModuleInfo) -> Result<(), String> {
+    let types = type_sizes(module);
+    let size = |ty: Handle<Type>| types[ty.index()];
+    let constants = constant_sizes(module, &types);
+    let mut numbers = Numbers { total: 0 };
+    for (_, variable) in module.global_variables.iter() {
+        let name = variable.name.as_deref().unwrap_or("a variable");
+        match (variable.init, variable.space) {
+            (Some(init), _) => numbers.add(constants[init.index()], name)?,
+            (None, AddressSpace::Private) => numbers.add(size(variable.ty), name)?,
+            _ => {}
+        }
+    }
+    let functions = module
+        .functions
+        .iter()
+        .map(|(handle, function)| (function, &info[handle]));
+    let entry_points = module
+        .entry_points
+        .iter()
+        .enumerate()
+        .map(|(i, entry)| (&entry.function, info.get_entry_point(i)));
+    for (function, info) in functions.chain(entry_points) {
+        for (_, variable) in function.local_variables.iter() {
+            if variable.init.is_none() {
+                let name = variable.name.as_deref().unwrap_or("a variable");
+                numbers.add(size(variable.ty), name)?;
+            }
+        }
+        for (handle, expression) in function.expressions.iter() {
+            let uses = info[handle].ref_count as u64;
+            let each = match *expression {
+                Expression::Constant(constant) => {
+                    constants[module.constants[constant].init.index()]
+                }
+                Expression::ZeroValue(ty) => size(ty),
+                _ => continue,
+            };
+            // A name, or a single number, is what every expression has.
+            if each > 1 {
+                numbers.add(each.saturating_mul(uses), "a constant")?;
+            }
+        }
+        depth(function)?;
+    }
+    Ok(())
+}
+
+struct Numbers {
+    total: u64,
+}
+
+impl Numbers {
+    fn add(&mut self, count: u64, what: &str) -> Result<(), String> {
+        self.total = self.total.saturating_add(count);
+        if self.total <= MOST_NUMBERS {
+            return Ok(());
+        }
+        Err(format!(
+            "its text would have more than {MOST_NUMBERS} numbers: {what} has {count} in all its \
+             uses, and every language spells them out; make the array smaller, or read it from a \
+             buffer"
+        ))
+    }
+}
+
+/// Numbers in a value of each type, saturating.
+fn type_sizes(module: &Module) -> Vec<u64> {
+    let mut sizes: Vec<u64> = Vec::with_capacity(module.types.len());
+    for (_, ty) in module.types.iter() {
+        let size = match &ty.inner {
+            TypeInner::Vector { size, .. } => *size as u64,
+            TypeInner::Matrix { columns, rows, .. } => *columns as u64 * *rows as u64,
+            TypeInner::Array {
+                base,
+                size: ArraySize::Constant(count),
+                ..
+            } => sizes[base.index()].saturating_mul(u64::from(count.get())),
+            TypeInner::Struct { members, .. } => members.iter().fold(0, |sum: u64, member| {
+                sum.saturating_add(sizes[member.ty.index()])
+            }),
+            _ => 1,
+        };
+        sizes.push(size);
+    }
+    sizes
+}
+
+/// Numbers in each of the module's constant expressions, saturating: they refer to earlier ones.
+fn constant_sizes(module: &Module, types: &[u64]) -> Vec<u64> {
+    let arena: &Arena<Expression> = &module.global_expressions;
+    let mut sizes: Vec<u64> = Vec::with_capacity(arena.len());
+    for (_, expression) in arena.iter() {
+        let size = match expression {
+            Expression::Compose { components, .. } => components
+                .iter()
+                .fold(0, |sum: u64, part| sum.saturating_add(sizes[part.index()])),
+            Expression::ZeroValue(ty) => types[ty.index()],
+            Expression::Constant(constant) => {
+                let init = module.constants[*constant].init.index();
+                sizes.get(init).copied().unwrap_or(1)
+            }
+            _ => 1,
+        };
+        sizes.push(size);
+    }
+    sizes
+}
+
+/// Refuses expressions and blocks that are nested too deeply.
+fn depth(function: &Function) -> Result<(), String> {
+    let mut depths: Vec<u32> = Vec::with_capacity(function.expressions.len());
+    for (_, expression) in function.expressions.iter() {
+        let mut deepest = 0;
+        for operand in operands(expression) {
+            // Expressions refer to earlier ones.
+            deepest = deepest.max(depths.get(operand.index()).copied().unwrap_or(0));
+        }
+        // What is stored in a variable starts anew: the writers name it.
+        let starts = matches!(
+            expression,
+            Expression::Load { .. } | Expression::CallResult(_) | Expression::LocalVariable(_)
+        );
+        depths.push(if starts { 1 } else { deepest + 1 });
+    }
+    let mut open: Vec<(&Block, u32)> = vec![(&function.body, 1)];
+    let mut levels = depths.into_iter().max().unwrap_or(0);
+    while let Some((block, level)) = open.pop() {
+        levels = levels.max(level);
+        for statement in block {
+            match statement {
+                Statement::Block(inner) => open.push((inner, level + 1)),
+                Statement::If { accept, reject, .. } => {
+                    open.extend([(accept, level + 1), (reject, level + 1)]);
+                }
+                Statement::Switch { cases, .. } => {
+                    open.extend(cases.iter().map(|case| (&case.body, level + 1)));
+                }
+                Statement::Loop {
+                    body, continuing, ..
+                } => open.extend([(body, level + 1), (continuing, level + 1)]),
+                _ => {}
+            }
+        }
+    }
+    if levels > MOST_LEVELS {
+        return Err(format!(
+            "it is nested {levels} levels deep, more than the {MOST_LEVELS} that can be written: \
+             put parts of the expression into variables"
+        ));
+    }
+    Ok(())
+}
+
+/// What an expression is written around.
+fn operands(expression: &Expression) -> Vec<Handle<Expression>> {
+    use Expression as E;
+    match expression {
+        E::Access { base, index } => vec![*base, *index],
+        E::AccessIndex { base, .. } => vec![*base],
+        E::Splat { value, .. } => vec![*value],
+        E::Swizzle { vector, .. } => vec![*vector],
+        E::Compose { components, .. } => components.clone(),
+        E::Unary { expr, .. } | E::As { expr, .. } | E::Derivative { expr, .. } => vec![*expr],
+        E::Binary { left, right, .. } => vec![*left, *right],
+        E::Select {
+            condition,
+            accept,
+            reject,
+        } => vec![*condition, *accept, *reject],
+        E::Relational { argument, .. } => vec![*argument],
+        E::Math {
+            arg,
+            arg1,
+            arg2,
+            arg3,
+            ..
+        } => [Some(*arg), *arg1, *arg2, *arg3]
+            .into_iter()
+            .flatten()
+            .collect(),
+        E::ArrayLength(array) => vec![*array],
+        _ => Vec::new(),
+    }
+}

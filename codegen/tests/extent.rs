@@ -1,0 +1,84 @@
+//! Modules of a few kilobytes that would become gigabytes of text, or that would take the writers'
+//! stack.
+
+mod support;
+
+use std::fmt::Write;
+
+use hankel_codegen::translate::Ir;
+
+const HEAD: &str = "OpCapability Shader
+OpMemoryModel Logical GLSL450
+OpEntryPoint GLCompute %main \"bound\"
+OpExecutionMode %main LocalSize 1 1 1
+%void = OpTypeVoid
+%call = OpTypeFunction %void
+%uint = OpTypeInt 32 0
+%float = OpTypeFloat 32
+%zero = OpConstant %uint 0
+%one = OpConstant %float 1
+";
+
+fn read(text: &str) -> Result<Ir, String> {
+    let spirv = support::assemble(&format!("{HEAD}{text}OpReturn\nOpFunctionEnd\n"));
+    Ir::read(&spirv, &support::bound()).map_err(|failure| failure.to_string())
+}
+
+/// A private array of `rows` times `columns` zeros.
+fn array(rows: u32, columns: u32) -> String {
+    format!(
+        "%rows = OpConstant %uint {rows}
+%columns = OpConstant %uint {columns}
+%row = OpTypeArray %uint %columns
+%table = OpTypeArray %row %rows
+%of_table = OpTypePointer Private %table
+%of_uint = OpTypePointer Private %uint
+%null = OpConstantNull %table
+%all = OpVariable %of_table Private %null
+%main = OpFunction %void None %call
+%begin = OpLabel
+%place = OpAccessChain %of_uint %all %zero %zero
+%value = OpLoad %uint %place
+OpStore %place %value
+"
+    )
+}
+
+/// A sum of so many terms, each within the next.
+fn sum(terms: u32) -> String {
+    let mut text = "%of_float = OpTypePointer Private %float
+%there = OpVariable %of_float Private %one
+%main = OpFunction %void None %call
+%begin = OpLabel
+%s0 = OpLoad %float %there
+"
+    .to_owned();
+    for i in 1..=terms {
+        let _ = writeln!(text, "%s{i} = OpFAdd %float %s{} %one", i - 1);
+    }
+    let _ = writeln!(text, "OpStore %there %s{terms}");
+    text
+}
+
+#[test]
+fn a_text_of_gigabytes_is_refused() {
+    read(&array(16, 16)).unwrap();
+    let error = read(&array(16_384, 16_384)).unwrap_err();
+    for words in ["`bound`", "268435456", "array smaller"] {
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn what_would_take_the_stack_is_refused() {
+    // On a stack that is smaller than any thread's.
+    let small = std::thread::Builder::new().stack_size(512 << 10);
+    let test = small.spawn(|| {
+        read(&sum(1500)).unwrap();
+        let error = read(&sum(20_000)).unwrap_err();
+        for words in ["`bound`", "levels deep", "variables"] {
+            assert!(error.contains(words), "{error}");
+        }
+    });
+    test.unwrap().join().unwrap();
+}

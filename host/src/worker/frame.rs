@@ -1,0 +1,327 @@
+//! What goes through the pipes: a length, a header in JSON, and the bytes that the header counts.
+
+use std::io::{self, Read, Write};
+
+use hankel_dsl::native::describe::{Kernel, TexelFormat};
+use hankel_dsl::native::{Address, Arg, Call, Filter, Mode, Sampler, TextureMut, TextureRef};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Bytes at an address that fits every layout.
+type Words = Vec<u128>;
+
+/// A call.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Request {
+    pub kernel: usize,
+    lanes: bool,
+    parallel: bool,
+    constants: Vec<u32>,
+    shapes: Vec<Shape>,
+}
+
+/// An argument, whose bytes follow the header in turn.
+#[derive(Debug, Serialize, Deserialize)]
+enum Shape {
+    Bytes(usize),
+    BytesMut(usize),
+    /// So many counters.
+    Atomics(usize),
+    Texture {
+        size: [u32; 3],
+        samples: u32,
+        format: TexelFormat,
+        bytes: usize,
+    },
+    TextureMut {
+        size: [u32; 3],
+        format: TexelFormat,
+        bytes: usize,
+    },
+    Sampler {
+        linear: bool,
+        repeat: bool,
+    },
+}
+
+impl Shape {
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Bytes(n) | Self::BytesMut(n) => *n,
+            Self::Atomics(n) => n * 4,
+            Self::Texture { bytes, .. } | Self::TextureMut { bytes, .. } => *bytes,
+            Self::Sampler { .. } => 0,
+        }
+    }
+}
+
+/// What the worker says: first [`Answer::Kernels`] or [`Answer::Failed`], then one for each call.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum Answer {
+    /// The plug-in is loaded.
+    Kernels(Vec<Kernel>),
+    /// The call is done; the bytes of what it writes follow in turn.
+    Done,
+    /// What went wrong, in words.
+    Failed(String),
+}
+
+/// The most bytes of a header: descriptions of all kernels are some hundred kilobytes.
+const MAX_HEADER: u32 = 256 << 20;
+
+pub(super) fn write_header(to: &mut impl Write, header: &impl Serialize) -> io::Result<()> {
+    let text = serde_json::to_vec(header)?;
+    let length = u32::try_from(text.len()).map_err(io::Error::other)?;
+    to.write_all(&length.to_le_bytes())?;
+    to.write_all(&text)
+}
+
+/// `None` at the end.
+pub(super) fn read_header<T: DeserializeOwned>(from: &mut impl Read) -> io::Result<Option<T>> {
+    let mut length = [0; 4];
+    match from.read_exact(&mut length) {
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
+        other => other?,
+    }
+    let length = u32::from_le_bytes(length);
+    if length > MAX_HEADER {
+        return Err(io::Error::other("a header of this length is none"));
+    }
+    let mut text = vec![0; length as usize];
+    from.read_exact(&mut text)?;
+    Ok(Some(serde_json::from_slice(&text)?))
+}
+
+/// Sends a call.
+pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) -> io::Result<()> {
+    let shapes = call.args.iter().map(|arg| match arg {
+        Arg::Bytes(b) => Shape::Bytes(b.len()),
+        Arg::BytesMut(b) => Shape::BytesMut(b.len()),
+        Arg::Atomics(a) => Shape::Atomics(a.len()),
+        Arg::Texture(t) => Shape::Texture {
+            size: t.size,
+            samples: t.samples,
+            format: t.format,
+            bytes: t.bytes.len(),
+        },
+        Arg::TextureMut(t) => Shape::TextureMut {
+            size: t.size,
+            format: t.format,
+            bytes: t.bytes.len(),
+        },
+        Arg::Sampler(s) => Shape::Sampler {
+            linear: s.filter == Filter::Linear,
+            repeat: s.address == Address::Repeat,
+        },
+    });
+    let request = Request {
+        kernel,
+        lanes: call.mode.lanes,
+        parallel: call.mode.parallel,
+        constants: call.constants.clone(),
+        shapes: shapes.collect(),
+    };
+    write_header(to, &request)?;
+    for arg in &call.args {
+        match arg {
+            Arg::Bytes(b) => to.write_all(b)?,
+            Arg::BytesMut(b) => to.write_all(b)?,
+            Arg::Atomics(a) => write_counters(to, a)?,
+            Arg::Texture(t) => to.write_all(t.bytes)?,
+            Arg::TextureMut(t) => to.write_all(t.bytes)?,
+            Arg::Sampler(_) => {}
+        }
+    }
+    to.flush()
+}
+
+/// Takes in what a call has written.
+pub(super) fn read_results(from: &mut impl Read, call: &mut Call<'_>) -> io::Result<()> {
+    for arg in &mut call.args {
+        match arg {
+            Arg::BytesMut(b) => from.read_exact(b)?,
+            Arg::TextureMut(t) => from.read_exact(t.bytes)?,
+            Arg::Atomics(counters) => {
+                let mut word = [0; 4];
+                for counter in counters.iter() {
+                    from.read_exact(&mut word)?;
+                    counter.store(u32::from_le_bytes(word), Ordering::Relaxed);
+                }
+            }
+            Arg::Bytes(_) | Arg::Texture(_) | Arg::Sampler(_) => {}
+        }
+    }
+    Ok(())
+}
+
+fn write_counters(to: &mut impl Write, counters: &[AtomicU32]) -> io::Result<()> {
+    for counter in counters {
+        to.write_all(&counter.load(Ordering::Relaxed).to_le_bytes())?;
+    }
+    Ok(())
+}
+
+/// A call as it arrived: its arguments' memory.
+pub(super) struct Arrived {
+    pub request: Request,
+    memory: Vec<Words>,
+    counters: Vec<Vec<AtomicU32>>,
+}
+
+impl Arrived {
+    /// Reads the bytes that follow a header.
+    pub fn read(from: &mut impl Read, request: Request) -> io::Result<Self> {
+        let (mut memory, mut counters) = (Vec::new(), Vec::new());
+        for shape in &request.shapes {
+            let bytes = shape.bytes();
+            let mut words: Words = vec![0; bytes.div_ceil(size_of::<u128>())];
+            let all: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+            from.read_exact(&mut all[..bytes])?;
+            counters.push(match shape {
+                Shape::Atomics(_) => bytemuck::cast_slice::<u8, u32>(&all[..bytes])
+                    .iter()
+                    .map(|&n| AtomicU32::new(u32::from_le(n)))
+                    .collect(),
+                _ => Vec::new(),
+            });
+            memory.push(words);
+        }
+        Ok(Self {
+            request,
+            memory,
+            counters,
+        })
+    }
+
+    /// The call.
+    pub fn call(&mut self) -> Call<'_> {
+        let shapes = self.request.shapes.iter();
+        let memory = self.memory.iter_mut().zip(&self.counters);
+        let args = shapes.zip(memory).map(|(shape, (words, counters))| {
+            let all: &mut [u8] = bytemuck::cast_slice_mut(words);
+            let bytes = &mut all[..shape.bytes()];
+            match *shape {
+                Shape::Bytes(_) => Arg::Bytes(bytes),
+                Shape::BytesMut(_) => Arg::BytesMut(bytes),
+                Shape::Atomics(_) => Arg::Atomics(counters),
+                Shape::Texture {
+                    size,
+                    samples,
+                    format,
+                    ..
+                } => Arg::Texture(TextureRef {
+                    size,
+                    samples,
+                    format,
+                    bytes,
+                }),
+                Shape::TextureMut { size, format, .. } => Arg::TextureMut(TextureMut {
+                    size,
+                    format,
+                    bytes,
+                }),
+                Shape::Sampler { linear, repeat } => Arg::Sampler(Sampler {
+                    filter: if linear {
+                        Filter::Linear
+                    } else {
+                        Filter::Nearest
+                    },
+                    address: if repeat {
+                        Address::Repeat
+                    } else {
+                        Address::ClampToEdge
+                    },
+                }),
+            }
+        });
+        Call {
+            args: args.collect(),
+            constants: self.request.constants.clone(),
+            mode: Mode {
+                lanes: self.request.lanes,
+                parallel: self.request.parallel,
+            },
+        }
+    }
+
+    /// Sends what the call has written.
+    pub fn write_results(&mut self, to: &mut impl Write) -> io::Result<()> {
+        for arg in &self.call().args {
+            match arg {
+                Arg::BytesMut(b) => to.write_all(b)?,
+                Arg::TextureMut(t) => to.write_all(t.bytes)?,
+                Arg::Atomics(counters) => write_counters(to, counters)?,
+                Arg::Bytes(_) | Arg::Texture(_) | Arg::Sampler(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_call_arrives_as_it_was_sent_and_comes_back() {
+        let (read, texels) = ([1_u8, 2, 3, 4], [7_u8; 16]);
+        let mut written = [5_u8; 8];
+        let mut image = [9_u8; 4];
+        let counters = [AtomicU32::new(3), AtomicU32::new(4)];
+        let format = TexelFormat::R32Float;
+        let size = [2, 2, 1];
+        let mut call = Call {
+            args: vec![
+                Arg::Bytes(&read),
+                Arg::Texture(TextureRef {
+                    size,
+                    samples: 1,
+                    format,
+                    bytes: &texels,
+                }),
+                Arg::Sampler(Sampler {
+                    filter: Filter::Linear,
+                    address: Address::Repeat,
+                }),
+                Arg::Atomics(&counters),
+                Arg::BytesMut(&mut written),
+                Arg::TextureMut(TextureMut {
+                    size: [1, 1, 1],
+                    format,
+                    bytes: &mut image,
+                }),
+            ],
+            constants: vec![42],
+            mode: Mode::REFERENCE,
+        };
+        let mut pipe = Vec::new();
+        write_call(&mut pipe, 6, &call).unwrap();
+        let mut from = &pipe[..];
+        let request: Request = read_header(&mut from).unwrap().unwrap();
+        assert_eq!(request.kernel, 6);
+        let mut arrived = Arrived::read(&mut from, request).unwrap();
+        assert!(from.is_empty());
+        {
+            let mut there = arrived.call();
+            assert_eq!((there.constants[0], there.mode), (42, Mode::REFERENCE));
+            assert_eq!(format!("{:?}", there.args), format!("{:?}", call.args));
+            let Arg::Atomics(there_counters) = &there.args[3] else {
+                panic!("counters")
+            };
+            there_counters[1].store(99, Ordering::Relaxed);
+            let Arg::BytesMut(bytes) = &mut there.args[4] else {
+                panic!("bytes")
+            };
+            bytes[0] = 77;
+        }
+        let mut back = Vec::new();
+        arrived.write_results(&mut back).unwrap();
+        read_results(&mut &back[..], &mut call).unwrap();
+        drop(call);
+        assert_eq!(written, [77, 5, 5, 5, 5, 5, 5, 5]);
+        assert_eq!(counters[1].load(Ordering::Relaxed), 99);
+        assert!(read_header::<Request>(&mut &[][..]).unwrap().is_none());
+        assert!(read_header::<Request>(&mut &[255; 8][..]).is_err());
+    }
+}
