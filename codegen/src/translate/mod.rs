@@ -50,7 +50,7 @@ use reading::Dropped;
 
 /// Number of how texts are written. To be raised with every change that gives other ones: a build by
 /// another number is stale.
-pub(crate) const WRITERS: u32 = 3;
+pub(crate) const WRITERS: u32 = 4;
 
 /// What to do about an index that is out of range, beyond the kernel's own guard.
 ///
@@ -381,6 +381,8 @@ impl Ir {
             cleanup::drop_unused_locals(&mut module);
             let info = validate(&module, name)?;
             cleanup::name_loads(&mut module, &info);
+            cleanup::name_phis(&mut module);
+            cleanup::name_values(&mut module, &info);
             let info = validate(&module, name)?;
             Ok((module, info, folded))
         };
