@@ -144,7 +144,7 @@ fn a_value_stored_once_is_returned() {
     // Stored on two paths: a local variable.
     let wgsl = text(&support::tint(), Language::Wgsl).source;
     assert!(
-        wgsl.contains("var color: vec4<f32>;") && wgsl.contains("return _e"),
+        wgsl.contains("var color: vec4<f32>;") && wgsl.contains("return color_1;"),
         "{wgsl}"
     );
 }
@@ -260,7 +260,7 @@ fn exact_arithmetic_is_precise_where_the_language_can() {
     let glsl = text(&kernel, Language::Glsl);
     assert!(
         glsl.source
-            .contains("precise float rounded_1 = (rounded - x);"),
+            .contains("precise float difference = (sum - x);"),
         "{}",
         glsl.source
     );
@@ -278,7 +278,7 @@ fn exact_arithmetic_is_precise_where_the_language_can() {
     let hlsl = text(&kernel, Language::Hlsl);
     assert!(
         hlsl.source
-            .contains("        precise float rounded_1 = (rounded - x);"),
+            .contains("        precise float difference = (sum - x);"),
         "{}",
         hlsl.source
     );

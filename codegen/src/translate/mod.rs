@@ -391,6 +391,8 @@ impl Ir {
             cleanup::drop_unused_locals(&mut module);
             let info = validate(&module, name)?;
             cleanup::name_loads(&mut module, &info);
+            cleanup::name_phis(&mut module);
+            cleanup::name_values(&mut module, &info);
             let info = validate(&module, name)?;
             Ok((module, info, folded))
         };

@@ -12,6 +12,7 @@
 //! - [`drop_dead_locals`] drops variables that are only written;
 //! - [`drop_last_return`] drops the `return` at the end;
 //! - [`name_loads`] names what is loaded after the member or structure that it comes from;
+//! - [`name_phis`] and [`name_values`] name what has no name in SPIR-V after what it is;
 //! - [`name_bit_counts`] names counts of bits, where a variable's precision must widen them;
 //! - [`restore_sampling`] says again where varyings are evaluated;
 //! - [`name_roundings`] names every result of arithmetic, where that must be computed as written.
@@ -28,6 +29,7 @@ mod names;
 mod rounding;
 mod sampling;
 mod shapes;
+mod values;
 mod walk;
 
 pub use bits::{has_bit_counts, name_bit_counts};
@@ -39,4 +41,5 @@ pub use names::{name_loads, name_result};
 pub use rounding::{ROUNDED, name_results, name_roundings};
 pub use sampling::restore_sampling;
 pub use shapes::{constant_indices, drop_last_return};
+pub use values::{name_phis, name_values};
 pub(crate) use walk::{each_statement, each_within};
