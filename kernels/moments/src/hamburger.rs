@@ -1,4 +1,4 @@
-//! The Hamburger problem with four moments: depths anywhere on the real line.
+//! The Hamburger problem with four moments, of depths in [-1, 1] and total 1.
 
 use hankel_dsl::{Real, lit};
 
@@ -61,9 +61,10 @@ impl<R: Real> Query<R> {
 /// The greatest lower bound, over all distributions of depths with moments `m`, of the share that
 /// lies below `z` (\[MSM\], Algorithms 2 and 3); in [0, 1].
 ///
-/// Moments are clamped to [-1, 1] and `z` to [-2, 2], which costs nothing for depths in [0, 1] or
-/// [-1, 1] and keeps every intermediate value finite. Moments that no distribution has give the
-/// bound of a nearby vector.
+/// Depths are in [-1, 1]: moments are clamped to that range and `z` to [-2, 2], which keeps every
+/// intermediate value finite. For depths elsewhere, and for any total, there is
+/// [`bound`](crate::bound). Moments that no distribution has give the bound of others, see
+/// [`bound`](crate::bound).
 ///
 /// The published form divides the polynomial by its leading coefficient, which is 0 when a root
 /// is at infinity. Here the query point's own weight is a quotient of sums of squares, whether

@@ -15,9 +15,21 @@ use crate::hamburger::Query;
 /// sums of squares.
 ///
 /// `z` is clamped into [0, 1], the moments to [0, 1]; moments that no distribution on [0, 1] has
-/// give the bound of a nearby vector.
+/// give a number in [0, 1].
 #[inline(always)]
 pub fn hausdorff_4<R: Real>(m: Moments4<R>, z: R) -> R {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let (m, z) = clamped(m, z);
+    let query = Query::new(m, z);
+    let outside = R::select(query.k1.gt(zero), one - query.own, zero);
+    let three = R::select(query.k2.lt(zero), query.between(), outside);
+    let four = FourPoints::new(m, z);
+    query.within_two_moments(R::select(four.is_possible, four.bound, three))
+}
+
+#[inline(always)]
+fn clamped<R: Real>(m: Moments4<R>, z: R) -> (Moments4<R>, R) {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let unit = |b: R| b.clamp(zero, one);
@@ -27,51 +39,52 @@ pub fn hausdorff_4<R: Real>(m: Moments4<R>, z: R) -> R {
         b3: unit(m.b3),
         b4: unit(m.b4),
     };
-    let z = z.clamp(R::epsilon(), one - R::epsilon());
-    let query = Query::new(m, z);
-    let Query {
-        own, k0, k1, k2, ..
-    } = query;
-
-    // The roots lie in [0, 1] if the polynomial has the right signs and slopes at its ends.
-    let at_zero = k0 - z * (k1 - z * k2);
-    let rest = one - z;
-    let at_one = k0 + rest * (k1 + rest * k2);
-    let slope_at_zero = k1 - z * k2 * lit!(2.0);
-    let slope_at_one = k1 + rest * k2 * lit!(2.0);
-    let straddles = k2.lt(zero);
-    let above = k1.gt(zero);
-    let inside_between = at_zero.le(zero) & at_one.le(zero);
-    let inside_below = at_zero.ge(zero) & slope_at_zero.le(zero);
-    let inside_above = at_one.ge(zero) & slope_at_one.ge(zero);
-    let inside = (straddles & inside_between)
-        | (!straddles & ((above & inside_below) | (!above & inside_above)));
-
-    let outside = R::select(above, one - own, zero);
-    let three = R::select(straddles, query.between(), outside);
-    query.within_two_moments(R::select(inside, three, four_points(m, z)))
+    (m, z.clamp(R::epsilon(), one - R::epsilon()))
 }
 
-/// The bound when 0 and 1 carry weight.
-#[inline(always)]
-fn four_points<R: Real>(m: Moments4<R>, z: R) -> R {
-    let zero: R = lit!(0.0);
-    let one: R = lit!(1.0);
-    let floor = R::epsilon() * R::epsilon();
-    // Moments of x (1 - x) times the distribution.
-    let n0 = (m.b1 - m.b2).max(floor);
-    let n1 = m.b2 - m.b3;
-    let n2 = m.b3 - m.b4;
-    let spread = (n0 * n2 - n1 * n1).max(zero);
-    let offset = n0 * z - n1;
-    // Its weight at z, n0 / (1 + …²); the rest is at the free point n1/n0 - spread/(n0 offset).
-    let own = n0 * spread / (spread + offset * offset).max(floor * floor);
-    let other = n0 - own;
-    let is_positive = offset.gt(zero);
-    let safe = R::select(is_positive, offset.max(floor), offset.min(-floor));
-    let free = (n1 - spread / safe) / n0;
-    let least = R::epsilon();
-    let below = other / (one - free).max(least);
-    let above = other / free.max(least);
-    one - m.b1 - own / z + R::select(is_positive, below, -above)
+/// The points 0, 1, `z` and one more with the given moments.
+struct FourPoints<R: Real> {
+    /// Their share below `z`.
+    bound: R,
+    /// Whether no weight is negative: either these four points are all in [0, 1], with weights that
+    /// are not negative, or the three of the Hamburger problem are. Where the weight of 0 or 1 is 0
+    /// both distributions are the same, so that what rounding does to a weight's sign changes the
+    /// bound by no more than that weight.
+    is_possible: R::Mask,
+}
+
+impl<R: Real> FourPoints<R> {
+    #[inline(always)]
+    fn new(m: Moments4<R>, z: R) -> Self {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let least = R::epsilon();
+        let floor = least * least;
+        // Moments of x (1 - x) times the distribution.
+        let total = (m.b1 - m.b2).max(floor);
+        let n1 = m.b2 - m.b3;
+        let n2 = m.b3 - m.b4;
+        let spread = (total * n2 - n1 * n1).max(zero);
+        let offset = total * z - n1;
+        let shift = n1 * z - n2;
+        let rest = offset - shift;
+        // Its weights, at z and at the free point.
+        let squares = (offset * offset + spread).max(floor * floor);
+        let own = total * (spread / squares);
+        let other = total * (offset * offset / squares);
+        // The free point is at shift / offset. Its weight over the distances to 0 and to 1.
+        let is_below = offset.gt(zero);
+        let length = offset.abs().max(floor);
+        let toward = |x: R| R::select(is_below, x, -x) / length;
+        let (from_start, from_end) = (toward(shift), toward(rest));
+        let by_start = other / from_start.max(least);
+        let by_end = other / from_end.max(least);
+        let at_start = one - m.b1 - own / z;
+        let at_end = m.b1 - own / (one - z);
+        let is_inside = from_start.ge(-least) & from_end.ge(-least);
+        Self {
+            bound: at_start + R::select(is_below, by_end, -by_start),
+            is_possible: is_inside & at_start.ge(by_start) & at_end.ge(by_end),
+        }
+    }
 }

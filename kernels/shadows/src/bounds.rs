@@ -65,8 +65,8 @@ fn cut<R: Real>(shadow: R, settings: &Settings<R>) -> Shadow<R> {
     }
 }
 
-/// Hamburger four moment shadow mapping: the least shadow that the moments allow, for depths
-/// anywhere.
+/// Hamburger four moment shadow mapping: the least shadow that the moments allow, for depths in
+/// [-1, 1] or [0, 1]. Other depths: `moment_bound_n2`.
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn hamburger_4msm<R: Real>(
     #[uniform] settings: &Settings<R>,

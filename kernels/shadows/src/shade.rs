@@ -37,7 +37,7 @@ pub struct Light {
     pub ambient: Vec4,
     /// The moment vector that the bias mixes in.
     pub bias_target: Vec4,
-    /// How much of it, from 0 to 1.
+    /// How much of it, from 0 to 1; for variance shadow mapping the least variance.
     pub moment_bias: f32,
     /// What is taken off a receiver's depth, in the map's range of 0 to 1.
     pub depth_bias: f32,
@@ -129,7 +129,7 @@ fn in_range(z: f32, how: u32) -> f32 {
     }
 }
 
-/// Biased moments at a receiver, and its depth in the map's range.
+/// The map's moments at a receiver, and its depth in the map's range.
 #[inline(always)]
 fn look_up(
     light: &Light,
@@ -139,6 +139,12 @@ fn look_up(
     world: Vec3,
 ) -> (Moments4<f32>, f32) {
     let (uv, z) = receiver(light, world);
+    (decode(map.sample(sampler, uv), how), in_range(z, how))
+}
+
+/// Moments with the light's bias mixed in.
+#[inline(always)]
+fn biased(light: &Light, m: Moments4<f32>) -> Moments4<f32> {
     let t = light.bias_target;
     let target = Moments4 {
         b1: t.x,
@@ -146,8 +152,7 @@ fn look_up(
         b3: t.z,
         b4: t.w,
     };
-    let m = decode(map.sample(sampler, uv), how).lerp(target, light.moment_bias);
-    (m, in_range(z, how))
+    m.lerp(target, light.moment_bias)
 }
 
 /// Shading with Hamburger four moment shadow mapping.
@@ -169,6 +174,7 @@ pub fn shade_hamburger(
     #[constant(id = 0, default = 2)] encoding: u32,
 ) -> Vec4 {
     let (m, z) = look_up(light, map, sampler, encoding, world);
+    let m = biased(light, m);
     lit(
         light,
         normal,
@@ -196,6 +202,7 @@ pub fn shade_hausdorff(
     #[constant(id = 0, default = 2)] encoding: u32,
 ) -> Vec4 {
     let (m, z) = look_up(light, map, sampler, encoding, world);
+    let m = biased(light, m);
     let shadow = if encoding == encoding::UNIT {
         hausdorff_4(m, z)
     } else {
@@ -204,7 +211,8 @@ pub fn shade_hausdorff(
     lit(light, normal, colour, cut_leak(shadow, light.light_leak))
 }
 
-/// Shading with variance shadow mapping, from the first two of four moments.
+/// Shading with variance shadow mapping, from the first two of four moments. The moments are as they
+/// are: against rounding, `moment_bias` is the least variance.
 #[kernel(
     fragment,
     parity(

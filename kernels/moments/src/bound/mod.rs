@@ -107,11 +107,30 @@ pub fn mix_bias<R: Real, const N: usize>(
     mixed
 }
 
+/// The bias as \[MBD\], Algorithm 1, has it: `(1 - strength) m + strength target`, all moments alike.
+/// With a target of total 1 the total becomes `(1 - strength) m_0 + strength`, whatever it was: for a
+/// total of 1 this is [`mix_bias`], for a small one it is stronger. Kernels use [`mix_bias`], which is
+/// the same for every unit of weight.
+#[inline(always)]
+pub fn mix_bias_and_total<R: Real, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    target: [R; MAX_MOMENTS],
+    strength: R,
+) -> [R; MAX_MOMENTS] {
+    let strength = strength.saturate();
+    let mut mixed = m;
+    hankel_dsl::unroll!(k in 0..(2 * N + 1), max 11, {
+        mixed[k] = m[k].lerp(target[k], strength);
+    });
+    mixed
+}
+
 /// A distribution on [-1, 1] to mix in with [`mix_bias`]: its moments `m_0` to `m_2N`, `m_0` being 1.
 ///
 /// For N = 2, 3, 4 the vectors published with \[MBOIT\] for 32-bit floats
-/// ([`SYMMETRIC_4_32`](crate::bias::SYMMETRIC_4_32) and on); for N = 1 and 5, where none is, N + 1
-/// equal weights at equal distances from -1 to 1, as \[MBD\] has it.
+/// ([`SYMMETRIC_4_32`](crate::bias::SYMMETRIC_4_32) and on), which \[MBD\] uses, too. None is
+/// published for N = 1 and 5: there, N + 1 equal weights at equal distances from -1 to 1, which is
+/// this library's own choice.
 #[inline(always)]
 pub fn bias_target<R: Real, const N: usize>() -> [R; MAX_MOMENTS] {
     let mut target = [lit!(0.0); MAX_MOMENTS];
