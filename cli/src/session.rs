@@ -15,8 +15,8 @@ use std::time::Duration;
 
 use hankel_codegen::build::{Modules, Request};
 use hankel_codegen::bundle::Bundle;
-use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::compile::{Compiled, Compiler, compile};
+use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::inputs::{Inputs, normal};
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;

@@ -45,10 +45,16 @@ fn example(name: &str, desk: &Path) {
 fn follows(desk: &Path, build: &dyn Fn() -> Output) {
     let text = |output: &Output| String::from_utf8_lossy(&output.stdout).into_owned();
     let first = text(&build());
-    assert!(first.contains("SHADERS") || first.contains("Shaders"), "{first}");
+    assert!(
+        first.contains("SHADERS") || first.contains("Shaders"),
+        "{first}"
+    );
     assert!(desk.join("shaders/wgsl/vsm.wgsl").is_file());
     let second = text(&build());
-    assert!(!second.contains("SHADERS") && !second.contains("Shaders"), "{second}");
+    assert!(
+        !second.contains("SHADERS") && !second.contains("Shaders"),
+        "{second}"
+    );
 }
 
 #[test]
@@ -62,7 +68,10 @@ fn ninja_builds_when_a_source_is_newer() {
     follows(desk, &build);
     let inputs = run("ninja", desk, &["-t", "deps"]);
     let inputs = String::from_utf8_lossy(&inputs.stdout).into_owned();
-    for file in ["kernels/shadows/src/bounds.rs", "kernels/moments/src/variance.rs"] {
+    for file in [
+        "kernels/shadows/src/bounds.rs",
+        "kernels/moments/src/variance.rs",
+    ] {
         assert!(inputs.contains(file), "{inputs}");
     }
 }
@@ -74,18 +83,39 @@ fn cmake_builds_when_a_source_is_newer() {
     example("cmake", desk);
     let kernels = format!("-DKERNELS={}", kernels().display());
     let hankel = format!("-DHANKEL={HANKEL}");
-    run("cmake", desk, &["-G", "Unix Makefiles", &kernels, &hankel, "-S", ".", "-B", "."]);
+    run(
+        "cmake",
+        desk,
+        &[
+            "-G",
+            "Unix Makefiles",
+            &kernels,
+            &hankel,
+            "-S",
+            ".",
+            "-B",
+            ".",
+        ],
+    );
     let build = || run("cmake", desk, &["--build", "."]);
     let first = build();
     assert!(first.status.success());
     let shader = desk.join("shaders/manifest.json");
-    let built = |file: &Path| fs::metadata(file).expect("it is there").modified().expect("a time");
+    let built = |file: &Path| {
+        fs::metadata(file)
+            .expect("it is there")
+            .modified()
+            .expect("a time")
+    };
     let before = built(&shader);
     build();
     assert_eq!(built(&shader), before, "nothing had changed");
     // As if every source were newer than the shaders.
     let past = std::time::SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_000);
-    let file = fs::File::options().append(true).open(&shader).expect("it is there");
+    let file = fs::File::options()
+        .append(true)
+        .open(&shader)
+        .expect("it is there");
     file.set_modified(past).expect("its time can be set");
     build();
     assert!(built(&shader) >= before, "it was built again");

@@ -164,10 +164,12 @@ fn crates(root: &Path) -> Vec<PathBuf> {
 /// A field of a Cargo.toml, or of its workspace's.
 fn field(folder: &Path, key: &str) -> String {
     let table = |folder: &Path| -> Option<toml::Table> {
-        std::fs::read_to_string(folder.join("Cargo.toml")).ok()?.parse().ok()
+        std::fs::read_to_string(folder.join("Cargo.toml"))
+            .ok()?
+            .parse()
+            .ok()
     };
-    let own = table(folder)
-        .and_then(|t| Some(t.get("package")?.get(key)?.as_str()?.to_owned()));
+    let own = table(folder).and_then(|t| Some(t.get("package")?.get(key)?.as_str()?.to_owned()));
     own.or_else(|| {
         folder.ancestors().skip(1).find_map(|above| {
             let workspace = table(above)?.get("workspace")?.clone();

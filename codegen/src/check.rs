@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::build::Generated;
 use crate::error::{Error, Failure, Result};
-use crate::files;
 use crate::finish;
 use crate::folder::{Folder, Found, STAGE, SUBFOLDERS};
 use crate::lint::Finding;

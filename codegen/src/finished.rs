@@ -36,7 +36,9 @@ pub fn finish_all(
         .map(|kernel| {
             let module = raw.get(&kernel.name).ok_or_else(|| missing(kernel))?;
             let name = kept.map(|_| file_name(module, kernel));
-            let path = kept.zip(name.as_ref()).map(|(folder, name)| folder.join(name));
+            let path = kept
+                .zip(name.as_ref())
+                .map(|(folder, name)| folder.join(name));
             let bytes = match path.as_deref().and_then(read) {
                 Some(bytes) => bytes,
                 None => finish_one(module, kernel, path.as_deref())?,
@@ -46,7 +48,12 @@ pub fn finish_all(
         .collect();
     let all: BTreeMap<String, (Option<String>, Vec<u8>)> = collect(results)?;
     if let Some(folder) = kept {
-        sweep(folder, &all.values().filter_map(|(name, _)| name.as_deref()).collect());
+        sweep(
+            folder,
+            &all.values()
+                .filter_map(|(name, _)| name.as_deref())
+                .collect(),
+        );
     }
     Ok(all
         .into_iter()

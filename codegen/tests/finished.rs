@@ -19,15 +19,24 @@ fn kept_modules_are_taken_and_damaged_or_unused_ones_go() {
         all
     };
     let plain = finish_all(&raw, &kernels, None).unwrap();
-    assert_eq!(finish_all(&raw, &kernels, Some(folder.path())).unwrap(), plain);
+    assert_eq!(
+        finish_all(&raw, &kernels, Some(folder.path())).unwrap(),
+        plain
+    );
     assert_eq!(files().len(), kernels.len());
-    assert_eq!(finish_all(&raw, &kernels, Some(folder.path())).unwrap(), plain);
+    assert_eq!(
+        finish_all(&raw, &kernels, Some(folder.path())).unwrap(),
+        plain
+    );
 
     // Damaged: made again, and whole again.
     let kept = std::fs::read(&files()[0]).unwrap();
     for bytes in [&kept[..kept.len() - 4], &kept[..10], &[]] {
         std::fs::write(&files()[0], bytes).unwrap();
-        assert_eq!(finish_all(&raw, &kernels, Some(folder.path())).unwrap(), plain);
+        assert_eq!(
+            finish_all(&raw, &kernels, Some(folder.path())).unwrap(),
+            plain
+        );
         assert_eq!(std::fs::read(&files()[0]).unwrap(), kept);
     }
 

@@ -9,10 +9,10 @@ use std::process::Command;
 
 use hankel_codegen::Error;
 use hankel_codegen::build::{Modules, build, generate};
-use hankel_codegen::finished::finish_all;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::check::{Budget, Config, Limits, check};
 use hankel_codegen::compile::Compiled;
+use hankel_codegen::finished::finish_all;
 use hankel_codegen::inputs::{Inputs, Names};
 use hankel_codegen::manifest::{Manifest, schema};
 use hankel_codegen::scaffold::{Dsl, scaffold};

@@ -6,7 +6,7 @@ mod support;
 use hankel_codegen::finish::finish;
 use hankel_codegen::translate::{Ir, Options, Text, Written};
 use hankel_codegen::{Language, Step};
-use hankel_dsl::native::describe::{Kernel, Stage};
+use hankel_dsl::native::describe::{Kernel, Range, Stage};
 use rspirv::binary::Disassemble;
 
 /// A kernel about which nothing is said.
@@ -24,8 +24,9 @@ fn compute() -> Kernel {
     kernel(Stage::Compute {
         threads: [1; 3],
         dimensions: 1,
-        phases: 0,
+        cooperative: false,
         workgroup_bytes: 0,
+        range: Range::Outputs,
     })
 }
 

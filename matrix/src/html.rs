@@ -66,7 +66,7 @@ summary { cursor: pointer; overflow-wrap: anywhere; }
 ";
 
 /// What cells read (as [`sort`] says it), and what that means.
-const LEGEND: [(&str, &str); 11] = [
+const LEGEND: [(&str, &str); 12] = [
     (
         "same",
         "ran, and gave the same bits as the native scalar run; zeros of either sign are equal, and so \

@@ -7,8 +7,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use hankel_codegen::finished::finish_all;
 use hankel_codegen::compile::{Compiler, compile};
+use hankel_codegen::finished::finish_all;
 use hankel_tests::{Crate, root};
 use hankel_toolchain::{Options, Silent};
 

@@ -5,9 +5,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use hankel_codegen::finished::finish_all;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiler, compile};
+use hankel_codegen::finished::finish_all;
 use hankel_dsl::native::Entry;
 use hankel_dsl::native::describe::Kernel;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;

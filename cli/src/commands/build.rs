@@ -34,12 +34,13 @@ fn open(args: &Build, quiet: bool) -> Result<Session> {
 
 /// Builds after each edit, until the program is stopped.
 fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
-    let sources = Session::sources(args.generate.source.manifest_path.as_deref()).ok_or_else(|| {
-        Failure::input(
-            "--watch: the built-in kernels have no sources here",
-            "Give a kernel crate with --manifest-path, or run it in Hankel's repository.",
-        )
-    })?;
+    let sources =
+        Session::sources(args.generate.source.manifest_path.as_deref()).ok_or_else(|| {
+            Failure::input(
+                "--watch: the built-in kernels have no sources here",
+                "Give a kernel crate with --manifest-path, or run it in Hankel's repository.",
+            )
+        })?;
     let mut edits = Edits::new(&args.out)?;
     loop {
         // Before the build: what is edited meanwhile is built next.

@@ -47,7 +47,11 @@ pub fn hash(texts: &[CrateText]) -> String {
     let mut all = String::new();
     for krate in texts {
         for (path, text) in &krate.files {
-            all.push_str(&format!("{} {path} {}\n", krate.name, sha256(text.as_bytes())));
+            all.push_str(&format!(
+                "{} {path} {}\n",
+                krate.name,
+                sha256(text.as_bytes())
+            ));
         }
     }
     sha256(all.as_bytes())
@@ -79,8 +83,12 @@ impl Crate {
     /// The manifests of the crates that it depends on by path.
     fn dependencies(&self) -> Result<Vec<PathBuf>> {
         let targets = self.table.get("target").and_then(Value::as_table);
-        let tables = std::iter::once(&self.table)
-            .chain(targets.into_iter().flatten().filter_map(|(_, t)| t.as_table()));
+        let tables = std::iter::once(&self.table).chain(
+            targets
+                .into_iter()
+                .flatten()
+                .filter_map(|(_, t)| t.as_table()),
+        );
         let (root, workspace) = &self.workspace;
         let shared = workspace
             .get("workspace")
@@ -108,7 +116,9 @@ impl Crate {
     fn field(&self, key: &str) -> String {
         let package = self.table.get("package").and_then(|p| p.get(key));
         let workspace = self.workspace.1.get("workspace");
-        let inherited = workspace.and_then(|w| w.get("package")).and_then(|p| p.get(key));
+        let inherited = workspace
+            .and_then(|w| w.get("package"))
+            .and_then(|p| p.get(key));
         [package, inherited]
             .into_iter()
             .flatten()

@@ -130,7 +130,7 @@ impl Folder {
                         old.is_some_and(|hash| *hash == sha256(&there))
                     };
                     if !ours && !force {
-                        return Err(Error::InTheWay { path });
+                        return Err(Error::InTheWay { path, kind: None });
                     }
                     changed.push(name);
                 }

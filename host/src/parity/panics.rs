@@ -1,15 +1,17 @@
 //! Which invocation a kernel panics in.
 
-use hankel_dsl::native::describe::{Kernel, Stage};
+use hankel_dsl::native::describe::{Kernel, Range, Stage};
 
 use crate::device::slots::{self, Use};
 use crate::inputs::{self, Case, Input};
 
 /// The case with its first `invocations` alone, where each reads an element of its own and writes
-/// one; none for kernels over texels or with shared memory.
+/// one; none for kernels over texels, with shared memory, or that write anywhere.
 fn first(kernel: &Kernel, case: &Case, invocations: usize) -> Option<Case> {
-    if let Stage::Compute { phases, .. } = kernel.stage
-        && phases > 0
+    if let Stage::Compute {
+        cooperative, range, ..
+    } = &kernel.stage
+        && (*cooperative || *range != Range::Outputs)
     {
         return None;
     }
@@ -22,12 +24,13 @@ fn first(kernel: &Kernel, case: &Case, invocations: usize) -> Option<Case> {
                 | Use::Attribute(..)
                 | Use::Varying(..)
                 | Use::Interface(_)
-                | Use::Output {
-                    per_group: false, ..
-                },
+                | Use::ElementMut(_)
+                | Use::Output(_),
                 Input::Bytes(bytes),
             ) => bytes.truncate(invocations * slot.role.element_bytes()?),
-            (Use::Output { .. } | Use::StorageTexture { .. }, _) => return None,
+            (Use::StorageMut { .. } | Use::Atomic { .. } | Use::StorageTexture { .. }, _) => {
+                return None;
+            }
             _ => {}
         }
     }

@@ -6,7 +6,6 @@ use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::{Address, Arg, Call, Filter, Mode, Sampler, TextureMut, TextureRef};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Bytes at an address that fits every layout.
 type Words = Vec<u128>;
@@ -26,8 +25,6 @@ pub(super) struct Request {
 enum Shape {
     Bytes(usize),
     BytesMut(usize),
-    /// So many counters.
-    Atomics(usize),
     Texture {
         size: [u32; 3],
         samples: u32,
@@ -49,7 +46,6 @@ impl Shape {
     fn bytes(&self) -> usize {
         match self {
             Self::Bytes(n) | Self::BytesMut(n) => *n,
-            Self::Atomics(n) => n * 4,
             Self::Texture { bytes, .. } | Self::TextureMut { bytes, .. } => *bytes,
             Self::Sampler { .. } => 0,
         }
@@ -98,7 +94,6 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
     let shapes = call.args.iter().map(|arg| match arg {
         Arg::Bytes(b) => Shape::Bytes(b.len()),
         Arg::BytesMut(b) => Shape::BytesMut(b.len()),
-        Arg::Atomics(a) => Shape::Atomics(a.len()),
         Arg::Texture(t) => Shape::Texture {
             size: t.size,
             samples: t.samples,
@@ -127,7 +122,6 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         match arg {
             Arg::Bytes(b) => to.write_all(b)?,
             Arg::BytesMut(b) => to.write_all(b)?,
-            Arg::Atomics(a) => write_counters(to, a)?,
             Arg::Texture(t) => to.write_all(t.bytes)?,
             Arg::TextureMut(t) => to.write_all(t.bytes)?,
             Arg::Sampler(_) => {}
@@ -142,22 +136,8 @@ pub(super) fn read_results(from: &mut impl Read, call: &mut Call<'_>) -> io::Res
         match arg {
             Arg::BytesMut(b) => from.read_exact(b)?,
             Arg::TextureMut(t) => from.read_exact(t.bytes)?,
-            Arg::Atomics(counters) => {
-                let mut word = [0; 4];
-                for counter in counters.iter() {
-                    from.read_exact(&mut word)?;
-                    counter.store(u32::from_le_bytes(word), Ordering::Relaxed);
-                }
-            }
             Arg::Bytes(_) | Arg::Texture(_) | Arg::Sampler(_) => {}
         }
-    }
-    Ok(())
-}
-
-fn write_counters(to: &mut impl Write, counters: &[AtomicU32]) -> io::Result<()> {
-    for counter in counters {
-        to.write_all(&counter.load(Ordering::Relaxed).to_le_bytes())?;
     }
     Ok(())
 }
@@ -166,45 +146,31 @@ fn write_counters(to: &mut impl Write, counters: &[AtomicU32]) -> io::Result<()>
 pub(super) struct Arrived {
     pub request: Request,
     memory: Vec<Words>,
-    counters: Vec<Vec<AtomicU32>>,
 }
 
 impl Arrived {
     /// Reads the bytes that follow a header.
     pub fn read(from: &mut impl Read, request: Request) -> io::Result<Self> {
-        let (mut memory, mut counters) = (Vec::new(), Vec::new());
+        let mut memory = Vec::new();
         for shape in &request.shapes {
             let bytes = shape.bytes();
             let mut words: Words = vec![0; bytes.div_ceil(size_of::<u128>())];
             let all: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
             from.read_exact(&mut all[..bytes])?;
-            counters.push(match shape {
-                Shape::Atomics(_) => bytemuck::cast_slice::<u8, u32>(&all[..bytes])
-                    .iter()
-                    .map(|&n| AtomicU32::new(u32::from_le(n)))
-                    .collect(),
-                _ => Vec::new(),
-            });
             memory.push(words);
         }
-        Ok(Self {
-            request,
-            memory,
-            counters,
-        })
+        Ok(Self { request, memory })
     }
 
     /// The call.
     pub fn call(&mut self) -> Call<'_> {
         let shapes = self.request.shapes.iter();
-        let memory = self.memory.iter_mut().zip(&self.counters);
-        let args = shapes.zip(memory).map(|(shape, (words, counters))| {
+        let args = shapes.zip(&mut self.memory).map(|(shape, words)| {
             let all: &mut [u8] = bytemuck::cast_slice_mut(words);
             let bytes = &mut all[..shape.bytes()];
             match *shape {
                 Shape::Bytes(_) => Arg::Bytes(bytes),
                 Shape::BytesMut(_) => Arg::BytesMut(bytes),
-                Shape::Atomics(_) => Arg::Atomics(counters),
                 Shape::Texture {
                     size,
                     samples,
@@ -251,7 +217,6 @@ impl Arrived {
             match arg {
                 Arg::BytesMut(b) => to.write_all(b)?,
                 Arg::TextureMut(t) => to.write_all(t.bytes)?,
-                Arg::Atomics(counters) => write_counters(to, counters)?,
                 Arg::Bytes(_) | Arg::Texture(_) | Arg::Sampler(_) => {}
             }
         }
@@ -268,7 +233,6 @@ mod tests {
         let (read, texels) = ([1_u8, 2, 3, 4], [7_u8; 16]);
         let mut written = [5_u8; 8];
         let mut image = [9_u8; 4];
-        let counters = [AtomicU32::new(3), AtomicU32::new(4)];
         let format = TexelFormat::R32Float;
         let size = [2, 2, 1];
         let mut call = Call {
@@ -284,7 +248,6 @@ mod tests {
                     filter: Filter::Linear,
                     address: Address::Repeat,
                 }),
-                Arg::Atomics(&counters),
                 Arg::BytesMut(&mut written),
                 Arg::TextureMut(TextureMut {
                     size: [1, 1, 1],
@@ -306,11 +269,7 @@ mod tests {
             let mut there = arrived.call();
             assert_eq!((there.constants[0], there.mode), (42, Mode::REFERENCE));
             assert_eq!(format!("{:?}", there.args), format!("{:?}", call.args));
-            let Arg::Atomics(there_counters) = &there.args[3] else {
-                panic!("counters")
-            };
-            there_counters[1].store(99, Ordering::Relaxed);
-            let Arg::BytesMut(bytes) = &mut there.args[4] else {
+            let Arg::BytesMut(bytes) = &mut there.args[3] else {
                 panic!("bytes")
             };
             bytes[0] = 77;
@@ -320,7 +279,6 @@ mod tests {
         read_results(&mut &back[..], &mut call).unwrap();
         drop(call);
         assert_eq!(written, [77, 5, 5, 5, 5, 5, 5, 5]);
-        assert_eq!(counters[1].load(Ordering::Relaxed), 99);
         assert!(read_header::<Request>(&mut &[][..]).unwrap().is_none());
         assert!(read_header::<Request>(&mut &[255; 8][..]).is_err());
     }

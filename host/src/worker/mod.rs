@@ -14,7 +14,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use hankel_dsl::native::call::{Culprit, Ending};
-use hankel_dsl::native::describe::{Kernel, Output, Role, Stage};
+use hankel_dsl::native::describe::{Kernel, Output, Range, Role, Stage};
 use hankel_dsl::native::{Arg, Call, CallError};
 
 use hankel_system::temporary::Folder;
@@ -153,20 +153,14 @@ impl Workers {
 fn element_sizes(kernel: &Kernel) -> Option<Vec<Option<usize>>> {
     let Stage::Compute {
         dimensions: 1,
-        phases: 0,
+        cooperative: false,
+        range: Range::Outputs,
         ..
     } = kernel.stage
     else {
         return None;
     };
-    let [
-        Output::Buffer {
-            layout: output,
-            per_group: false,
-            ..
-        },
-    ] = &kernel.outputs[..]
-    else {
+    let [Output::Buffer { layout: output, .. }] = &kernel.outputs[..] else {
         return None;
     };
     let mut sizes = Vec::new();
@@ -220,7 +214,7 @@ fn part<T>(
             },
             Arg::Texture(texture) => Arg::Texture(*texture),
             Arg::Sampler(sampler) => Arg::Sampler(*sampler),
-            Arg::Atomics(_) | Arg::TextureMut(_) => Arg::Bytes(&[]),
+            Arg::TextureMut(_) => Arg::Bytes(&[]),
         });
     }
     run(&mut Call {

@@ -1,5 +1,9 @@
 //! The native executor of kernels whose invocations work together, and of those that write where
 //! they like: what comes out, and what it reports.
+#![allow(
+    unused_qualifications,
+    reason = "barriers and helpers are found by their path, too"
+)]
 
 use hankel_dsl::native::{Arg, Call, CallError, Mode};
 use hankel_dsl::{
