@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::LazyLock;
 use std::time::Duration;
 
 use hankel_codegen::Language;
@@ -20,7 +19,7 @@ use hankel_codegen::functions::{self, FORMS, crates};
 use hankel_codegen::translate::Place;
 use hankel_dsl::native::call::{Arg, CallError};
 use hankel_dsl::native::describe::{
-    Field, Kernel, Layout, Output, Param, Role, Scalar, Stage, Tolerance, Type,
+    Field, Kernel, Layout, Output, Param, Range, Role, Scalar, Stage, Tolerance, Type,
 };
 use hankel_dsl::native::function::Function;
 use hankel_host::crates::KernelEntry;
@@ -38,26 +37,32 @@ fn root() -> PathBuf {
     here.parent().expect("tests/ lies in the root").to_owned()
 }
 
-/// The built-in library, translated from its sources.
-static LIBRARY: LazyLock<Library> = LazyLock::new(|| {
-    let manifest = root().join("kernels/shadows/Cargo.toml");
-    let texts = crates::texts(&manifest).expect("the sources can be read");
-    let mut libraries = functions::read(&texts).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(libraries.len(), 1);
-    libraries.remove(0)
-});
+/// The built-in library, translated from its sources once for each thread: its expressions are
+/// shared within it, not between threads.
+fn library() -> &'static Library {
+    thread_local! {
+        static LIBRARY: &'static Library = {
+            let manifest = root().join("kernels/shadows/Cargo.toml");
+            let texts = crates::texts(&manifest).expect("the sources can be read");
+            let mut libraries = functions::read(&texts).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(libraries.len(), 1);
+            Box::leak(Box::new(libraries.remove(0)))
+        };
+    }
+    LIBRARY.with(|library| *library)
+}
 
 fn naming() -> Naming {
     Naming {
         prefix: PREFIX.into(),
-        library: LIBRARY.name.clone(),
+        library: library().name.clone(),
     }
 }
 
 /// The shipped text in a form.
 fn text(form: &str) -> String {
     let form = FORMS.iter().find(|f| f.name == form).expect("a form");
-    form.text(&LIBRARY, &naming(), &"0".repeat(64))
+    form.text(library(), &naming(), &"0".repeat(64))
 }
 
 /// A scalar of a function's arguments or result.
@@ -146,8 +151,9 @@ fn entry(function: &Function) -> KernelEntry {
         stage: Stage::Compute {
             threads: [64, 1, 1],
             dimensions: 1,
-            phases: 0,
+            cooperative: false,
             workgroup_bytes: 0,
+            range: Range::Outputs,
         },
         precision: None,
         params: vec![Param {
@@ -160,7 +166,6 @@ fn entry(function: &Function) -> KernelEntry {
         outputs: vec![Output::Buffer {
             binding: 1,
             layout: layout("Given", &results(function)),
-            per_group: false,
         }],
         tolerance: Tolerance {
             ulp: 0,
@@ -536,6 +541,7 @@ fn every_function_computes_the_native_bits_in_every_language() {
         runner: vec![PathBuf::from(env!("CARGO_BIN_EXE_hankel-tests-runner")).into()],
         cache: None,
         known: Known::default(),
+        absent: None,
         whole: true,
         required: columns,
     };

@@ -304,6 +304,17 @@ struct Body {
     refused: Vec<(Span, String, &'static str)>,
 }
 
+/// Whether a path may mean a function of this crate. One through another crate's name, or a type's,
+/// may end in the name of a function here and mean something else.
+fn is_own(path: &syn::Path) -> bool {
+    path.segments.len() == 1
+        || path.segments.first().is_some_and(|first| {
+            ["crate", "self", "super"]
+                .iter()
+                .any(|own| first.ident == own)
+        })
+}
+
 const WIDTHS: [&str; 6] = ["u8", "i8", "u16", "i16", "u128", "i128"];
 
 impl<'ast> Visit<'ast> for Body {
@@ -311,6 +322,7 @@ impl<'ast> Visit<'ast> for Body {
         if let syn::Expr::Path(path) = &*call.func
             && path.qself.is_none()
             && let Some(last) = path.path.segments.last()
+            && is_own(&path.path)
         {
             let name = last.ident.to_string();
             self.calls.entry(name).or_insert_with(|| last.ident.span());
@@ -383,6 +395,11 @@ mod tests {
             ["4:8 the kernel `two` is not listed, so that nobody gets it"]
         );
         let none = told("#[kernel]\npub fn one(x: f32) -> f32 { x }\n");
+        assert!(none.is_empty(), "{none:?}");
+        // Another crate's function of the same name.
+        let none = told(
+            "#[kernel]\npub fn one(x: f32) -> f32 { other::one(x) }\nhankel_dsl::kernels![one];\n",
+        );
         assert!(none.is_empty(), "{none:?}");
     }
 

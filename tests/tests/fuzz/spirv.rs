@@ -39,8 +39,7 @@ fn spirv() {
                 filter: Vec::new(),
                 targets: Vec::new(),
                 options: Options::default(),
-                source_sha256: origin.source_sha256.clone(),
-                rust_gpu: origin.rust_gpu.clone(),
+                rust_gpu: origin.made_by.rust_gpu.clone(),
             };
             let began = Instant::now();
             for modules in [Modules::Raw, Modules::Final] {
