@@ -1,14 +1,8 @@
-//! Published algorithms give what the kernels give where both are well conditioned, and are what the
-//! kernels are held against where they are not.
+//! Published algorithms give what the kernels give where both are well conditioned.
 
-use hankel_moments::{
-    Bounds, HalfAngle, Moments6, TrigonometricMoments, bias_target, bound, hamburger_6, mix_bias,
-    sparse_2, trigonometric_4,
-};
+use hankel_moments::{Moments6, bias_target, bound, hamburger_6, mix_bias, sparse_2};
 use hankel_numerics::families::{Family, Format, Row};
-use hankel_numerics::published::{
-    Float, mixed, moment_bound, six_moments, trigonometric, two_points,
-};
+use hankel_numerics::published::{mixed, moment_bound, six_moments, two_points};
 use hankel_numerics::stress::bounds_of;
 
 fn rows<T: Format>(family: &str, n: usize, count: u64) -> impl Iterator<Item = Row<T>> {
@@ -60,44 +54,6 @@ fn six_moments_agree_in_f64() {
     assert!(share > 0.98, "{share}");
 }
 
-fn trigonometric_rows<T: Float>(count: u64) -> impl Iterator<Item = (TrigonometricMoments<T>, T)> {
-    rows::<f64>("generic-unit", 2, count)
-        .enumerate()
-        .map(|(i, row)| {
-            // Depths from the row's own numbers: as good as random.
-            let depth = |k: usize| (row.m[k] * (7.0 + k as f64) + 0.1 * i as f64).fract();
-            let mut m = TrigonometricMoments::of_depth(depth(1));
-            for (k, share) in [(2, 0.4), (3, 0.3), (4, 0.5)] {
-                let other = TrigonometricMoments::of_depth(depth(k));
-                let mix = |a: f64, b: f64| a + share * (b - a);
-                m = TrigonometricMoments {
-                    c1: mix(m.c1, other.c1),
-                    s1: mix(m.s1, other.s1),
-                    c2: mix(m.c2, other.c2),
-                    s2: mix(m.s2, other.s2),
-                };
-            }
-            let m = m.biased(1e-3);
-            let m = TrigonometricMoments {
-                c1: T::round(m.c1),
-                s1: T::round(m.s1),
-                c2: T::round(m.c2),
-                s2: T::round(m.s2),
-            };
-            (m, T::round(row.eta.rem_euclid(1.0)))
-        })
-}
-
-#[test]
-fn trigonometric_moments_agree_in_f64() {
-    let pairs = trigonometric_rows::<f64>(1000).map(|(m, z)| {
-        let own = trigonometric_4(m, HalfAngle::of_depth(z)).lower;
-        (trigonometric(m, z), own)
-    });
-    let share = near(pairs, 1e-6);
-    assert!(share > 0.95, "{share}");
-}
-
 #[test]
 fn two_points_agree_in_f64() {
     for row in rows::<f64>("generic-symmetric", 2, 200) {
@@ -110,34 +66,6 @@ fn two_points_agree_in_f64() {
             (a.w[1], b.w2),
         ] {
             assert!((x - y).abs() < 1e-8, "{a:?} {b:?}");
-        }
-    }
-}
-
-fn quantile(mut errors: Vec<f64>, q: f64) -> f64 {
-    errors.sort_by(f64::total_cmp);
-    errors[(q * (errors.len() - 1) as f64) as usize]
-}
-
-/// Errors of a bound in f32, NaN as 1.
-fn error(found: f32, exact: f64) -> f64 {
-    let error = (f64::from(found) - exact).abs();
-    if error.is_finite() { error } else { 1.0 }
-}
-
-#[test]
-fn kernels_in_f32_are_no_worse() {
-    for family in ["silhouettes-biased", "self-biased", "generic-symmetric"] {
-        let (mut own, mut its) = (Vec::new(), Vec::new());
-        for row in rows::<f32>(family, 3, 4000) {
-            let wide = row.map(f64::from);
-            let exact: Bounds<f64> = hankel_moments::bound_compensated::<f64, 3>(wide.m, wide.eta);
-            own.push(error(hamburger_6(six(&row), row.eta).lower, exact.lower));
-            its.push(error(six_moments(six(&row), row.eta).lower, exact.lower));
-        }
-        for q in [0.5, 0.9, 0.99] {
-            let (own, its) = (quantile(own.clone(), q), quantile(its.clone(), q));
-            assert!(own <= its * 1.1, "{family} {q}: {own} {its}");
         }
     }
 }

@@ -325,6 +325,8 @@ impl Programme<'_> {
                 *r += w * v;
             }
         }
+        // The cost once the weights' moments were put right, at the prices that P gives.
+        let repair: f64 = coefficients.iter().zip(&rest).map(|(c, r)| c * r).sum();
         let value = mean - worst - uncertain;
         let sensitivity = coefficients.iter().fold(0.0_f64, |a, c| a.max(c.abs()));
         let missed: f64 = rest
@@ -334,10 +336,7 @@ impl Programme<'_> {
             .sum();
         Least {
             value,
-            // The weights with what they miss put right at the programme's price are a solution, so
-            // that the least cost is no more than theirs. P's own coefficients would be cheaper, but
-            // they are the price only where the solver has converged.
-            margin: (cost - value).max(0.0) + uncertain + self.price * missed,
+            margin: (cost - repair - value).abs() + uncertain + sensitivity * missed,
             residual: missed,
             sensitivity,
             support: atoms.iter().map(|a| (a.t, a.weight)).collect(),

@@ -9,7 +9,6 @@
 //! - [`six_moments`]: \[BHS\], section 3 of the supplement, with the cubic's roots by the cosine that
 //!   its shader code takes them by.
 //! - [`two_points`]: \[BHS\], Theorem 1 of the supplement.
-//! - [`trigonometric`]: \[MSM\], section 7.4 of the supplement, with its quartic.
 //!
 //! They divide by what may be 0, and take roots of what may be negative: their results may be no
 //! numbers.
@@ -17,12 +16,10 @@
 mod roots;
 mod six;
 mod solver;
-mod trigonometric;
 mod two_points;
 
 pub use six::six_moments;
 pub use solver::{mixed, moment_bound};
-pub use trigonometric::trigonometric;
 pub use two_points::{Sparse, two_points};
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
