@@ -394,7 +394,7 @@ fn budgets_are_read() {
     }
     fs::write(&path, vec![b'#'; 2 << 20]).unwrap();
     let error = Config::read(&path).unwrap_err().to_string();
-    assert!(error.contains("larger than 1 MiB"), "{error}");
+    assert!(error.contains("more than the 1 MiB"), "{error}");
 }
 
 /// A crate with a path dependency, a workspace and a lock file, and the record of a build of it.

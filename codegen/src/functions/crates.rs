@@ -41,20 +41,20 @@ pub fn texts(manifest: &Path) -> Result<Vec<CrateText>> {
     Ok(texts)
 }
 
-/// Hash of all texts.
+/// Hash of all texts, in whatever order the crates are.
 #[must_use]
 pub fn hash(texts: &[CrateText]) -> String {
-    let mut all = String::new();
-    for krate in texts {
-        for (path, text) in &krate.files {
-            all.push_str(&format!(
-                "{} {path} {}\n",
-                krate.name,
-                sha256(text.as_bytes())
-            ));
-        }
-    }
-    sha256(all.as_bytes())
+    let mut lines: Vec<String> = texts
+        .iter()
+        .flat_map(|krate| {
+            krate
+                .files
+                .iter()
+                .map(|(path, text)| format!("{} {path} {}\n", krate.name, sha256(text.as_bytes())))
+        })
+        .collect();
+    lines.sort();
+    sha256(lines.concat().as_bytes())
 }
 
 /// A Cargo.toml.
