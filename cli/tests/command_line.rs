@@ -192,7 +192,7 @@ fn misuse_of_build_is_explained() {
     desk.hankel("build --out file")
         .fails(2, &["file is a file", "goes into a folder"]);
     desk.hankel("build --out file/deeper")
-        .fails(3, &["file/deeper", "Not a directory"]);
+        .fails(2, &["file/deeper", "Not a directory"]);
     desk.hankel("check file")
         .fails(2, &["file", "it is no folder"]);
     desk.hankel("build --set nosuch=1").fails(2, &["nosuch"]);
@@ -269,7 +269,7 @@ fn what_is_no_file_is_refused() {
     fifo("budget.toml");
     for budget in ["nope.toml", "budget.toml", "/dev/zero", "s"] {
         desk.hankel(&format!("check s --budget {budget}"))
-            .fails(2, &[budget, "cannot be read"]);
+            .fails(2, &[budget]);
     }
 }
 
@@ -582,7 +582,9 @@ fn parity_reports_and_filters() {
 #[test]
 fn every_instruction_set_gives_the_same_bits() {
     let desk = Desk::new();
-    for level in ["avx512", "avx2", "neon", "scalar"] {
+    let levels = hankel_dsl::native::lanes::levels();
+    let names = levels.iter().map(|(name, _)| *name);
+    for level in names.chain([hankel_dsl::native::lanes::SCALAR]) {
         let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
             .args([
                 "parity",

@@ -52,11 +52,12 @@ fn inputs_are_not_overwritten() {
     let desk = Desk::new();
     desk.write("rows.csv", ROWS);
     desk.write("scene.toml", SCENE);
+    desk.write("moments.csv", "m0,m1,m2,z\n1,0.5,0.34,0.9\n");
     fs::hard_link(desk.path("rows.csv"), desk.path("same.csv")).expect("a link");
     for line in [
         format!("{EVAL} rows.csv"),
         format!("{EVAL} same.csv"),
-        "judge --functions z,z^2 --input rows.csv --output ./rows.csv".into(),
+        "judge --functions z,z^2 --input moments.csv --output ./moments.csv".into(),
         "render scene.toml --out scene.toml".into(),
     ] {
         desk.hankel(&line).fails(2, &["is read", "another name"]);

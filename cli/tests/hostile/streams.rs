@@ -30,7 +30,13 @@ fn a_reader_that_is_gone_ends_a_command_without_a_word() {
         let output = command.stdout(writer).stderr(Stdio::piped()).output();
         let run = Run(output.expect("it starts"));
         run.ended_by(SIGPIPE);
-        assert_eq!(run.err(), "", "{line}");
+        // What goes on is told while it goes on; a driver's layer has words of its own.
+        let words = run.err().replace("Running 2 kernels in 5 columns", "");
+        let words = words.replace(
+            "error: XDG_RUNTIME_DIR is invalid or not set in the environment.",
+            "",
+        );
+        assert_eq!(words.trim(), "", "{line}");
     }
 }
 
