@@ -2,7 +2,7 @@
 //! all of its stack or memory, is an outcome with a name, and the end of that process alone.
 //!
 //! [`Workers`] starts this program again, which then [`serve`]s: it loads the crate's plug-in and
-//! runs one call after the other. Arguments and results go through pipes, see [`frame`].
+//! runs one call after the other. Arguments and results go through pipes, see `frame`.
 
 mod frame;
 mod process;
