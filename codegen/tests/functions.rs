@@ -1,5 +1,10 @@
 //! Libraries of functions: what is translated means what the Rust function means, what has no form is
 //! refused with its place, and a signature does not change behind its users' backs.
+#![allow(
+    clippy::manual_swap,
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "the functions are what is translated, as somebody may write them"
+)]
 
 use std::path::Path;
 use std::process::Command;

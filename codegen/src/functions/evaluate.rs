@@ -362,10 +362,10 @@ impl<'a> Evaluator<'a> {
                 }
             }
             for (target, new) in targets.into_iter().zip(news) {
-                if let Some(id) = target {
-                    if !matches!(new.kind, Kind::Local(other) if other == id) {
-                        self.emit(Stmt::Assign(id, new));
-                    }
+                if let Some(id) = target
+                    && !matches!(new.kind, Kind::Local(other) if other == id)
+                {
+                    self.emit(Stmt::Assign(id, new));
                 }
             }
             return Ok(());
@@ -2114,7 +2114,7 @@ impl<'a> Evaluator<'a> {
             Some((home, Item::Function(source))) => {
                 let in_dsl = self.tree.modules[home].path[0] == "hankel_dsl";
                 if in_dsl && name == "to_i32" {
-                    return self.to_i32(frame, args, span);
+                    return self.whole_number(frame, args, span);
                 }
                 if is_function(&source.attrs) {
                     return self.kept_call(frame, home, &source, args, span);
@@ -2131,12 +2131,12 @@ impl<'a> Evaluator<'a> {
                 )
             }
             // The DSL's own sources may not be at hand.
-            None if name == "to_i32" => self.to_i32(frame, args, span),
+            None if name == "to_i32" => self.whole_number(frame, args, span),
             _ => Err(self.refuse(frame, span, format!("`{}` is not found", names.join("::")))),
         }
     }
 
-    fn to_i32(&mut self, frame: &Frame, args: Vec<Value>, span: Span) -> Done<Value> {
+    fn whole_number(&mut self, frame: &Frame, args: Vec<Value>, span: Span) -> Done<Value> {
         let mut args = args.into_iter();
         let x = args.next().map(|v| self.read(v));
         match x {
