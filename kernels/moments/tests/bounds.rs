@@ -123,6 +123,10 @@ proptest! {
 /// Nearly everything is at the ends, so that differences of values of the polynomial there cancel; by
 /// their signs the bound was 0. The exact value is a linear programme's in 60 digits.
 #[test]
+#[allow(
+    clippy::excessive_precision,
+    reason = "the digits of the row as it was found"
+)]
 fn which_points_carry_weight_is_decided_by_the_weights() {
     let m = Moments4 {
         b1: 0.506_677_93_f32,
