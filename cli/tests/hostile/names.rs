@@ -101,7 +101,7 @@ fn what_is_set_is_used_or_refused() {
     for (set, words) in [
         ("--set encoding=1 --set encoding=2", "was set to 1 already"),
         ("--set encoding=4294967296", "from 0 to 4294967295"),
-        ("--set encoding=-1", "0 or more"),
+        ("--set encoding=-1", "from 0 to"),
         ("--set encoding", "no `=`"),
     ] {
         desk.hankel(&format!("build --out s --kernel shade_hamburger {set}"))
