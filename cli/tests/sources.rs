@@ -133,7 +133,7 @@ pub fn add(#[element] number: Number) -> Number {
     let x = number.x * INCLUDED + number.x * number.x * BYTES;
     let x = x * OF_SCRIPT + number.x * OF_CALLER;
     let x = x * outside::FACTOR + number.x * table::FACTOR;
-    let x = x * native::FACTOR + number.x * cfg_if::FACTOR;
+    let x = x * native::FACTOR + number.x * percent_encoding::FACTOR;
     Number { x: x * generated::FACTOR + number.x }
 }
 
@@ -151,22 +151,24 @@ fn every_input_counts_wherever_it_is() {
     let lock = fs::read_to_string(desk.path("my-kernels/Cargo.lock")).expect("it was copied");
     let version = lock
         .lines()
-        .skip_while(|line| *line != "name = \"cfg-if\"")
+        .skip_while(|line| *line != "name = \"percent-encoding\"")
         .find_map(|line| line.strip_prefix("version = \"")?.strip_suffix('"'))
-        .expect("cfg-if is in the lock file");
+        .expect("percent-encoding is in the lock file");
     let manifest = fs::read_to_string(desk.path("my-kernels/Cargo.toml")).expect("it was made");
     let manifest = manifest.replace(
         "[dependencies]\n",
-        &format!("[dependencies]\ncfg-if = \"={version}\"\n"),
+        &format!("[dependencies]\npercent-encoding = \"={version}\"\n"),
     );
     desk.write(
         "my-kernels/Cargo.toml",
-        &format!("{manifest}\n[patch.crates-io]\ncfg-if = {{ path = \"../patched\" }}\n"),
+        &format!("{manifest}\n[patch.crates-io]\npercent-encoding = {{ path = \"../patched\" }}\n"),
     );
     let factor = |value: u32| format!("/// A factor.\npub const FACTOR: f32 = {value}.5;\n");
     desk.write(
         "patched/Cargo.toml",
-        &format!("[package]\nname = \"cfg-if\"\nversion = \"{version}\"\nedition = \"2024\"\n"),
+        &format!(
+            "[package]\nname = \"percent-encoding\"\nversion = \"{version}\"\nedition = \"2024\"\n"
+        ),
     );
     desk.write("patched/src/lib.rs", &format!("#![no_std]\n{}", factor(1)));
     desk.write("outside.rs", &factor(2));

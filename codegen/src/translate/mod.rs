@@ -455,6 +455,13 @@ impl Ir {
         if let Some(reason) = self.float_atomics(language, options) {
             return Some(reason);
         }
+        if language == Language::Hlsl && self.has_signed_extremes() {
+            return Some(
+                "compilers of HLSL compare signed numbers in a byte address buffer as unsigned ones: \
+                 take the smallest or largest of `x ^ 0x8000_0000` as u32"
+                    .into(),
+            );
+        }
         let es = matches!(language, Language::Essl310 | Language::Essl300);
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
         if language == Language::Hlsl && old && self.has_wide(ScalarKind::Float) {
@@ -559,6 +566,21 @@ impl Ir {
         used.then(|| format!("{lacks}; add by compare and exchange on the bits"))
     }
 
+    /// Whether there is an atomic minimum or maximum of signed numbers. naga's HLSL writer calls the
+    /// methods of a byte address buffer, of which DXC 1.7 makes invalid SPIR-V and glslang an
+    /// unsigned comparison.
+    fn has_signed_extremes(&self) -> bool {
+        let signed = self.module.types.iter().any(|(_, ty)| {
+            matches!(ty.inner, TypeInner::Atomic(scalar) if scalar.kind == ScalarKind::Sint)
+        });
+        let functions = self.module.functions.iter().map(|(_, function)| function);
+        let entries = self.module.entry_points.iter().map(|entry| &entry.function);
+        signed
+            && functions
+                .chain(entries)
+                .any(|function| has_extreme(&function.body))
+    }
+
     fn globals(&self) -> impl Iterator<Item = (&naga::GlobalVariable, &TypeInner)> {
         self.module
             .global_variables
@@ -591,6 +613,21 @@ impl Ir {
             _ => false,
         }) || functions.any(|function| function.expressions.iter().any(|(_, it)| literal(it)))
     }
+}
+
+/// Whether a block has an atomic minimum or maximum, at any depth.
+fn has_extreme(block: &naga::Block) -> bool {
+    use naga::{AtomicFunction, Statement};
+    block.iter().any(|statement| match statement {
+        Statement::Atomic { fun, .. } => matches!(fun, AtomicFunction::Min | AtomicFunction::Max),
+        Statement::Block(block) => has_extreme(block),
+        Statement::If { accept, reject, .. } => has_extreme(accept) || has_extreme(reject),
+        Statement::Switch { cases, .. } => cases.iter().any(|case| has_extreme(&case.body)),
+        Statement::Loop {
+            body, continuing, ..
+        } => has_extreme(body) || has_extreme(continuing),
+        _ => false,
+    })
 }
 
 /// Why arithmetic may be done otherwise than it is written, where a text cannot forbid it.

@@ -75,7 +75,7 @@ pub fn run(compiler: &Path, work: &Path, job: &Job, timeout: Duration) -> Result
         .tempdir_in(work)
         .doing(|| format!("make a folder in {}", work.display()))?;
     let folder = folder.path();
-    write(&folder.join("kernel.metal"), &text)?;
+    write(&folder.join("kernel.metal"), &in_one_space(&text))?;
     write(&folder.join("main.cpp"), &main)?;
     write(&folder.join("plan"), &plan)?;
     let program = folder.join("program");
@@ -195,6 +195,32 @@ fn make_shared(compiler: &Path, folder: &Path, timeout: Duration) -> Result<(), 
 }
 
 /// Bytes of all results.
+/// The text for a processor, which has one address space: of two templates that differ only in
+/// whether a pointer is to `device` or to `threadgroup` memory, the second is taken out. Its lines
+/// stay, empty, so that the compiler's messages name those of the text.
+fn in_one_space(text: &str) -> String {
+    const START: &str = "template <typename A>\n";
+    let mut whole = String::with_capacity(text.len());
+    let mut seen: Vec<String> = Vec::new();
+    let mut parts = text.split(START);
+    whole.push_str(parts.next().unwrap_or_default());
+    for part in parts {
+        let end = part.find("\n}\n").map_or(part.len(), |at| at + 3);
+        let (template, rest) = part.split_at(end);
+        let in_device = template.replace("threadgroup A", "device A");
+        if seen.contains(&in_device) {
+            let lines = START.matches('\n').count() + template.matches('\n').count();
+            whole.extend(std::iter::repeat_n('\n', lines));
+        } else {
+            whole.push_str(START);
+            whole.push_str(template);
+            seen.push(in_device);
+        }
+        whole.push_str(rest);
+    }
+    whole
+}
+
 fn result_bytes(job: &Job) -> u64 {
     let mut sum = 0;
     for case in &job.cases {

@@ -316,6 +316,28 @@ kernel void k(device metal::atomic_uint* bins [[buffer(0)]],
 }
 
 #[test]
+fn templates_for_both_address_spaces_are_one() {
+    let template = |space: &str| {
+        format!(
+            "template <typename A>\nuint add(\n    {space} A *p,\n    uint v\n) {{\n    return \
+             metal::atomic_fetch_add_explicit(p, v, metal::memory_order_relaxed);\n}}\n"
+        )
+    };
+    let text = format!(
+        "using metal::uint;\n{}{}
+kernel void k(device metal::atomic_uint* bins [[buffer(0)]],
+              metal::uint3 id [[thread_position_in_grid]]) {{
+    add(&bins[0], id.x);
+}}",
+        template("device"),
+        template("threadgroup")
+    );
+    let stage = Stage::Compute { threads: [4, 1, 1] };
+    let got = run_kernel(&text, stage, [1, 1, 1], vec![uints(Role::Atomic, 0, &[0])]);
+    assert_eq!(as_uints(&got.unwrap()), [6]);
+}
+
+#[test]
 fn accesses_out_of_bounds_are_caught() {
     for (statement, words) in [
         ("x[i] = 1.0", "byte 12 was touched"),
