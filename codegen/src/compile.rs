@@ -472,7 +472,7 @@ fn last_artefact(messages: &str) -> Option<Artefact> {
             })
         })
         .filter(|artefact| artefact.file.to_string_lossy().ends_with(".spv.json"))
-        .last()
+        .next_back()
 }
 
 fn read_modules(

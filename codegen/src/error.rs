@@ -236,13 +236,13 @@ pub enum Error {
         /// How long it was waited for.
         seconds: u64,
     },
-    /// A file that is no file, or larger than it can be.
-    #[error("cannot read {}: it is {kind}", path.display())]
+    /// A file that is no regular file, no text, or larger than it can be.
+    #[error("cannot read {}: {problem}", path.display())]
     NotAFile {
         /// The file.
         path: PathBuf,
-        /// What it is.
-        kind: String,
+        /// What is wrong with it.
+        problem: String,
     },
     /// Two kernels with one name.
     #[error("two kernels are named `{name}`")]

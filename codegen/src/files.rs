@@ -1,9 +1,9 @@
 //! Hashes, files that are there whole or not at all, and files of a size that can be read.
 
-use std::io::Read;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use hankel_system::input::{self, InputError};
 use sha2::{Digest, Sha256};
 
 use crate::error::{During, Error, Result};
@@ -16,32 +16,23 @@ pub fn sha256(bytes: &[u8]) -> String {
         .collect()
 }
 
-/// Reads a regular file of at most `most` bytes. What is at its path may be anything: a FIFO would
-/// make the reader wait, and a device never ends.
+/// Reads a regular file of at most `most` bytes.
 ///
 /// # Errors
 ///
 /// It cannot be read, is no regular file, or is larger.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
-    let wrong = |kind: String| Error::NotAFile {
-        path: path.to_owned(),
-        kind,
-    };
-    let data = std::fs::metadata(path).during("read", path)?;
-    if data.is_dir() {
-        return Err(wrong("a folder".into()));
-    }
-    if !data.is_file() {
-        return Err(wrong("a device, FIFO or socket, no file".into()));
-    }
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).during("read", path)?;
-    let read = file.take(most.saturating_add(1)).read_to_end(&mut bytes);
-    read.during("read", path)?;
-    if bytes.len() as u64 > most {
-        return Err(wrong(format!("larger than {} MiB", most >> 20)));
-    }
-    Ok(bytes)
+    input::read(path, most).map_err(|error| match error {
+        InputError::Io { path, source } => Error::Io {
+            action: "read",
+            path,
+            source,
+        },
+        other => Error::NotAFile {
+            problem: other.problem(),
+            path: path.to_owned(),
+        },
+    })
 }
 
 /// Writes a file by way of a sibling that is renamed; folders above it are made.

@@ -25,6 +25,7 @@ use cap_std::fs::{Dir, FileType, OpenOptions};
 use crate::Language;
 use crate::error::{During, Error, Result};
 use crate::files::sha256;
+use crate::functions::FORMS;
 
 /// Where a change is prepared.
 pub(crate) const STAGE: &str = ".hankel";
@@ -454,7 +455,9 @@ fn can_be_removed(name: &str) -> bool {
     plain
         && match folder {
             None => file.ends_with(".spv"),
-            Some(folder) => SUBFOLDERS.contains(&folder),
+            Some(folder) => {
+                SUBFOLDERS.contains(&folder) || FORMS.iter().any(|form| form.name == folder)
+            }
         }
 }
 

@@ -152,7 +152,7 @@ impl Crate {
                 let bytes = files::read(&path, MOST_BYTES)?;
                 let text = String::from_utf8(bytes).map_err(|_| Error::NotAFile {
                     path: path.clone(),
-                    kind: "no UTF-8".into(),
+                    problem: "it is no UTF-8 text".into(),
                 })?;
                 krate.files.insert(name, text.replace("\r\n", "\n"));
             }

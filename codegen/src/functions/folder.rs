@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::{Component, Path};
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::api::{FILE, LibraryRecord, Record};
 use super::ir::Library;
-use crate::error::{During, Error, Result};
-use crate::files::{sha256, write_whole};
+use crate::error::{Error, Result};
+use crate::files::sha256;
+use crate::folder::{self, Found};
 
 /// Libraries in every language, in memory.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,58 +116,23 @@ impl Folder {
     /// A signature changed and the library's number did not; a file that hankel did not write is in
     /// the way, unless `force`; a file cannot be written.
     pub fn write(&self, out: &Path, force: bool) -> Result<Report> {
-        let before = read(out);
-        self.same_api(before.as_ref())?;
-        let mut changed = Vec::new();
-        for (name, bytes) in &self.files {
-            let path = out.join(name);
-            match std::fs::read(&path) {
-                Ok(there) if there == *bytes => {}
-                Ok(there) => {
-                    let ours = if name == FILE {
-                        before.is_some()
-                    } else {
-                        let old = before.as_ref().and_then(|b| b.files.get(name));
-                        old.is_some_and(|hash| *hash == sha256(&there))
-                    };
-                    if !ours && !force {
-                        return Err(Error::InTheWay { path, kind: None });
-                    }
-                    changed.push(name);
-                }
-                Err(e) if e.kind() == std::io::ErrorKind::NotFound => changed.push(name),
-                Err(source) => {
-                    return Err(Error::Io {
-                        action: "read",
-                        path,
-                        source,
-                    });
-                }
-            }
+        let folder = folder::Folder::create(out)?;
+        let mut owned = folder::Owned::new();
+        if let Some((before, hash)) = record(&folder)? {
+            self.same_api(Some(&before))?;
+            owned.insert(FILE.into(), [hash].into());
+            owned.extend(
+                before
+                    .files
+                    .into_iter()
+                    .map(|(name, hash)| (name, [hash].into())),
+            );
         }
-        // The record comes last: it is believed.
-        changed.sort_by_key(|name| *name == FILE);
-        for name in &changed {
-            write_whole(&out.join(name), &self.files[*name])?;
-        }
-        let mut removed = Vec::new();
-        for (name, hash) in before.iter().flat_map(|b| &b.files) {
-            let inside = Path::new(name)
-                .components()
-                .all(|part| matches!(part, Component::Normal(_)));
-            let path = out.join(name);
-            if inside
-                && !self.files.contains_key(name)
-                && std::fs::read(&path).is_ok_and(|there| sha256(&there) == *hash)
-            {
-                std::fs::remove_file(&path).during("remove", &path)?;
-                removed.push(name.clone());
-            }
-        }
+        let change = folder.update(&self.files, FILE, owned, force)?;
         Ok(Report {
-            unchanged: self.files.len() - changed.len(),
-            written: changed.into_iter().cloned().collect(),
-            removed,
+            written: change.written,
+            unchanged: change.unchanged,
+            removed: change.removed,
             functions: self
                 .record
                 .libraries
@@ -182,17 +148,19 @@ impl Folder {
     /// # Errors
     /// A signature changed and the library's number did not; the folder is none of libraries.
     pub fn check(&self, committed: &Path) -> Result<Differences> {
-        let before = read(committed).ok_or_else(|| Error::Manifest {
+        let missing = || Error::Manifest {
             path: committed.join(FILE),
             problem: "it is missing, or no record of libraries of functions".into(),
-        })?;
+        };
+        let folder = folder::Folder::open(committed)?.ok_or_else(missing)?;
+        let (before, _) = record(&folder)?.ok_or_else(missing)?;
         self.same_api(Some(&before))?;
         let mut files = Vec::new();
         for (name, bytes) in &self.files {
-            match std::fs::read(committed.join(name)) {
-                Ok(there) if there == *bytes => {}
-                Ok(_) => files.push(format!("{name} differs")),
-                Err(_) => files.push(format!("{name} is missing")),
+            match folder.read(name)? {
+                Found::File(there) if there == *bytes => {}
+                Found::Nothing => files.push(format!("{name} is missing")),
+                Found::File(_) | Found::Other(..) => files.push(format!("{name} differs")),
             }
         }
         let extra = before.files.keys().filter(|n| !self.files.contains_key(*n));
@@ -223,6 +191,17 @@ impl Folder {
 
 /// What a folder is said to hold.
 #[must_use]
-pub fn read(folder: &Path) -> Option<Record> {
-    serde_json::from_slice(&std::fs::read(folder.join(FILE)).ok()?).ok()
+pub fn read(path: &Path) -> Option<Record> {
+    let folder = folder::Folder::open(path).ok()??;
+    record(&folder).ok()?.map(|(record, _)| record)
+}
+
+/// The record in a folder, and its hash; `None` where there is none that can be read.
+fn record(folder: &folder::Folder) -> Result<Option<(Record, String)>> {
+    Ok(match folder.read(FILE)? {
+        Found::File(bytes) => serde_json::from_slice(&bytes)
+            .ok()
+            .map(|record| (record, sha256(&bytes))),
+        Found::Nothing | Found::Other(..) => None,
+    })
 }

@@ -276,9 +276,8 @@ fn is_of_subgroup(op: Op) -> bool {
 /// Storage that is decorated so that it cannot be written.
 fn read_only(module: &Module) -> HashSet<Word> {
     let is_note = |note: &&Instruction| {
-        note.operands
-            .iter()
-            .any(|it| *it == Operand::Decoration(Decoration::NonWritable))
+        let mark = Operand::Decoration(Decoration::NonWritable);
+        note.operands.contains(&mark)
     };
     let marked: HashSet<Word> = module
         .annotations
@@ -317,14 +316,14 @@ fn joins(successors: &[Vec<usize>]) -> Vec<Option<usize>> {
     loop {
         let mut changed = false;
         for number in (0..count).rev() {
-            for other in 0..count {
-                let stays = other == number
-                    || !successors[number].is_empty()
-                        && successors[number].iter().all(|next| through[*next][other]);
-                if through[number][other] != stays {
-                    through[number][other] = stays;
-                    changed = true;
-                }
+            let next = &successors[number];
+            let of_all = |other: usize| next.iter().all(|next| through[*next][other]);
+            let now: Vec<bool> = (0..count)
+                .map(|other| other == number || !next.is_empty() && of_all(other))
+                .collect();
+            if through[number] != now {
+                through[number] = now;
+                changed = true;
             }
         }
         if !changed {

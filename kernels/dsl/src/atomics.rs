@@ -69,7 +69,49 @@ mod spirv {
         }
     }
 
-    macro_rules! operation {
+    /// The operations on integers of `self.0`, with the caller's `SCOPE` and `NONE`.
+    macro_rules! operations {
+        () => {
+            #[inline(always)]
+            #[allow(clippy::mut_from_ref, reason = "an atomic operation takes a pointer")]
+            unsafe fn slot(self, i: u32) -> &'a mut T {
+                // SAFETY: the caller's.
+                unsafe { &mut *(self.0.index_unchecked(i as usize) as *const T as *mut T) }
+            }
+
+            $crate::atomics::operations! {
+                add = arch::atomic_i_add::<T, SCOPE, NONE>;
+                sub = arch::atomic_i_sub::<T, SCOPE, NONE>;
+                min = T::fetch_min;
+                max = T::fetch_max;
+                and = arch::atomic_and::<T, SCOPE, NONE>;
+                or = arch::atomic_or::<T, SCOPE, NONE>;
+                xor = arch::atomic_xor::<T, SCOPE, NONE>;
+                exchange = arch::atomic_exchange::<T, SCOPE, NONE>;
+            }
+
+            #[inline(always)]
+            pub fn compare_exchange(self, i: u32, expected: T, value: T) -> T {
+                // SAFETY: as for the others.
+                unsafe {
+                    arch::atomic_compare_exchange::<T, SCOPE, NONE, NONE>(
+                        self.slot(i),
+                        value,
+                        expected,
+                    )
+                }
+            }
+            #[inline(always)]
+            pub fn load(self, i: u32) -> T {
+                // SAFETY: as for the others.
+                unsafe { arch::atomic_load::<T, SCOPE, NONE>(self.slot(i)) }
+            }
+            #[inline(always)]
+            pub fn store(self, i: u32, value: T) {
+                // SAFETY: as for the others.
+                unsafe { arch::atomic_store::<T, SCOPE, NONE>(self.slot(i), value) }
+            }
+        };
         ($($name:ident = $function:path;)*) => {$(
             #[inline(always)]
             pub fn $name(self, i: u32, value: T) -> T {
@@ -78,6 +120,7 @@ mod spirv {
             }
         )*};
     }
+    pub(crate) use operations;
 
     impl<'a, T: AtomicInteger> Atomics<'a, T> {
         #[doc(hidden)]
@@ -93,41 +136,7 @@ mod spirv {
         pub fn is_empty(self) -> bool {
             self.len() == 0
         }
-        #[inline(always)]
-        #[allow(clippy::mut_from_ref, reason = "an atomic operation takes a pointer")]
-        unsafe fn slot(self, i: u32) -> &'a mut T {
-            // SAFETY: the caller's.
-            unsafe { &mut *(self.0.index_unchecked(i as usize) as *const T as *mut T) }
-        }
-
-        operation! {
-            add = arch::atomic_i_add::<T, SCOPE, NONE>;
-            sub = arch::atomic_i_sub::<T, SCOPE, NONE>;
-            min = T::fetch_min;
-            max = T::fetch_max;
-            and = arch::atomic_and::<T, SCOPE, NONE>;
-            or = arch::atomic_or::<T, SCOPE, NONE>;
-            xor = arch::atomic_xor::<T, SCOPE, NONE>;
-            exchange = arch::atomic_exchange::<T, SCOPE, NONE>;
-        }
-
-        #[inline(always)]
-        pub fn compare_exchange(self, i: u32, expected: T, value: T) -> T {
-            // SAFETY: as for the others.
-            unsafe {
-                arch::atomic_compare_exchange::<T, SCOPE, NONE, NONE>(self.slot(i), value, expected)
-            }
-        }
-        #[inline(always)]
-        pub fn load(self, i: u32) -> T {
-            // SAFETY: as for the others.
-            unsafe { arch::atomic_load::<T, SCOPE, NONE>(self.slot(i)) }
-        }
-        #[inline(always)]
-        pub fn store(self, i: u32, value: T) {
-            // SAFETY: as for the others.
-            unsafe { arch::atomic_store::<T, SCOPE, NONE>(self.slot(i), value) }
-        }
+        operations!();
     }
 }
 
@@ -290,3 +299,5 @@ mod host {
 pub use host::AtomicInteger;
 #[cfg(target_arch = "spirv")]
 pub use spirv::AtomicInteger;
+#[cfg(target_arch = "spirv")]
+pub(crate) use spirv::operations;

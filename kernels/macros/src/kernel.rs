@@ -40,7 +40,7 @@ pub struct Kernel {
 }
 
 pub enum Stage {
-    Compute(Compute),
+    Compute(Box<Compute>),
     Vertex,
     Fragment,
 }
@@ -1006,12 +1006,12 @@ impl Args {
                     Some((_, args)) => Range::parse(args, params, threads.len())?,
                     None => Range::Outputs,
                 };
-                Stage::Compute(Compute {
+                Stage::Compute(Box::new(Compute {
                     threads,
                     // To be found in the body.
                     cooperative: false,
                     range,
-                })
+                }))
             }
             word => {
                 if self.threads.is_some()
