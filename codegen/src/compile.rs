@@ -471,8 +471,7 @@ fn last_artefact(messages: &str) -> Option<Artefact> {
                 fresh: message.fresh,
             })
         })
-        .filter(|artefact| artefact.file.to_string_lossy().ends_with(".spv.json"))
-        .next_back()
+        .rfind(|artefact| artefact.file.to_string_lossy().ends_with(".spv.json"))
 }
 
 fn read_modules(

@@ -5,7 +5,7 @@
 use super::ir::{Builtin, Function, Id, Library, Literal, Scalar, Signature, Type};
 use super::print::{
     Dialect, Naming, Piece, atom, called, choice, components, digits, documented, function,
-    members, provenance, signed,
+    members, provenance, rounds, signed,
 };
 use super::wgsl::looks_up;
 
@@ -169,6 +169,15 @@ impl Dialect for Glsl<'_> {
             self.naming.function(&function.name),
             params.join(", ")
         )
+    }
+
+    fn give(&self, ty: &Type, value: &Piece) -> String {
+        // `precise` is for variables: what is returned at once is not pinned.
+        if self.form == Form::Plain && rounds(ty, value) {
+            let (precise, ty) = (self.precise(), self.ty(ty));
+            return format!("{precise} {ty} given = {};\nreturn given;", value.0);
+        }
+        format!("return {};", value.0)
     }
 
     fn constant_local(&self, name: &str, ty: &Type, value: &Piece) -> String {

@@ -6,7 +6,7 @@ use super::glsl::by_macro;
 use super::ir::{Builtin, Function, Id, Library, Literal, Signature, Type};
 use super::print::{
     Bond, Dialect, Naming, Piece, atom, bracketed, c_like, called, choice, components, digits,
-    documented, function, list, members, provenance, signed,
+    documented, function, list, members, provenance, rounds, signed,
 };
 
 pub(super) struct Hlsl<'a>(pub(super) &'a Naming);
@@ -102,6 +102,14 @@ impl Dialect for Hlsl<'_> {
             // A structure is initialised where it is declared.
             Type::Struct(_) if value.0.starts_with('{') => {
                 format!("{} given = {};\nreturn given;", self.ty(ty), value.0)
+            }
+            // `precise` is for variables: what is returned at once is not pinned.
+            ty if rounds(ty, value) => {
+                format!(
+                    "precise {} given = {};\nreturn given;",
+                    self.ty(ty),
+                    value.0
+                )
             }
             _ => format!("return {};", value.0),
         }

@@ -131,6 +131,7 @@ const TAKEN: &[&str] = &[
     "from",
     "function",
     "get",
+    "given",
     "global",
     "goto",
     "groupshared",

@@ -389,6 +389,16 @@ impl Printer<'_> {
     }
 }
 
+/// Whether a value is a number or vector in `f32` that rounds on its way: where a language pins
+/// locals, it must be one.
+pub fn rounds(ty: &Type, value: &Piece) -> bool {
+    let is_float = matches!(ty, Type::Scalar(Scalar::F32) | Type::Vector(Scalar::F32, _));
+    is_float
+        && [" + ", " - ", " * ", " / "]
+            .iter()
+            .any(|op| value.0.contains(op))
+}
+
 /// Adds a statement, in lines that are not too long.
 fn push(dialect: &dyn Dialect, lines: &mut Vec<String>, indent: &str, text: &str) {
     for part in text.split('\n') {
