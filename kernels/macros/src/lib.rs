@@ -66,7 +66,7 @@ use syn::parse_macro_input;
 /// }
 /// # fn main() {}
 /// ```
-/// A kernel with a [`StorageMut`](struct@StorageMut) or [`Atomics`](struct@Atomics) writes where it
+/// A kernel with a `StorageMut` or `Atomics` writes where it
 /// likes; that its invocations do not race is the author's to see to.
 /// ```
 /// use hankel_dsl::{Atomics, StorageMut, kernel};
@@ -84,7 +84,7 @@ use syn::parse_macro_input;
 /// }
 /// # fn main() {}
 /// ```
-/// A kernel with [`Shared`](struct@Shared) memory or a [`barrier`](fn@barrier) runs workgroup by
+/// A kernel with `Shared` memory or a `barrier` runs workgroup by
 /// workgroup, those invocations too that are beyond the range, so that all of them come to every
 /// barrier. Natively each invocation is resumable, and barriers in control flow that is not uniform
 /// are reported.
@@ -124,7 +124,7 @@ pub fn kernel(args: TokenStream, item: TokenStream) -> TokenStream {
         .into()
 }
 
-/// Marks a function that waits at a [`barrier`](fn@barrier) and is called by kernels, which name it
+/// Marks a function that waits at a `barrier` and is called by kernels, which name it
 /// in `cooperative(…)`. One that calls others names those: `#[cooperative(other)]`. Such a function
 /// is called by its name or path, not from a closure.
 #[proc_macro_attribute]
