@@ -56,20 +56,25 @@ if ! command -v cargo >/dev/null 2>&1; then
     exit 3
 fi
 
-# What no distribution has, in a folder of Hankel's own. The versions are those of `hankel doctor`.
+# What no distribution has, in a folder of Hankel's own. Versions and checksums are in xtask/tools.
 if [ "${for_tests:-no}" = yes ]; then
     HANKEL_TOOLS=${HANKEL_TOOLS:-${XDG_CACHE_HOME:-$HOME/.cache}/hankel/tools}
     export HANKEL_TOOLS
     mkdir -p "$HANKEL_TOOLS"
-    if [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ]; then
+    if ! cmp -s xtask/tools/package-lock.json "$HANKEL_TOOLS/package-lock.json" ||
+        [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ]; then
         echo "Installing Dawn for Node.js (npm: webgpu, MIT and BSD-3-Clause)"
-        npm install --silent --no-save --prefix "$HANKEL_TOOLS" webgpu@0.6.2
+        cp xtask/tools/package.json xtask/tools/package-lock.json "$HANKEL_TOOLS"
+        npm ci --silent --prefix "$HANKEL_TOOLS"
     fi
     if ! command -v dxc >/dev/null 2>&1 && [ ! -e "$HANKEL_TOOLS/libdxcompiler_x86_64.so.3.7" ]; then
         echo "Installing DXC's library (PyPI: compushady, MIT; DXC: NCSA)"
-        pip3 download --quiet --no-deps --no-binary :all: --dest "$HANKEL_TOOLS" compushady==0.17.5
+        pip3 download --quiet --no-deps --no-binary :all: --dest "$HANKEL_TOOLS" \
+            --require-hashes --requirement xtask/tools/requirements.txt
         tar -xzf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" -C "$HANKEL_TOOLS" --strip-components=3 \
             compushady-0.17.5/compushady/backends/libdxcompiler_x86_64.so.3.7
+        tar -xzOf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" compushady-0.17.5/LICENSE \
+            >"$HANKEL_TOOLS/compushady-LICENSE"
     fi
 fi
 

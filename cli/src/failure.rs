@@ -9,12 +9,6 @@ use hankel_host::device::DeviceError;
 use hankel_host::eval::EvalError;
 use hankel_host::frame::FrameError;
 use hankel_host::scene::SceneError;
-use hankel_numerics::accuracy::AccuracyError;
-use hankel_numerics::biases::BiasError;
-use hankel_numerics::judge::{JudgeError, TableError};
-use hankel_numerics::report::ReportError;
-use hankel_numerics::speed::SpeedError;
-use hankel_numerics::stress::StressError;
 use hankel_system::input::InputError;
 use hankel_system::output::OutputError;
 use hankel_system::text::visible;
@@ -37,7 +31,7 @@ impl Outcome {
 
 /// Whose turn it is, which is the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Blame {
+pub enum Blame {
     /// 1: a kernel does not compile, or does not pass through the tools.
     Kernel,
     /// 2: the command's arguments or the files that they name.
@@ -57,7 +51,7 @@ pub struct Failure {
 pub type Result<T> = std::result::Result<T, Failure>;
 
 impl Failure {
-    fn new(blame: Blame, error: &dyn std::error::Error, help: Option<String>) -> Self {
+    pub fn new(blame: Blame, error: &dyn std::error::Error, help: Option<String>) -> Self {
         let mut message = error.to_string();
         let mut source = error.source();
         while let Some(cause) = source {
@@ -160,14 +154,14 @@ fn is_misplaced(kind: ErrorKind) -> bool {
     )
 }
 
-fn blame_of_input(error: &InputError) -> Blame {
+pub fn blame_of_input(error: &InputError) -> Blame {
     match error.is_machine() {
         true => Blame::Machine,
         false => Blame::Input,
     }
 }
 
-fn blame_of_output(error: &OutputError) -> Blame {
+pub fn blame_of_output(error: &OutputError) -> Blame {
     match error.is_machine() {
         true => Blame::Machine,
         false => Blame::Input,
@@ -237,78 +231,5 @@ impl From<FrameError> for Failure {
 impl From<hankel_toolchain::Error> for Failure {
     fn from(error: hankel_toolchain::Error) -> Self {
         Self::new(Blame::Machine, &error, None)
-    }
-}
-
-impl From<SpeedError> for Failure {
-    fn from(error: SpeedError) -> Self {
-        let blame = match &error {
-            SpeedError::Order(_) | SpeedError::Rows(_) | SpeedError::Rounds => Blame::Input,
-            SpeedError::Kernel { .. } | SpeedError::Call(_) => Blame::Kernel,
-            SpeedError::Worker(..) | SpeedError::Peer(_) | SpeedError::Io(_) => Blame::Machine,
-        };
-        Self::new(blame, &error, None)
-    }
-}
-
-impl From<ReportError> for Failure {
-    fn from(error: ReportError) -> Self {
-        let blame = match &error {
-            ReportError::Output(error) => blame_of_output(error),
-            _ => Blame::Machine,
-        };
-        Self::new(blame, &error, None)
-    }
-}
-
-/// A kernel that does not run is its own fault; the rest is that of the arguments or the machine.
-fn blame_of_stress(error: &StressError) -> Blame {
-    match error {
-        StressError::Family { .. } | StressError::Order(_) | StressError::Samples(_) => {
-            Blame::Input
-        }
-        StressError::Kernel { .. } | StressError::Backend { .. } => Blame::Kernel,
-        StressError::Peer(_) => Blame::Machine,
-    }
-}
-
-impl From<StressError> for Failure {
-    fn from(error: StressError) -> Self {
-        Self::new(blame_of_stress(&error), &error, None)
-    }
-}
-
-impl From<AccuracyError> for Failure {
-    fn from(error: AccuracyError) -> Self {
-        let blame = match &error {
-            AccuracyError::Order(_) | AccuracyError::Samples(_) => Blame::Input,
-            AccuracyError::Family(_) | AccuracyError::NoKernel { .. } => Blame::Kernel,
-            AccuracyError::Kernel(error) => blame_of_stress(error),
-            AccuracyError::Peer(_) => Blame::Machine,
-        };
-        Self::new(blame, &error, None)
-    }
-}
-
-impl From<BiasError> for Failure {
-    fn from(error: BiasError) -> Self {
-        Self::new(Blame::Input, &error, None)
-    }
-}
-
-impl From<JudgeError> for Failure {
-    fn from(error: JudgeError) -> Self {
-        Self::new(Blame::Input, &error, None)
-    }
-}
-
-impl From<TableError> for Failure {
-    fn from(error: TableError) -> Self {
-        let blame = match &error {
-            TableError::Input(error) => blame_of_input(error),
-            TableError::Output(error) => blame_of_output(error),
-            _ => Blame::Input,
-        };
-        Self::new(blame, &error, None)
     }
 }

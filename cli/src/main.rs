@@ -7,6 +7,8 @@ mod args;
 mod commands;
 mod depfile;
 mod failure;
+#[cfg(feature = "measure")]
+mod measure;
 mod print;
 mod progress;
 mod session;
@@ -16,6 +18,8 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
+#[cfg(not(feature = "measure"))]
+use clap::error::{ContextKind, ContextValue};
 
 use args::{Arguments, Command};
 use failure::Outcome;
@@ -35,10 +39,9 @@ fn main() -> ExitCode {
         Command::New(a) => commands::new::run(&a, quiet),
         Command::Parity(a) => commands::parity::run(&a, quiet),
         Command::Eval(a) => commands::eval::run(&a, quiet),
-        Command::Judge(a) => commands::judge::run(&a, quiet),
         Command::Render(a) => commands::render::run(&a, quiet),
-        Command::Bench(a) => commands::bench::run(&a, quiet),
-        Command::Stress(a) => commands::stress::run(&a, quiet),
+        #[cfg(feature = "measure")]
+        Command::Measure(command) => measure::run(&command, quiet),
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
         Command::Doctor(a) => commands::doctor::run(&a),
         Command::Completions(a) => commands::completions::run(&a),
@@ -74,6 +77,15 @@ fn show(message: &clap::Error) -> ExitCode {
     if message.use_stderr() {
         // With colours where the terminal has them; who closed the stream wants no message.
         let _ = message.print();
+        #[cfg(not(feature = "measure"))]
+        if let Some(ContextValue::String(name)) = message.get(ContextKind::InvalidSubcommand)
+            && ["bench", "judge", "stress"].contains(&name.as_str())
+        {
+            print::note(format_args!(
+                "\nThis `hankel` was built without what measures. With it: \
+                 cargo install --path cli --features measure"
+            ));
+        }
         return ExitCode::from(2);
     }
     if std::io::stdout().is_terminal() {

@@ -102,7 +102,7 @@ fn misuse_is_explained() {
     fails(
         folder.path(),
         &format!("{quick} --rounds 1 --out file"),
-        3,
-        &["file", "--out"],
+        2,
+        &["cannot write file", "should be a folder"],
     );
 }

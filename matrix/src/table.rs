@@ -522,6 +522,7 @@ pub(crate) mod tests {
             name: say("Chromium"),
             purpose: say("runs WGSL"),
             licence: say("BSD"),
+            licence_file: None,
             path: there.then(|| say("/usr/bin/chromium").into()),
             version: there.then(|| say("1.2")),
             files: Vec::new(),

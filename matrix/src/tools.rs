@@ -67,6 +67,8 @@ pub struct Status {
     pub purpose: String,
     /// Its licence.
     pub licence: String,
+    /// The file with the licence's text on this machine, if it is where its package puts it.
+    pub licence_file: Option<PathBuf>,
     /// Where it is.
     pub path: Option<PathBuf>,
     /// Its version, as it says itself.
@@ -187,6 +189,22 @@ impl Tool {
         }
     }
 
+    /// Where the text of the licence is after [`Self::install`].
+    fn licence_file(self, tools: &Tools) -> PathBuf {
+        let of_debian = |package: &str| Path::new("/usr/share/doc").join(package).join("copyright");
+        match self {
+            Self::Vulkan => of_debian("mesa-vulkan-drivers"),
+            // Its driver comes in Chromium's package.
+            Self::SwiftShader | Self::Chromium => of_debian("chromium"),
+            Self::Egl => of_debian("libegl-mesa0"),
+            Self::Glslang => of_debian("glslang-tools"),
+            Self::Clang => of_debian("clang-19"),
+            Self::Node => of_debian("nodejs"),
+            Self::Dawn => tools.folder.join("node_modules/webgpu/LICENSE.md"),
+            Self::Dxc => tools.folder.join("compushady-LICENSE"),
+        }
+    }
+
     fn install(self, tools: &Tools) -> String {
         let folder = tools.folder.display();
         match self {
@@ -255,6 +273,7 @@ impl Tools {
             name: tool.name().into(),
             purpose: tool.purpose().into(),
             licence: tool.licence().into(),
+            licence_file: Some(tool.licence_file(self)).filter(|file| file.is_file()),
             path: None,
             version: None,
             files: Vec::new(),

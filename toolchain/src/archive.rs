@@ -41,29 +41,29 @@ pub struct Packed {
     pub bytes: u64,
 }
 
-/// The checksum that `archive` must have: the one that was given, else the one in a
-/// `SHA256SUMS` file beside it, else the one built in for an archive of that name.
+/// The checksum that `archive` must have: the one that was given, else the one built in for an
+/// archive of that name, else the one in a `SHA256SUMS` file beside it. Who replaces an archive can
+/// replace the file beside it, too.
 pub(crate) fn expected_sha256(options: &Options, archive: &Path) -> Result<String> {
     if let Some(given) = &options.sha256 {
         return checked_syntax(given);
     }
     let name = archive.file_name().unwrap_or_default().to_string_lossy();
+    if let Some((_, sum)) = pinned::ARCHIVES.iter().find(|(known, _)| *known == name) {
+        return Ok((*sum).to_owned());
+    }
     let sums = archive.with_file_name("SHA256SUMS");
     match input::read_text(&sums, MAX_SUMS) {
-        Ok(text) => {
-            if let Some(sum) = in_sums(&text, &name) {
-                return checked_syntax(sum);
-            }
-        }
-        Err(error) if error.is_missing() => {}
-        Err(error) => return Err(error.into()),
-    }
-    let known = pinned::ARCHIVES.iter().find(|(known, _)| *known == name);
-    match known {
-        Some((_, sum)) => Ok((*sum).to_owned()),
-        None => Err(Error::ChecksumUnknown {
+        Ok(text) => match in_sums(&text, &name) {
+            Some(sum) => checked_syntax(sum),
+            None => Err(Error::ChecksumUnknown {
+                path: archive.to_owned(),
+            }),
+        },
+        Err(error) if error.is_missing() => Err(Error::ChecksumUnknown {
             path: archive.to_owned(),
         }),
+        Err(error) => Err(error.into()),
     }
 }
 

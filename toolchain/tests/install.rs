@@ -71,6 +71,27 @@ fn a_wrong_checksum_shows_both_sums() {
 }
 
 #[test]
+fn a_file_of_checksums_does_not_replace_a_built_in_one() {
+    let scratch = Scratch::new();
+    let (name, built_in) = pinned::ARCHIVES[0];
+    let bytes = archive_bytes(&toolchain_entries("a"));
+    let archive = scratch.join("a").join(name);
+    fs::create_dir_all(scratch.join("a")).unwrap();
+    fs::write(&archive, &bytes).unwrap();
+    let sums = format!("{}  {name}\n", sha256(&bytes));
+    fs::write(archive.with_file_name("SHA256SUMS"), sums).unwrap();
+    let (error, text) = refused(&scratch, &scratch.options(), &archive);
+    assert!(matches!(error, Error::Checksum { .. }), "{text}");
+    assert!(text.contains(built_in), "{text}");
+
+    let told = Options {
+        sha256: Some(sha256(&bytes)),
+        ..scratch.options()
+    };
+    install(&told, Some(Method::Archive(archive)), &mut Silent).unwrap();
+}
+
+#[test]
 fn a_truncated_archive_is_refused() {
     let scratch = Scratch::new();
     let bytes = archive_bytes(&toolchain_entries("a"));

@@ -28,7 +28,9 @@ fn print(status: &Status) {
         (None, None) => "not installed".into(),
     };
     say!("{}: {found}", status.name);
-    say!("    {}; licence: {}", status.purpose, status.licence);
+    let text = status.licence_file.as_ref();
+    let text = text.map_or(String::new(), |file| format!(" ({})", file.display()));
+    say!("    {}; licence: {}{text}", status.purpose, status.licence);
     if !status.is_there() {
         say!("    {}", status.install);
     }

@@ -10,8 +10,9 @@ use hankel_numerics::report::Report;
 use hankel_numerics::stress::{self, BackendError, Native};
 use hankel_system::output;
 
+use super::args::{Rival, Stress};
 use super::{command_line, deliver};
-use crate::args::{self, Format, Rival, Stress};
+use crate::args::{self, Backend, Format};
 use crate::failure::{Outcome, Result};
 use crate::progress::Progress;
 use crate::session::Session;
@@ -82,8 +83,8 @@ fn of_families(args: &Stress, quiet: bool, progress: &Progress) -> Result<(Repor
     let (mut scalar, mut lanes) = (Native::scalar(), Native::lanes());
     let mut backends: Vec<&mut dyn stress::Backend> = vec![&mut scalar, &mut lanes];
     let mut vulkan = match args.backend {
-        args::Backend::Native => None,
-        args::Backend::Vulkan => Some(Vulkan::open(quiet)?),
+        Backend::Native => None,
+        Backend::Vulkan => Some(Vulkan::open(quiet)?),
     };
     if let Some(vulkan) = &mut vulkan {
         backends.push(vulkan);

@@ -1,6 +1,6 @@
 use hankel_numerics::judge::{DepthFunction, Judge, JudgeError, Range, table};
 
-use crate::args::Judge as Args;
+use super::args::Judge as Args;
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::say;
 use crate::progress::Progress;

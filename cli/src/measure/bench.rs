@@ -10,8 +10,9 @@ use hankel_numerics::report::{Column, Table};
 use hankel_numerics::speed::{self, Program};
 use hankel_system::output;
 
+use super::args::{Bench, BenchBounds, BenchCommand, Rival};
 use super::{command_line, deliver};
-use crate::args::{Bench, BenchBounds, BenchCommand, Format, Rival};
+use crate::args::Format;
 use crate::failure::{Failure, Outcome, Result};
 use crate::progress::Progress;
 use crate::session::Session;

@@ -1,0 +1,201 @@
+//! The arguments of the commands that measure.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use crate::args::{Backend, Format, Precision};
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The exact bounds of each row of a table, by a linear programme.
+    Judge(Judge),
+    /// Measure how fast kernels are.
+    Bench(Bench),
+    /// Measure how wrong bounds are, on every kind of input, and how much bias moments need.
+    Stress(Stress),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel judge --functions z,z^2,z^3,z^4 --input rows.csv --output bounds.csv
+  hankel judge --functions z,z^2,z^3,z^4 --range line --input rows.csv --output bounds.csv
+  hankel judge --functions 'z,exp(2z),sin(2pi*z)' --range 0,1 --input rows.csv --output bounds.csv
+
+The table's columns are m0 (the total weight), m1, m2 and so on (the sums of weight times each
+function) and z. Written are the least weight strictly below z, the greatest at or below z, over all
+distributions with these moments, the margin within which both are exact, and the residual: how far
+the moments of the distributions found are from the given ones, relative to m0.
+
+Functions: z to z^16; z^(1/2), z^(1/3), z^(1/4); 1/(z+1) to 1/(z+1)^4; exp(z) to exp(4z);
+log(z+1) to log(z+4); sin(2pi*z), cos(2pi*z) and 4pi, 6pi, 8pi; cosh(z), sinh(z), asin(z),
+asin(2z-1), atan(z), exp(-z^2)")]
+pub struct Judge {
+    /// Functions of depth whose means the moments are, with commas between.
+    #[arg(long, value_name = "FUNCTIONS", value_delimiter = ',', required = true)]
+    pub functions: Vec<String>,
+    /// The depths that there may be: two numbers with a comma between, or `line` for any.
+    #[arg(
+        long,
+        value_name = "LOW,HIGH",
+        default_value = "0,1",
+        allow_hyphen_values = true
+    )]
+    pub range: String,
+    /// Table to read: CSV with a header.
+    #[arg(long, value_name = "FILE")]
+    pub input: PathBuf,
+    /// Table to write.
+    #[arg(long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Bench {
+    #[command(subcommand)]
+    pub command: BenchCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Bounds and their derivatives: run time, error, and how near the machine's limits they are.
+    Bounds(BenchBounds),
+    /// Measure for another process, which asks on the standard input stream.
+    #[command(hide = true)]
+    Worker,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel bench bounds --quick
+  hankel bench bounds --out report --against diffmoments --python venv/bin/python
+  hankel bench bounds --n 2,3 --samples 200000
+
+OUT gets bounds.html, bounds.json, and a CSV file for each table. diffmoments is a Python package:
+  python3 -m pip install diffmoments numpy
+
+Environment:
+  HANKEL_PYTHON  the Python that has diffmoments, unless --python says
+  HANKEL_SIMD    the instruction set of the lanes; the others are measured all the same")]
+pub struct BenchBounds {
+    /// Only these orders; several with commas between, or repeated [default: 1 to 5].
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=5))]
+    pub n: Vec<u8>,
+    /// Rows of each call [default: 1000000; with --quick 20000].
+    #[arg(long, value_name = "NUMBER", value_parser = rows)]
+    pub samples: Option<usize>,
+    /// Rounds in which everything has its turn [default: 5; with --quick 3].
+    #[arg(long, value_name = "NUMBER", value_parser = rounds)]
+    pub rounds: Option<usize>,
+    /// Seed of the rows.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// Measure this implementation in turns with the kernels.
+    #[arg(long, value_enum)]
+    pub against: Option<Rival>,
+    /// The Python that has it [default: HANKEL_PYTHON, or python3].
+    #[arg(long, value_name = "PROGRAM", requires = "against")]
+    pub python: Option<PathBuf>,
+    /// Folder for the report; without it, tables are only printed.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// A look in seconds: fewer rows and rounds.
+    #[arg(long)]
+    pub quick: bool,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel stress
+  hankel stress --family silhouettes,self --n 2,3 --samples 100000
+  hankel stress --backend vulkan --precision f32
+  hankel stress --against diffmoments --python venv/bin/python --out report
+  hankel stress --singularities --samples 5000
+  hankel stress --biases
+
+Exit code 1: a kernel gave something that is no number or not from 0 to m_0, or lanes gave other
+bits than the scalar run. OUT gets stress.html, stress.json, and a CSV file for each table.
+diffmoments is a Python package:
+  python3 -m pip install diffmoments numpy
+
+Environment:
+  HANKEL_PYTHON  the Python that has diffmoments, unless --python says
+  HANKEL_SIMD    the instruction set of the lanes")]
+pub struct Stress {
+    /// Only these orders; several with commas between, or repeated [default: 1 to 5].
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=5))]
+    pub n: Vec<u8>,
+    /// Only these families of rows; several with commas between, or repeated.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub family: Vec<String>,
+    /// Rows of each family, order and precision; moment vectors for --singularities; regions for
+    /// each strength for --biases [default: 10000; 400; 4000000].
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(16..=MOST_SAMPLES))]
+    pub samples: Option<u64>,
+    /// Only this precision.
+    #[arg(long, value_enum)]
+    pub precision: Option<Precision>,
+    /// Where kernels are run besides the scalar run that all others are compared with.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// Measure this implementation on the same rows.
+    #[arg(long, value_enum)]
+    pub against: Option<Rival>,
+    /// The Python that has it [default: HANKEL_PYTHON, or python3].
+    #[arg(long, value_name = "PROGRAM", requires = "against")]
+    pub python: Option<PathBuf>,
+    /// Only bounds and derivatives at singularities and next to them.
+    #[arg(long, conflicts_with_all = ["family", "biases"])]
+    pub singularities: bool,
+    /// Instead, search the least biases that keep stored moments valid (minutes).
+    #[arg(long, conflicts_with_all = ["n", "family", "precision", "against"])]
+    pub biases: bool,
+    /// Seed of the rows.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the report; without it, tables are only printed.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Most samples that are drawn: results of all are kept in memory, some hundred bytes each.
+const MOST_SAMPLES: u64 = 10_000_000;
+
+/// Most rounds of a measurement.
+const MOST_ROUNDS: usize = 1000;
+
+fn within(least: usize, most: usize, text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        Ok(_) => Err(format!("from {least} to {most}")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn rounds(text: &str) -> Result<usize, String> {
+    within(1, MOST_ROUNDS, text)
+}
+
+fn rows(text: &str) -> Result<usize, String> {
+    within(
+        hankel_numerics::speed::LEAST_ROWS,
+        MOST_SAMPLES as usize,
+        text,
+    )
+}
+
+/// An implementation to compare with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Rival {
+    /// The 2025 paper's own code, a Python package.
+    Diffmoments,
+}

@@ -1,0 +1,69 @@
+//! The commands that measure bounds: `judge`, `bench` and `stress`. They are the Cargo feature
+//! `measure`, since what they measure with takes longer to compile than all else.
+
+mod args;
+mod bench;
+mod failure;
+mod judge;
+mod stress;
+
+use std::path::Path;
+
+use hankel_numerics::report::Report;
+
+pub use args::Command;
+
+use crate::args::Format;
+use crate::failure::{Outcome, Result};
+use crate::print::{self, say};
+
+/// Runs a command that measures.
+pub fn run(command: &Command, quiet: bool) -> Result<Outcome> {
+    match command {
+        Command::Judge(a) => judge::run(a, quiet),
+        Command::Bench(a) => bench::run(a, quiet),
+        Command::Stress(a) => stress::run(a, quiet),
+    }
+}
+
+/// Writes a report's files where a folder is given for them, and prints it.
+fn deliver(
+    report: &Report,
+    out: Option<&Path>,
+    name: &str,
+    format: Format,
+    quiet: bool,
+) -> Result<()> {
+    let paths = match out {
+        Some(folder) => report.write(folder, name)?,
+        None => Vec::new(),
+    };
+    match format {
+        Format::Json => print::json(report),
+        Format::Text => {
+            say!("{report}");
+            if !quiet {
+                for path in paths {
+                    say!("{}", path.display());
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The command line as it was typed, as near as a program can know, for reports.
+fn command_line() -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_=./,:*@%+".contains(c);
+    std::iter::once("hankel".to_owned())
+        .chain(std::env::args_os().skip(1).map(|argument| {
+            let text = argument.to_string_lossy();
+            if !text.is_empty() && text.chars().all(plain) {
+                text.into_owned()
+            } else {
+                format!("'{}'", text.replace('\'', "'\\''"))
+            }
+        }))
+        .collect::<Vec<_>>()
+        .join(" ")
+}
