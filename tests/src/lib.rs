@@ -1,5 +1,7 @@
 //! What the tests of this folder share: kernel crates whose SPIR-V is committed.
 
+pub mod lean;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
