@@ -272,14 +272,17 @@ pub struct Constant {
 pub struct Interface {
     /// Its name.
     pub name: String,
-    /// `attribute`, `varying`, `position` or `target`.
+    /// `attribute`, `varying`, `position`, `depth` or `target`.
     pub kind: String,
-    /// Location; the position has none.
+    /// Location; the position and the depth have none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub location: Option<u32>,
     /// Type.
     #[serde(rename = "type")]
     pub ty: String,
+    /// A varying that is not interpolated.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub flat: bool,
 }
 
 /// How closely backends agree.
@@ -483,6 +486,7 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
         kind: kind.into(),
         location,
         ty,
+        flat: false,
     };
     let inputs = kernel
         .params
@@ -494,12 +498,10 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
                 Some(*location),
                 layouts.spell(ty),
             )),
-            Role::Varying { location, ty } => Some(made(
-                &param.name,
-                "varying",
-                Some(*location),
-                layouts.spell(ty),
-            )),
+            Role::Varying { location, ty, flat } => Some(Interface {
+                flat: *flat,
+                ..made(&param.name, "varying", Some(*location), layouts.spell(ty))
+            }),
             _ => None,
         })
         .collect();
@@ -511,9 +513,11 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
             let name = output_name(kernel, index);
             match output {
                 Output::Position => Some(made(&name, "position", None, "vec4<f32>".into())),
-                Output::Varying { location, ty } => {
-                    Some(made(&name, "varying", Some(*location), layouts.spell(ty)))
-                }
+                Output::Depth => Some(made(&name, "depth", None, "f32".into())),
+                Output::Varying { location, ty, flat } => Some(Interface {
+                    flat: *flat,
+                    ..made(&name, "varying", Some(*location), layouts.spell(ty))
+                }),
                 Output::Target { location, ty } => {
                     Some(made(&name, "target", Some(*location), layouts.spell(ty)))
                 }
@@ -586,6 +590,16 @@ fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                     ..plain(*binding, name, BindingKind::Texture)
                 }
             }
+            Role::StorageTexture {
+                binding,
+                format,
+                dimensions,
+            } => Binding {
+                written: true,
+                texture: Some(format!("{dimensions}d")),
+                format: Some(format_name(*format)),
+                ..plain(*binding, name, BindingKind::StorageTexture)
+            },
             Role::Sampler { binding } => plain(*binding, name, BindingKind::Sampler),
             _ => return None,
         })

@@ -818,6 +818,7 @@ fn passes_whose_parts_do_not_fit_are_refused() {
         Role::Varying {
             location: 3,
             ty: vector(Scalar::F32, 4),
+            flat: false,
         },
     );
     let text = refuse(

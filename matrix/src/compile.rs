@@ -15,10 +15,22 @@ use crate::tools::Dxc;
 /// # Errors
 /// [`Failure::Refused`] with the compiler's words; a crash or time-out.
 pub fn glsl(glslang: &Path, job: &Job, out: &Path, limit: Duration) -> Result<Vec<u8>, Failure> {
+    // OpenGL's names of what Vulkan calls otherwise; the numbers are the same where both begin at 0.
+    let mut code = job.code.clone();
+    if job.stage == Stage::Vertex {
+        let refused = |e: std::io::Error| Failure::refused(format!("{}: {e}", code.display()));
+        let text = fs::read_to_string(&code).map_err(refused)?;
+        let text = text
+            .replace("gl_VertexID", "gl_VertexIndex")
+            .replace("gl_InstanceID", "gl_InstanceIndex");
+        let adopted = out.with_extension("vulkan.vert");
+        fs::write(&adopted, text).map_err(refused)?;
+        code = adopted;
+    }
     let mut command = Command::new(glslang);
     command
         .args(["-V", "--target-env", "vulkan1.1", "-S", stage(job), "-o"])
-        .args([out, &job.code]);
+        .args([out, &code]);
     compile(&mut command, "glslangValidator", folder(job), limit)?;
     adopt::glsl(&compiled(out)?, job).map_err(Failure::refused)
 }

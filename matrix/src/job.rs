@@ -140,6 +140,8 @@ pub enum Role {
         /// Its type.
         value: Value,
     },
+    /// The depth that a fragment stage returns: one float from 0 to 1; written.
+    Depth,
     /// A colour that a fragment stage returns; written.
     Target {
         /// Its location.
@@ -160,6 +162,7 @@ impl Role {
                 | Self::StorageTexture { .. }
                 | Self::Position
                 | Self::Passed { .. }
+                | Self::Depth
                 | Self::Target { .. }
         )
     }

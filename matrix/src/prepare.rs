@@ -221,7 +221,8 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
                 .unwrap_or(0);
             match kernel.outputs.get(index) {
                 Some(Output::Position) => Role::Position,
-                Some(Output::Varying { location, ty }) => Role::Passed {
+                Some(Output::Depth) => Role::Depth,
+                Some(Output::Varying { location, ty, .. }) => Role::Passed {
                     location: *location,
                     value: value(ty)?,
                 },

@@ -118,16 +118,26 @@ fn bindings(kernel: &Kernel) {
                 in_order(*unordered)
             ),
             Role::Texture { binding, texture } => format!("binding {binding}: {texture:?}"),
+            Role::StorageTexture {
+                binding, format, ..
+            } => {
+                format!("binding {binding}: texture {}, written", format.name())
+            }
             Role::Sampler { binding } => format!("binding {binding}: sampler"),
             Role::Constant { id, default } => format!("constant {id}, default {default}"),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
-            Role::Varying { location, ty } => format!("varying {location}: {}", spell(ty)),
+            Role::Varying { location, ty, flat } => varying(*location, ty, *flat),
             Role::Index => "the invocation's index".into(),
             Role::BuiltIn { built_in } => match built_in {
                 BuiltIn::LocalId => "the invocation's place in its workgroup",
                 BuiltIn::LocalIndex => "the invocation's number in its workgroup",
                 BuiltIn::GroupId => "the workgroup",
                 BuiltIn::GroupCount => "how many workgroups there are",
+                BuiltIn::VertexIndex => "the vertex's number",
+                BuiltIn::InstanceIndex => "the instance's number",
+                BuiltIn::FragCoord => "where the fragment is, and its depth",
+                BuiltIn::FrontFacing => "whether the primitive faces the viewer",
+                BuiltIn::SampleIndex => "which sample of the pixel",
             }
             .into(),
             Role::Shared {
@@ -153,11 +163,17 @@ fn bindings(kernel: &Kernel) {
                 format!("binding {binding}: texture {}", format.name())
             }
             Output::Position => "clip-space position".into(),
-            Output::Varying { location, ty } => format!("varying {location}: {}", spell(ty)),
+            Output::Depth => "depth".into(),
+            Output::Varying { location, ty, flat } => varying(*location, ty, *flat),
             Output::Target { location, ty } => format!("target {location}: {}", spell(ty)),
         };
         say!("    {:<12} {what}", "output");
     }
+}
+
+fn varying(location: u32, ty: &Type, flat: bool) -> String {
+    let how = if flat { ", not interpolated" } else { "" };
+    format!("varying {location}: {}{how}", spell(ty))
 }
 
 const fn in_order(unordered: bool) -> &'static str {

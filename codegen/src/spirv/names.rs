@@ -44,7 +44,9 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                 };
                 names.buffer(module, *binding, &param.name, &plain, "Buffer", "elements")?;
             }
-            Role::Texture { binding, .. } | Role::Sampler { binding } => {
+            Role::Texture { binding, .. }
+            | Role::StorageTexture { binding, .. }
+            | Role::Sampler { binding } => {
                 if let Some(variable) = bound(module, *binding) {
                     names.set(variable, &param.name);
                 }
@@ -87,8 +89,9 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                     names.set(variable, &name);
                 }
             }
-            Output::Position => {
-                if let Some(variable) = built_in(module, 0) {
+            Output::Position | Output::Depth => {
+                let number = if *output == Output::Depth { 22 } else { 0 };
+                if let Some(variable) = built_in(module, number) {
                     names.set(variable, &name);
                 }
             }
@@ -115,21 +118,25 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
 }
 
 /// Input variables that every stage names alike: SPIR-V's number, name.
-const INPUTS: [(u32, &str); 6] = [
+const INPUTS: [(u32, &str); 9] = [
     (28, "id"),
     (27, "local_id"),
     (26, "group_id"),
     (29, "local_index"),
     (42, "vertex_index"),
+    (43, "instance_index"),
     (15, "frag_coord"),
+    (17, "front_facing"),
+    (18, "sample_index"),
 ];
 
 /// What an output is called where it needs a name: `out` if it is the only one of its kind,
-/// otherwise its number after it; `position`, `target`.
+/// otherwise its number after it; `position`, `depth`, `color`.
 pub fn output_name(kernel: &Kernel, index: usize) -> String {
     let stem = |output: &Output| match output {
         Output::Buffer { .. } | Output::Texture { .. } => "out",
         Output::Position => "position",
+        Output::Depth => "depth",
         Output::Varying { .. } => "varying",
         Output::Target { .. } => "color",
     };

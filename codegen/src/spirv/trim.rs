@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{
-    AddressingModel, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel,
+    AddressingModel, BuiltIn, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel,
     MemorySemantics, Op, Scope, StorageClass, Word,
 };
 
@@ -28,11 +28,13 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 4] = [
+pub const ENABLED: [Capability; 6] = [
     Capability::Float64,
     Capability::Int64,
     Capability::ImageQuery,
     Capability::StorageImageExtendedFormats,
+    Capability::DerivativeControl,
+    Capability::SampleRateShading,
 ];
 
 fn needs(instruction: &Instruction) -> Option<Capability> {
@@ -48,6 +50,16 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
             Some(Operand::ImageFormat(format)) => {
                 (!is_core(*format)).then_some(Capability::StorageImageExtendedFormats)
             }
+            _ => None,
+        },
+        Op::DPdxFine
+        | Op::DPdyFine
+        | Op::FwidthFine
+        | Op::DPdxCoarse
+        | Op::DPdyCoarse
+        | Op::FwidthCoarse => Some(Capability::DerivativeControl),
+        Op::Decorate => match instruction.operands.get(2) {
+            Some(Operand::BuiltIn(BuiltIn::SampleId)) => Some(Capability::SampleRateShading),
             _ => None,
         },
         _ => None,

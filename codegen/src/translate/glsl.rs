@@ -73,6 +73,13 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         }
         Err(error) => return Err(job.failure(&error)),
     };
+    // Instances are counted from 0, whichever is the first one: OpenGL knows no more before 4.60.
+    let source = source
+        .replace("uniform uint naga_vs_first_instance;\n", "")
+        .replace(
+            "(uint(gl_InstanceID) + naga_vs_first_instance)",
+            "uint(gl_InstanceID)",
+        );
     let types = ["float", "double", "vec", "dvec", "mat", "dmat"];
     let mut source = if job.language == Language::Essl300 {
         source

@@ -33,7 +33,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-use hankel_dsl::native::describe::{Kernel, Stage};
+use hankel_dsl::native::describe::{BuiltIn, Kernel, Role, Stage};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{
@@ -463,6 +463,16 @@ impl Ir {
             );
         }
         let es = matches!(language, Language::Essl310 | Language::Essl300);
+        if es && kernel.params.iter().any(|p| p.role == SAMPLE_INDEX) {
+            return Some(format!(
+                "{language} does not know the sample: it came with 3.20"
+            ));
+        }
+        if (es || language == Language::Msl) && self.has_grained_derivatives() {
+            return Some(format!(
+                "{language} has no coarse and no fine derivatives: use `dpdx`, `dpdy`, `fwidth`"
+            ));
+        }
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
         if language == Language::Hlsl && old && self.has_wide(ScalarKind::Float) {
             return Some(format!(
@@ -581,6 +591,18 @@ impl Ir {
                 .any(|function| has_extreme(&function.body))
     }
 
+    /// Whether there are derivatives that must be coarse or fine.
+    fn has_grained_derivatives(&self) -> bool {
+        let functions = self.module.functions.iter().map(|(_, function)| function);
+        let entries = self.module.entry_points.iter().map(|entry| &entry.function);
+        functions
+            .chain(entries)
+            .flat_map(|function| function.expressions.iter())
+            .any(|(_, expression)| {
+                matches!(expression, Expression::Derivative { ctrl, .. } if *ctrl != naga::DerivativeControl::None)
+            })
+    }
+
     fn globals(&self) -> impl Iterator<Item = (&naga::GlobalVariable, &TypeInner)> {
         self.module
             .global_variables
@@ -645,6 +667,11 @@ fn inexact(language: Language, options: &Options) -> Option<String> {
         "{lacks}; the kernel is right only if it is computed as it is written"
     ))
 }
+
+/// The role of a parameter that is the sample's number.
+const SAMPLE_INDEX: Role = Role::BuiltIn {
+    built_in: BuiltIn::SampleIndex,
+};
 
 /// The first version of MSL that can forbid contraction and reordering.
 const EXACT_MSL: MslVersion = MslVersion { major: 3, minor: 2 };

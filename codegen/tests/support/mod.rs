@@ -258,6 +258,7 @@ pub fn fullscreen() -> Kernel {
             Output::Varying {
                 location: 0,
                 ty: vector(2),
+                flat: false,
             },
         ],
     )
@@ -279,6 +280,7 @@ pub fn tint() -> Kernel {
                 Role::Varying {
                     location: 0,
                     ty: vector(2),
+                    flat: false,
                 },
             ),
         ],

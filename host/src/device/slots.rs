@@ -153,6 +153,11 @@ pub const POSITION: Type = Type::Vector {
     size: 4,
 };
 
+/// The type of a fragment's depth.
+pub const DEPTH: Type = Type::Scalar {
+    scalar: Scalar::F32,
+};
+
 /// A kernel's arguments in order: the bound parameters, attributes and varyings, then the
 /// outputs. On the native device these are all arguments, in every stage.
 #[must_use]
@@ -187,9 +192,20 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                 },
             ),
             Role::Texture { binding, texture } => (Some(*binding), Use::Texture(*texture)),
+            Role::StorageTexture {
+                binding,
+                format,
+                dimensions,
+            } => (
+                Some(*binding),
+                Use::StorageTexture {
+                    format: *format,
+                    dimensions: *dimensions,
+                },
+            ),
             Role::Sampler { binding } => (Some(*binding), Use::Sampler),
             Role::Attribute { location, ty } => (None, Use::Attribute(*location, ty)),
-            Role::Varying { location, ty } => (None, Use::Varying(*location, ty)),
+            Role::Varying { location, ty, .. } => (None, Use::Varying(*location, ty)),
             Role::Constant { .. } | Role::Index | Role::BuiltIn { .. } | Role::Shared { .. } => {
                 continue;
             }
@@ -215,6 +231,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                 },
             ),
             Output::Position => (None, Use::Interface(&POSITION)),
+            Output::Depth => (None, Use::Interface(&DEPTH)),
             Output::Varying { ty, .. } | Output::Target { ty, .. } => (None, Use::Interface(ty)),
         };
         let name = if kernel.outputs.len() == 1 {

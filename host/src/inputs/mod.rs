@@ -178,9 +178,14 @@ fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
         _ => TABLE,
     };
     let size = size.unwrap_or(FLAT);
+    // A volume that is written beside a flat range.
+    let volume = match kernel.stage {
+        Stage::Compute { dimensions: 3, .. } => size,
+        _ => VOLUME,
+    };
     let mut args: Vec<Input> = slots
         .iter()
-        .map(|s| input(s, &mut values, elements, table, size))
+        .map(|s| input(s, &mut values, elements, table, [size, volume]))
         .collect();
     if let Stage::Compute {
         range: Range::Uniform { param, offset },
@@ -236,7 +241,7 @@ fn input(
     values: &mut Values,
     elements: usize,
     table: usize,
-    size: [u32; 3],
+    [size, volume]: [[u32; 3]; 2],
 ) -> Input {
     let zeros =
         |count: usize| Input::Bytes(vec![0; count * slot.role.element_bytes().unwrap_or(0)]);
@@ -258,7 +263,7 @@ fn input(
         Use::Output(_) => zeros(elements),
         Use::StorageTexture { format, dimensions } => {
             let shape = if dimensions == 3 {
-                TextureShape::d3(size, format)
+                TextureShape::d3(volume, format)
             } else {
                 TextureShape::d2(size[0], size[1], format)
             };

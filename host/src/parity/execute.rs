@@ -7,8 +7,8 @@ use hankel_dsl::native::describe::{
 use super::capture;
 use crate::device::slots::{self, Slot, Use};
 use crate::device::{
-    Arithmetic, Bind, BufferId, Colour, Cull, Device, DeviceError, Draw, Pass, Program, Shader,
-    TextureId, TextureShape, Topology,
+    Arithmetic, Bind, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, Pass,
+    Program, Shader, TextureId, TextureShape, Topology,
 };
 use crate::inputs::{Case, Input};
 
@@ -33,7 +33,7 @@ pub enum ExecuteError {
 }
 
 /// Width of the targets that vertices and fragments are read back through.
-const WIDTH: u32 = 64;
+const WIDTH: u32 = hankel_dsl::native::fragment::COLUMNS;
 
 /// What a case holds on a device, freed at the end.
 #[derive(Default)]
@@ -231,12 +231,13 @@ fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), Execut
     Ok((scalar, size, text))
 }
 
-/// How a varying is declared: integers are never interpolated.
-const fn interpolation(scalar: Scalar) -> &'static str {
-    match scalar {
-        Scalar::F32 | Scalar::F64 => "",
-        Scalar::U32 | Scalar::I32 => "@interpolate(flat) ",
-    }
+/// How the varying at a location is declared.
+fn interpolation(kernel: &Kernel, at: u32) -> &'static str {
+    let flat = kernel
+        .params
+        .iter()
+        .any(|p| matches!(p.role, Role::Varying { location, flat: true, .. } if location == at));
+    if flat { "@interpolate(flat) " } else { "" }
 }
 
 /// The bytes of `count` values of `size` components out of texels of four.
@@ -249,11 +250,11 @@ fn narrowed(texels: &[u8], size: u32, count: usize) -> Vec<u8> {
         .collect()
 }
 
-fn pass<'a>(colours: &'a [Colour], draws: &'a [Draw<'a>]) -> Pass<'a> {
+fn pass<'a>(colours: &'a [Colour], depth: Option<Depth>, draws: &'a [Draw<'a>]) -> Pass<'a> {
     Pass {
         label: "parity",
         colours,
-        depth: None,
+        depth,
         draws,
     }
 }
@@ -277,8 +278,8 @@ fn fragment(
     for (slot, bind) in slots.iter().zip(&all) {
         match slot.role {
             Use::Varying(location, ty) => {
-                let (scalar, _, text) = interface(kernel, ty)?;
-                let flat = interpolation(scalar);
+                let (_, _, text) = interface(kernel, ty)?;
+                let flat = interpolation(kernel, location);
                 members.push_str(&format!(
                     "@location({location}) {flat}v{location}: {text},\n"
                 ));
@@ -294,6 +295,7 @@ fn fragment(
                 outputs.push(Output::Varying {
                     location,
                     ty: ty.clone(),
+                    flat: !flat.is_empty(),
                 });
                 vertex_args.push(*bind);
             }
@@ -312,9 +314,23 @@ fn fragment(
     );
     let points = helper("hankel_points", Stage::Vertex, params, outputs);
     let mut targets = Vec::new();
+    let (mut colours, mut depth) = (Vec::new(), None);
     for output in &kernel.outputs {
-        let Output::Target { ty, .. } = output else {
-            continue;
+        let ty = match output {
+            Output::Target { ty, .. } => ty,
+            Output::Depth => {
+                let id = device.texture("depth", &TextureShape::depth(WIDTH, height))?;
+                held.textures.push(id);
+                targets.push((id, TexelFormat::R32Float));
+                depth = Some(Depth {
+                    texture: id,
+                    clear: Some(0.0),
+                    test: DepthTest::Always,
+                    write: true,
+                });
+                continue;
+            }
+            _ => continue,
         };
         let (scalar, size, _) = interface(kernel, ty)?;
         let format = match (scalar, size) {
@@ -332,15 +348,12 @@ fn fragment(
         let id = device.texture("target", &TextureShape::d2(WIDTH, height, format))?;
         held.textures.push(id);
         targets.push((id, format));
-    }
-    let colours: Vec<Colour> = targets
-        .iter()
-        .map(|&(texture, _)| Colour {
-            texture,
+        colours.push(Colour {
+            texture: id,
             resolve: None,
             clear: Some([0.0; 4]),
-        })
-        .collect();
+        });
+    }
     let draw = Draw {
         vertex: Program {
             kernel: &points,
@@ -359,7 +372,7 @@ fn fragment(
         topology: Topology::Points,
         cull: Cull::None,
     };
-    device.draw(&pass(&colours, &[draw]))?;
+    device.draw(&pass(&colours, depth, &[draw]))?;
     targets
         .into_iter()
         .map(|(id, format)| {
@@ -400,6 +413,7 @@ fn vertex(
             Output::Position => Output::Varying {
                 location: captured.location,
                 ty: slots::POSITION,
+                flat: false,
             },
             other => other.clone(),
         })
@@ -416,7 +430,7 @@ fn vertex(
     held.textures.push(integers);
     let mut written = Vec::new();
     for output in &captured_kernel.outputs {
-        let Output::Varying { location, ty } = output else {
+        let Output::Varying { location, ty, .. } = output else {
             return Err(bad(
                 kernel,
                 "a vertex stage writes a position and varyings only",
@@ -462,6 +476,7 @@ fn vertex(
                 role: Role::Varying {
                     location: *location,
                     ty: ty.clone(),
+                    flat: true,
                 },
             }],
             vec![Output::Target {
@@ -494,7 +509,7 @@ fn vertex(
             resolve: None,
             clear: Some([0.0; 4]),
         }];
-        device.draw(&pass(&colours, &[draw]))?;
+        device.draw(&pass(&colours, None, &[draw]))?;
         written.push(narrowed(
             &device.read_texture(texture)?,
             size,

@@ -538,6 +538,7 @@ pub fn place() -> Sample {
             Output::Varying {
                 location: 0,
                 ty: vector(f, 4),
+                flat: false,
             },
         ],
     );
@@ -603,6 +604,7 @@ pub fn tint() -> Sample {
                 Role::Varying {
                     location: 0,
                     ty: vector(f, 4),
+                    flat: false,
                 },
             ),
         ],

@@ -60,7 +60,9 @@ mod memory;
 #[cfg(not(target_arch = "spirv"))]
 pub mod native;
 mod real;
+mod stage;
 mod storage;
+mod storage_texture;
 mod texture;
 mod unroll;
 mod workgroup;
@@ -73,7 +75,12 @@ pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]
 pub use spirv_std;
+pub use stage::{
+    Depth, Derivative, Flat, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine,
+    fwidth, fwidth_coarse, fwidth_fine,
+};
 pub use storage::{StorageMut, Stored};
+pub use storage_texture::{Format, StorageTexture2d, StorageTexture3d, format};
 pub use texture::{Sampler, Texel, Texture2d, Texture2dMultisampled, Texture3d};
 pub use workgroup::{Shared, SharedAtomics, barrier, storage_barrier};
 

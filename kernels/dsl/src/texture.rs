@@ -105,6 +105,10 @@ mod spirv {
         pub fn sample(self, sampler: Sampler, uv: Vec2) -> Vec4 {
             self.0.sample_by_lod(sampler.0, uv, 0.0)
         }
+        #[inline(always)]
+        pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, uv: Vec2) -> Vec4 {
+            self.0.gather(sampler.0, uv, CHANNEL)
+        }
     }
 
     impl<'a> Texture2dMultisampled<'a> {
@@ -184,6 +188,22 @@ mod host {
         #[must_use]
         pub fn sample(self, sampler: Sampler, uv: Vec2) -> Vec4 {
             filter(&self.0, sampler.0, Vec3::new(uv.x, uv.y, 0.5))
+        }
+        /// Channel `CHANNEL` (0 to 3) of the four texels that a linear filter reads at `uv`: lower
+        /// left, lower right, upper right, upper left, where the first row is the upper one. Which
+        /// four they are is rounded to 8 bits on hardware: stay away from the middle of texels.
+        #[inline]
+        #[must_use]
+        pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, uv: Vec2) -> Vec4 {
+            const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
+            let size = [self.0.size[0], self.0.size[1]];
+            let base = [0, 1].map(|d| (uv[d] * size[d] as f32 - 0.5).floor() as i64);
+            let tap = |dx: i64, dy: i64| {
+                let at = [base[0] + dx, base[1] + dy];
+                let at = [0, 1].map(|d| wrap(at[d], size[d], sampler.0.address));
+                texel(&self.0, UVec3::new(at[0], at[1], 0), 0)[CHANNEL as usize]
+            };
+            Vec4::new(tap(0, 1), tap(1, 1), tap(1, 0), tap(0, 0))
         }
     }
 

@@ -6,7 +6,8 @@ use syn::spanned::Spanned;
 
 use crate::general::{Form, own};
 use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Texture, Variant};
-use crate::shader::{output_name, texture_type};
+use crate::shader::{output_name, storage_texture_type, texture_type};
+use crate::stage::{Passed, Returned};
 use crate::twin;
 
 impl Kernel {
@@ -52,7 +53,7 @@ impl Kernel {
                 )]
                 #[must_use]
                 pub fn entries() -> ::hankel_dsl::native::Entries {
-                    use ::hankel_dsl::native::{self, describe, exec, layout, workgroup};
+                    use ::hankel_dsl::native::{self, describe, exec, fragment, layout, workgroup};
                     #uniforms
                     #twin
                     let mut all = native::Entries::new();
@@ -189,6 +190,11 @@ impl Kernel {
                         };
                         quote!(Texture { binding: #b, texture: describe::TextureKind::#kind })
                     }
+                    Role::StorageTexture { dimensions, format } => quote!(StorageTexture {
+                        binding: #b,
+                        format: <#format as ::hankel_dsl::Format>::FORMAT,
+                        dimensions: #dimensions,
+                    }),
                     Role::Sampler => quote!(Sampler { binding: #b }),
                     Role::Constant { id, default } => {
                         quote!(Constant { id: #id, default: #default })
@@ -206,8 +212,13 @@ impl Kernel {
                     Role::Attribute(ty) => {
                         quote!(Attribute { location: #l, ty: <#ty as layout::Element>::ty() })
                     }
-                    Role::Varying(ty) => {
-                        quote!(Varying { location: #l, ty: <#ty as layout::Element>::ty() })
+                    Role::Varying(passed) => {
+                        let (ty, flat) = (&passed.ty, passed.flat());
+                        quote!(Varying {
+                            location: #l,
+                            ty: <#ty as layout::Element>::ty(),
+                            flat: #flat,
+                        })
                     }
                 };
                 quote!(describe::Param { name: #name.into(), role: describe::Role::#role })
@@ -216,45 +227,31 @@ impl Kernel {
     }
 
     fn describe_outputs(&self, variant: &Variant) -> Vec<TokenStream> {
+        if !matches!(self.stage, Stage::Compute(_)) {
+            return self.returned().iter().map(Returned::describe).collect();
+        }
         let binding = self.params.iter().filter(|p| p.role.is_bound()).count() as u32;
         self.outputs
             .iter()
             .enumerate()
             .map(|(i, ty)| {
-                let i = i as u32;
-                match &self.stage {
-                    Stage::Vertex if i == 0 => quote!(describe::Output::Position),
-                    Stage::Vertex => {
-                        let location = i - 1;
-                        quote!(describe::Output::Varying {
-                            location: #location,
-                            ty: <#ty as layout::Element>::ty(),
+                let binding = binding + i as u32;
+                match self.output_format(i, variant) {
+                    Some(format) => {
+                        let format = format_ident!("{}", format.variant);
+                        let dimensions = self.dimensions() as u32;
+                        quote!(describe::Output::Texture {
+                            binding: #binding,
+                            format: describe::TexelFormat::#format,
+                            dimensions: #dimensions,
                         })
                     }
-                    Stage::Fragment => quote!(describe::Output::Target {
-                        location: #i,
-                        ty: <#ty as layout::Element>::ty(),
-                    }),
-                    Stage::Compute(_) => {
-                        let binding = binding + i;
-                        match self.output_format(i as usize, variant) {
-                            Some(format) => {
-                                let format = format_ident!("{}", format.variant);
-                                let dimensions = self.dimensions() as u32;
-                                quote!(describe::Output::Texture {
-                                    binding: #binding,
-                                    format: describe::TexelFormat::#format,
-                                    dimensions: #dimensions,
-                                })
-                            }
-                            None => {
-                                let ty = self.concrete(ty, variant);
-                                quote!(describe::Output::Buffer {
-                                    binding: #binding,
-                                    layout: <#ty as layout::Element>::layout(),
-                                })
-                            }
-                        }
+                    None => {
+                        let ty = self.concrete(ty, variant);
+                        quote!(describe::Output::Buffer {
+                            binding: #binding,
+                            layout: <#ty as layout::Element>::layout(),
+                        })
                     }
                 }
             })
@@ -287,7 +284,7 @@ impl Kernel {
                     let ty = self.concrete(ty, variant);
                     quote!(let #name = args.slice::<#ty>(#text)?;)
                 }
-                Role::Attribute(ty) | Role::Varying(ty) => {
+                Role::Attribute(ty) | Role::Varying(Passed { ty, .. }) => {
                     quote!(let #name = args.slice::<#ty>(#text)?;)
                 }
                 Role::ElementMut(ty) | Role::StorageMut { ty, .. } => {
@@ -304,6 +301,14 @@ impl Kernel {
                 Role::Texture(t) => {
                     let (multisampled, flat) = (*t == Texture::Multisampled, *t != Texture::Volume);
                     quote!(let #name = args.texture(#text, #multisampled, #flat)?;)
+                }
+                Role::StorageTexture { dimensions, format } => {
+                    let ty = storage_texture_type(*dimensions);
+                    quote! {
+                        let #name = #ty::<#format>::new(
+                            args.texels(#text, <#format as ::hankel_dsl::Format>::FORMAT)?,
+                        );
+                    }
                 }
                 Role::Sampler => quote!(let #name = args.sampler(#text)?;),
                 Role::Constant { .. } => quote!(let #name = args.constant();),
@@ -336,14 +341,17 @@ impl Kernel {
                     quote!(__it.number.and_then(|n| #name.get(n as usize)).copied())
                 }
                 Role::Element(_) if form == Form::General => quote!(#name[__number as usize]),
-                Role::Element(_) | Role::Attribute(_) | Role::Varying(_) => quote!(#name[i]),
+                Role::Element(_) | Role::Attribute(_) => quote!(#name[i]),
+                Role::Varying(passed) => passed.wrap(&quote!(#name[i])),
                 Role::Uniform(_) | Role::Constant { .. } => quote!(#name),
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
                 Role::ElementMut(_) => {
                     let own = own(p);
                     quote!(&mut #own)
                 }
-                Role::StorageMut { .. } | Role::Atomic { .. } => quote!(#name),
+                Role::StorageMut { .. } | Role::StorageTexture { .. } | Role::Atomic { .. } => {
+                    quote!(#name)
+                }
                 Role::Texture(t) => {
                     let ty = texture_type(*t);
                     quote!(#ty::new(#name))
@@ -359,6 +367,7 @@ impl Kernel {
                 Role::BuiltIn(BuiltIn::LocalId) => self.host_place(&quote!(__it.local)),
                 Role::BuiltIn(BuiltIn::GroupId) => self.host_place(&quote!(__it.group)),
                 Role::BuiltIn(BuiltIn::GroupCount) => self.host_place(&quote!(__it.groups)),
+                Role::BuiltIn(built_in) => built_in.on_host(),
                 Role::Shared { .. } => quote!(#name),
             }
         });
@@ -523,8 +532,9 @@ impl Kernel {
         let names: Vec<_> = (0..self.outputs.len())
             .map(|i| output_name(&self.stage, i))
             .collect();
-        let takes = names.iter().zip(&self.outputs).map(|(name, ty)| {
-            let text = name.to_string();
+        let returned = self.returned();
+        let takes = names.iter().zip(&returned).map(|(name, returned)| {
+            let (ty, text) = (returned.ty(), name.to_string());
             quote!(let #name = args.slice_mut::<#ty>(#text)?;)
         });
         let first = &names[0];
@@ -532,17 +542,31 @@ impl Kernel {
             let text = name.to_string();
             quote!(exec::enough(#text, #name.len(), count)?;)
         });
-        let value = if names.len() == 1 {
-            quote!((#call,))
-        } else {
-            call
+        let values: Vec<_> = (0..names.len())
+            .map(|i| format_ident!("__value{i}"))
+            .collect();
+        let stored = returned.iter().zip(&values);
+        let stored = stored.map(|(it, value)| it.stored_on_host(value));
+        let pattern = match &values[..] {
+            [one] => quote!(#one),
+            _ => quote!((#(#values),*)),
+        };
+        let value = quote!({
+            let #pattern = #call;
+            (#(#stored,)*)
+        });
+        let map = match self.stage {
+            Stage::Fragment => {
+                quote!(fragment::map_fragments(mode, (#(#names,)*), |i, __fragment| #value))
+            }
+            _ => quote!(exec::map_tuple(mode, (#(#names,)*), |i| #value)),
         };
         quote! {
             #(#takes)*
             let count = #first.len();
             #(#same)*
             #checks
-            exec::map_tuple(mode, (#(#names,)*), |i| #value)
+            #map
         }
     }
 }

@@ -13,6 +13,7 @@ use syn::{
 use crate::element::{replace, summary};
 use crate::general::Form;
 use crate::range::Range;
+use crate::stage::Passed;
 use crate::twin;
 
 /// A kernel function.
@@ -155,6 +156,10 @@ pub enum Role {
         unordered: bool,
     },
     Texture(Texture),
+    StorageTexture {
+        dimensions: u32,
+        format: Type,
+    },
     Sampler,
     Constant {
         id: u32,
@@ -168,7 +173,7 @@ pub enum Role {
         atomic: bool,
     },
     Attribute(Type),
-    Varying(Type),
+    Varying(Passed),
 }
 
 /// What the device knows of an invocation.
@@ -178,14 +183,24 @@ pub enum BuiltIn {
     LocalIndex,
     GroupId,
     GroupCount,
+    VertexIndex,
+    InstanceIndex,
+    FragCoord,
+    FrontFacing,
+    SampleIndex,
 }
 
 /// Each by the word of its attribute.
-const BUILT_INS: [(&str, BuiltIn); 4] = [
+const BUILT_INS: [(&str, BuiltIn); 9] = [
     ("local_id", BuiltIn::LocalId),
     ("local_index", BuiltIn::LocalIndex),
     ("group_id", BuiltIn::GroupId),
     ("group_count", BuiltIn::GroupCount),
+    ("vertex_index", BuiltIn::VertexIndex),
+    ("instance_index", BuiltIn::InstanceIndex),
+    ("frag_coord", BuiltIn::FragCoord),
+    ("front_facing", BuiltIn::FrontFacing),
+    ("sample_index", BuiltIn::SampleIndex),
 ];
 
 impl BuiltIn {
@@ -198,6 +213,11 @@ impl BuiltIn {
                 Self::LocalIndex => "LocalIndex",
                 Self::GroupId => "GroupId",
                 Self::GroupCount => "GroupCount",
+                Self::VertexIndex => "VertexIndex",
+                Self::InstanceIndex => "InstanceIndex",
+                Self::FragCoord => "FragCoord",
+                Self::FrontFacing => "FrontFacing",
+                Self::SampleIndex => "SampleIndex",
             }
         )
     }
@@ -222,6 +242,7 @@ impl Role {
                 | Self::StorageMut { .. }
                 | Self::Atomic { .. }
                 | Self::Texture(_)
+                | Self::StorageTexture { .. }
                 | Self::Sampler
         )
     }
@@ -230,7 +251,7 @@ impl Role {
 /// Variables of the generated code.
 const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
 
-const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, shared, attribute, varying";
+const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
 
 impl Kernel {
     pub fn parse(args: TokenStream, mut item: ItemFn) -> syn::Result<Self> {
@@ -359,20 +380,26 @@ impl Kernel {
                     Role::Element(_)
                     | Role::ElementMut(_)
                     | Role::StorageMut { .. }
+                    | Role::StorageTexture { .. }
                     | Role::Index
                     | Role::Atomic { .. },
                     Stage::Vertex | Stage::Fragment,
                 ) => {
                     return error(
                         span,
-                        "elements, indices, atomics and buffers that are written belong to compute kernels",
+                        "elements, indices, atomics, buffers and textures that are written belong to compute kernels",
                     );
                 }
-                (Role::Shared { .. } | Role::BuiltIn(_), Stage::Vertex | Stage::Fragment) => {
+                (Role::Shared { .. }, Stage::Vertex | Stage::Fragment) => {
                     return error(
                         span,
                         "workgroups and their memory belong to compute kernels",
                     );
+                }
+                (Role::BuiltIn(built_in), stage) => {
+                    if let Some(problem) = built_in.foreign_to(stage) {
+                        return error(span, problem);
+                    }
                 }
                 _ => {}
             }
@@ -421,7 +448,10 @@ impl Kernel {
             let writes = self.params.iter().any(|p| {
                 matches!(
                     p.role,
-                    Role::Atomic { .. } | Role::ElementMut(_) | Role::StorageMut { .. }
+                    Role::Atomic { .. }
+                        | Role::ElementMut(_)
+                        | Role::StorageMut { .. }
+                        | Role::StorageTexture { .. }
                 )
             });
             if !writes {
@@ -626,6 +656,14 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 unordered: unordered(&role)?,
             }
         }
+        "texture" if argument(ty, "StorageTexture2d").is_some() => Role::StorageTexture {
+            dimensions: 2,
+            format: argument(ty, "StorageTexture2d").unwrap_or_else(|| ty.clone()),
+        },
+        "texture" if argument(ty, "StorageTexture3d").is_some() => Role::StorageTexture {
+            dimensions: 3,
+            format: argument(ty, "StorageTexture3d").unwrap_or_else(|| ty.clone()),
+        },
         "texture" => Role::Texture(
             match last_segment(ty).map(|s| s.ident.to_string()).as_deref() {
                 Some("Texture2d") => Texture::Flat,
@@ -634,7 +672,7 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 _ => {
                     return Err(syn::Error::new(
                         ty.span(),
-                        "a texture is `Texture2d<'_>`, `Texture2dMultisampled<'_>` or `Texture3d<'_>`",
+                        "a texture is `Texture2d<'_>`, `Texture2dMultisampled<'_>` or `Texture3d<'_>`; one that is written is `StorageTexture2d<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
                     ));
                 }
             },
@@ -664,7 +702,7 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
         "index" => Role::Index,
         "shared" => shared(ty)?,
         "attribute" => Role::Attribute(ty.clone()),
-        "varying" => Role::Varying(ty.clone()),
+        "varying" => Role::Varying(Passed::of(ty)),
         word => match BUILT_INS.iter().find(|(name, _)| *name == word) {
             Some((_, built_in)) => Role::BuiltIn(*built_in),
             None => return Err(syn::Error::new(role.span(), "this role is not known")),
@@ -686,7 +724,7 @@ fn unordered(role: &Attribute) -> syn::Result<bool> {
     }
 }
 
-fn last_segment(ty: &Type) -> Option<&syn::PathSegment> {
+pub fn last_segment(ty: &Type) -> Option<&syn::PathSegment> {
     match ty {
         Type::Path(p) => p.path.segments.last(),
         _ => None,
@@ -694,7 +732,7 @@ fn last_segment(ty: &Type) -> Option<&syn::PathSegment> {
 }
 
 /// `T` of `NAME<'_, T>`.
-fn argument(ty: &Type, name: &str) -> Option<Type> {
+pub fn argument(ty: &Type, name: &str) -> Option<Type> {
     let segment = last_segment(ty).filter(|s| s.ident == name)?;
     let syn::PathArguments::AngleBracketed(args) = &segment.arguments else {
         return None;

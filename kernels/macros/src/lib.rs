@@ -9,6 +9,7 @@ mod kernel;
 mod list;
 mod range;
 mod shader;
+mod stage;
 mod twin;
 
 use proc_macro::TokenStream;
@@ -48,11 +49,16 @@ use syn::parse_macro_input;
 /// | `#[local_index] x: u32` | the invocation's number in its workgroup |
 /// | `#[shared] x: Shared<'_, T, N>` | memory of the workgroup; `SharedAtomics<'_, u32, N>` (or `i32`) for atomic operations |
 /// | `#[attribute] x: Vec3` | a vertex attribute |
-/// | `#[varying] x: Vec3` | an interpolated value |
+/// | `#[varying] x: Vec3` | an interpolated value; integers and [`Flat<f32>`](struct@Flat) are that of one vertex |
+/// | `#[vertex_index]`, `#[instance_index] x: u32` | the vertex's number, its instance's |
+/// | `#[frag_coord] x: Vec3` | the centre of the fragment's pixel in the target, and its depth |
+/// | `#[front_facing] x: bool` | whether the fragment's primitive faces the viewer |
+/// | `#[sample_index] x: u32` | the sample that the fragment is for |
 ///
 /// A compute kernel returns what it computes, or a tuple of it; or nothing, if it writes to its
 /// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
-/// fragment kernel one colour or a tuple of them.
+/// fragment kernel one colour or a tuple of them, among which may be a [`Depth`](struct@Depth). It may
+/// [`discard`](fn@discard) the fragment and take derivatives ([`dpdx`](fn@dpdx)).
 ///
 /// # Kinds of compute kernels
 /// A map reads what it likes and returns its own element: it cannot race.

@@ -37,14 +37,17 @@ impl Kernel {
             }
             Stage::Vertex => (
                 quote!(vertex(entry_point_name = #entry)),
-                TokenStream::new(),
+                self.stage_builtins(),
                 self.interface_body(variant),
             ),
-            Stage::Fragment => (
-                quote!(fragment(entry_point_name = #entry)),
-                TokenStream::new(),
-                self.interface_body(variant),
-            ),
+            Stage::Fragment => {
+                let depth = self.returns_depth().then(|| quote!(depth_replacing,));
+                (
+                    quote!(fragment(#depth entry_point_name = #entry)),
+                    self.stage_builtins(),
+                    self.interface_body(variant),
+                )
+            }
         };
         let params = self.shader_params(variant);
         let outputs = self.shader_outputs(variant);
@@ -131,13 +134,24 @@ impl Kernel {
                     };
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::image::#ty,)
                 }
+                Role::StorageTexture { dimensions, format } => {
+                    let shape = storage_shape(*dimensions);
+                    quote! {
+                        #[spirv(descriptor_set = 0, binding = #here)]
+                        #name: &<#format as ::hankel_dsl::Format>::#shape,
+                    }
+                }
                 Role::Sampler => {
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::spirv_std::Sampler,)
                 }
                 Role::Constant { id, default } => {
                     quote!(#[spirv(spec_constant(id = #id, default = #default))] #name: u32,)
                 }
-                Role::Attribute(ty) | Role::Varying(ty) => quote!(#name: #ty,),
+                Role::Attribute(ty) => quote!(#name: #ty,),
+                Role::Varying(passed) => {
+                    let (decoration, ty) = (passed.decoration(), &passed.ty);
+                    quote!(#decoration #name: #ty,)
+                }
                 Role::Shared { ty, length, .. } => {
                     quote!(#[spirv(workgroup)] #name: &mut [#ty; #length],)
                 }
@@ -165,16 +179,13 @@ impl Kernel {
                 }).collect()
             }
             stage => self
-                .outputs
+                .returned()
                 .iter()
                 .enumerate()
-                .map(|(i, ty)| {
-                    let name = output_name(stage, i);
-                    if matches!(stage, Stage::Vertex) && i == 0 {
-                        quote!(#[spirv(position)] #name: &mut #ty,)
-                    } else {
-                        quote!(#name: &mut #ty,)
-                    }
+                .map(|(i, returned)| {
+                    let (name, ty) = (output_name(stage, i), returned.ty());
+                    let decoration = returned.decoration();
+                    quote!(#decoration #name: &mut #ty,)
                 })
                 .collect(),
         }
@@ -206,17 +217,19 @@ impl Kernel {
                     let own = own(p);
                     quote!(&mut #own)
                 }
-                Role::Uniform(_)
-                | Role::Constant { .. }
-                | Role::Attribute(_)
-                | Role::Varying(_) => {
+                Role::Uniform(_) | Role::Constant { .. } | Role::Attribute(_) => {
                     quote!(#name)
                 }
+                Role::Varying(passed) => passed.wrap(&quote!(#name)),
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
                 Role::StorageMut { .. } => quote!(::hankel_dsl::StorageMut::new(&*#name)),
                 Role::Atomic { .. } => quote!(::hankel_dsl::Atomics::new(&*#name)),
                 Role::Texture(t) => {
                     let ty = texture_type(*t);
+                    quote!(#ty::new(#name))
+                }
+                Role::StorageTexture { dimensions, .. } => {
+                    let ty = storage_texture_type(*dimensions);
                     quote!(#ty::new(#name))
                 }
                 Role::Sampler => quote!(::hankel_dsl::Sampler::new(#name)),
@@ -229,6 +242,11 @@ impl Kernel {
                 Role::BuiltIn(BuiltIn::LocalId) => self.of_dimensions(&quote!(__local_id)),
                 Role::BuiltIn(BuiltIn::GroupId) => self.of_dimensions(&quote!(__group_id)),
                 Role::BuiltIn(BuiltIn::GroupCount) => quote!(__groups),
+                // What lies in w differs from device to device.
+                Role::BuiltIn(BuiltIn::FragCoord) => {
+                    quote!(::hankel_dsl::glam::Vec4::truncate(#name))
+                }
+                Role::BuiltIn(_) => quote!(#name),
             }
         });
         quote!(super::super::#name #generics (#(#args),*))
@@ -271,15 +289,21 @@ impl Kernel {
         let names: Vec<Ident> = (0..self.outputs.len())
             .map(|i| output_name(&self.stage, i))
             .collect();
-        if let [name] = &names[..] {
-            return quote!(*#name = #call;);
-        }
         let values: Vec<Ident> = (0..names.len())
             .map(|i| format_ident!("value{i}"))
             .collect();
+        let stored = self.returned();
+        let stored = stored
+            .iter()
+            .zip(&values)
+            .map(|(it, value)| it.stored(value));
+        let pattern = match &values[..] {
+            [one] => quote!(#one),
+            _ => quote!((#(#values),*)),
+        };
         quote! {
-            let (#(#values),*) = #call;
-            #(*#names = #values;)*
+            let #pattern = #call;
+            #(*#names = #stored;)*
         }
     }
 }
@@ -300,4 +324,18 @@ pub fn texture_type(t: Texture) -> TokenStream {
         Texture::Multisampled => quote!(::hankel_dsl::Texture2dMultisampled),
         Texture::Volume => quote!(::hankel_dsl::Texture3d),
     }
+}
+
+/// The DSL's type of a texture that is written.
+pub fn storage_texture_type(dimensions: u32) -> TokenStream {
+    if dimensions == 2 {
+        quote!(::hankel_dsl::StorageTexture2d)
+    } else {
+        quote!(::hankel_dsl::StorageTexture3d)
+    }
+}
+
+/// Which of a format's types in SPIR-V it is.
+fn storage_shape(dimensions: u32) -> Ident {
+    format_ident!("{}", if dimensions == 2 { "Flat" } else { "Volume" })
 }

@@ -527,6 +527,29 @@ impl Context {
         })
     }
 
+    /// A depth buffer, to be drawn into and then read as a texture.
+    pub(super) fn depth(&mut self, size: [u32; 2]) -> Result<Texture, String> {
+        let [width, height, _] = lengths([size[0], size[1], 1])?;
+        let raw = gl!(self, create_texture())?;
+        self.made.push(Made::Texture(raw));
+        let target = glow::TEXTURE_2D;
+        gl!(self, active_texture(glow::TEXTURE0 + MAKING));
+        gl!(self, bind_texture(target, Some(raw)));
+        let internal = glow::DEPTH_COMPONENT32F;
+        gl!(self, tex_storage_2d(target, 1, internal, width, height));
+        for what in [glow::TEXTURE_MIN_FILTER, glow::TEXTURE_MAG_FILTER] {
+            gl!(self, tex_parameter_i32(target, what, glow::NEAREST as i32));
+        }
+        gl!(self, bind_texture(target, None));
+        self.check("making a depth buffer")?;
+        Ok(Texture {
+            raw,
+            target,
+            texel: Texel::named("depth32float")?,
+            size: [size[0], size[1], 1],
+        })
+    }
+
     /// A multisampled texture, to be drawn into.
     pub(super) fn multisampled(
         &mut self,
@@ -685,10 +708,12 @@ impl Context {
         }
     }
 
-    /// Binds a framebuffer with these colour attachments, by number, and a viewport of `size`.
+    /// Binds a framebuffer with these colour attachments, by number, this depth buffer, cleared to 0,
+    /// and a viewport of `size`.
     pub(super) fn draw_into(
         &mut self,
         targets: &[(u32, Texture)],
+        depth: Option<Texture>,
         size: [u32; 2],
     ) -> Result<(), String> {
         self.framebuffer()?;
@@ -702,6 +727,24 @@ impl Context {
             buffers[number as usize] = glow::COLOR_ATTACHMENT0 + number;
         }
         gl!(self, draw_buffers(&buffers));
+        if let Some(depth) = depth {
+            gl!(
+                self,
+                framebuffer_texture_2d(
+                    glow::FRAMEBUFFER,
+                    glow::DEPTH_ATTACHMENT,
+                    depth.target,
+                    Some(depth.raw),
+                    0
+                )
+            );
+            gl!(self, enable(glow::DEPTH_TEST));
+            gl!(self, depth_func(glow::ALWAYS));
+            gl!(self, depth_mask(true));
+            gl!(self, clear_buffer_f32_slice(glow::DEPTH, 0, &[0.0]));
+        } else {
+            gl!(self, disable(glow::DEPTH_TEST));
+        }
         self.complete()?;
         gl!(
             self,

@@ -8,9 +8,9 @@ use super::context::{Attribute, Buffer, Context, Program, Texture};
 use super::texels::{self, Texel};
 use super::text::{self, Variable};
 
-/// Width of what fragments are drawn into, one pixel each. A power of two: a pixel's centre is
-/// then no rounded number.
-const WIDEST: u32 = 1024;
+/// Width of what fragments are drawn into, one pixel each: as in every column. A power of two: a
+/// pixel's centre is then no rounded number.
+const WIDTH: u32 = hankel_dsl::native::fragment::COLUMNS;
 
 /// Hands a texture on, whose samples lie side by side, to the samples of another.
 const SPREAD: &str = "#version 320 es
@@ -211,7 +211,7 @@ fn stage_before(job: &Job, code: &str) -> Result<(String, Vec<usize>), String> {
     }
     let stage = format!(
         "{declared}void main() {{\n{body}    gl_PointSize = 1.0;\n    \
-         gl_Position = vec4(a_place, 0.0, 1.0);\n}}\n"
+         gl_Position = vec4(a_place, -1.0, 1.0);\n}}\n"
     );
     Ok((stage, taken))
 }
@@ -314,6 +314,7 @@ impl<'a> Run<'a> {
                 | Role::Varying { .. }
                 | Role::Position
                 | Role::Passed { .. }
+                | Role::Depth
                 | Role::Target { .. },
                 _,
             ) => None,
@@ -343,7 +344,8 @@ impl<'a> Run<'a> {
         self.context.set_number(program, "u_samples", 0)?;
         self.context.set_number(program, "u_count", samples)?;
         self.context.bind_texture(0, flat);
-        self.context.draw_into(&[(0, into)], [size[0], size[1]])?;
+        self.context
+            .draw_into(&[(0, into)], None, [size[0], size[1]])?;
         self.context.draw(glow::TRIANGLES, 3, &[])?;
         Ok(into)
     }
@@ -465,7 +467,7 @@ impl<'a> Run<'a> {
             // Nothing is drawn, but OpenGL wants something to draw into.
             let texel = Texel::named("rgba8unorm")?;
             let target = self.context.texture(texel, 2, [1; 3], None)?;
-            self.context.draw_into(&[(0, target)], [1; 2])?;
+            self.context.draw_into(&[(0, target)], None, [1; 2])?;
             self.context
                 .capture(self.case.invocations, stride, &attributes)?
         };
@@ -483,7 +485,7 @@ impl<'a> Run<'a> {
 
     fn fragments(&mut self, written: &mut [Option<Written>]) -> Result<(), String> {
         let count = self.case.invocations;
-        let width = count.clamp(1, WIDEST).next_power_of_two();
+        let width = WIDTH;
         let height = count.div_ceil(width).max(1).next_power_of_two();
         let centre = |at: u32, of: u32| (2 * at + 1) as f32 / of as f32 - 1.0;
         let places: Vec<u8> = (0..count)
@@ -503,6 +505,7 @@ impl<'a> Run<'a> {
         }
         let mut targets = Vec::new();
         let mut slots = Vec::new();
+        let mut depth = None;
         for (i, slot) in self.job.slots.iter().enumerate() {
             if let Role::Target { location, value } = slot.role {
                 let texel = Texel::named(match value.scalar {
@@ -510,14 +513,28 @@ impl<'a> Run<'a> {
                     Scalar::U32 => "rgba32uint",
                     Scalar::I32 => "rgba32sint",
                 })?;
+                // What is discarded stays as it is.
+                let zeros = vec![0; (width * height * 16) as usize];
                 let size = [width, height, 1];
-                targets.push((location, self.context.texture(texel, 2, size, None)?));
+                let target = self.context.texture(texel, 2, size, Some(&zeros))?;
+                targets.push((location, target));
                 slots.push((i, value.size as usize * 4));
             }
+            if matches!(slot.role, Role::Depth) {
+                depth = Some((i, self.context.depth([width, height])?));
+            }
         }
-        self.context.draw_into(&targets, [width, height])?;
+        let attached = depth.map(|it| it.1);
+        self.context
+            .draw_into(&targets, attached, [width, height])?;
         if count > 0 {
             self.context.draw(glow::POINTS, count, &attributes)?;
+        }
+        if let Some((slot, depth)) = depth {
+            let pixels = self.depths(depth, [width, height])?;
+            let values = pixels.chunks_exact(16).take(count as usize);
+            let values = values.flat_map(|it| &it[..4]).copied().collect();
+            written[slot] = Some(Written::Bytes(values));
         }
         for ((_, target), (slot, bytes)) in targets.into_iter().zip(slots) {
             let pixels = self.context.read_texture(target)?;
@@ -528,6 +545,29 @@ impl<'a> Run<'a> {
             written[slot] = Some(Written::Bytes(values.copied().collect()));
         }
         Ok(())
+    }
+}
+
+impl Run<'_> {
+    /// What a depth buffer holds, as the first of four floats each: OpenGL ES does not read it as it
+    /// is.
+    fn depths(&mut self, depth: Texture, size: [u32; 2]) -> Result<Vec<u8>, String> {
+        let texel = Texel::named("rgba32float")?;
+        let into = self
+            .context
+            .texture(texel, 2, [size[0], size[1], 1], None)?;
+        let stages = [
+            (glow::VERTEX_SHADER, COVER),
+            (glow::FRAGMENT_SHADER, SPREAD),
+        ];
+        let program = self.context.program(&stages, &[])?;
+        self.context.use_program(program);
+        self.context.set_number(program, "u_samples", 0)?;
+        self.context.set_number(program, "u_count", 1)?;
+        self.context.bind_texture(0, depth);
+        self.context.draw_into(&[(0, into)], None, size)?;
+        self.context.draw(glow::TRIANGLES, 3, &[])?;
+        self.context.read_texture(into)
     }
 }
 

@@ -45,6 +45,8 @@ template <class T> struct number_of<metal::vec<T, 3>> {
 };
 template <class P> P number(const uint (&v)[3]) { return number_of<P>::of(v); }
 
+template <class P> P vector(const float (&v)[4]) { return P(v[0], v[1], v[2], v[3]); }
+
 // The bytes of a scalar or vector without its padding.
 template <class T> struct packed_size { static constexpr size_t value = sizeof(T); };
 template <class T, int N> struct packed_size<metal::vec<T, N>> {

@@ -245,6 +245,10 @@ fn stream(role: &Role) -> Option<Value> {
         | Role::Varying { value, .. }
         | Role::Passed { value, .. }
         | Role::Target { value, .. } => Some(value),
+        Role::Depth => Some(Value {
+            scalar: Scalar::F32,
+            size: 1,
+        }),
         Role::Position => Some(Value {
             scalar: Scalar::F32,
             size: 4,
@@ -284,7 +288,7 @@ fn plan(job: &Job) -> Result<String, Failure> {
             Role::Texture { .. } | Role::StorageTexture { .. } => "texture",
             Role::Sampler => "sampler",
             Role::Attribute { .. } | Role::Varying { .. } => "in",
-            Role::Position | Role::Passed { .. } | Role::Target { .. } => "out",
+            Role::Position | Role::Passed { .. } | Role::Depth | Role::Target { .. } => "out",
         };
         let name: String = slot
             .name
@@ -354,7 +358,7 @@ fn plan_arg(plan: &mut String, slot: &Slot, arg: &Arg) -> Result<(), Failure> {
             }
             writeln!(plan, "{format} {x} {y} {z} {samples} {offset} {length}")
         }
-        (Role::Position | Role::Passed { .. } | Role::Target { .. }, _) => {
+        (Role::Position | Role::Passed { .. } | Role::Depth | Role::Target { .. }, _) => {
             writeln!(plan, "{}", stride.unwrap_or_default())
         }
         (Role::Attribute { .. } | Role::Varying { .. }, Arg::Bytes { offset, length }) => {
@@ -420,7 +424,7 @@ fn main_text(job: &Job, signature: &Signature) -> Result<String, Failure> {
         format!("    ::{entry}({arguments});\n")
     } else {
         format!(
-            "    auto msl_out = ::{entry}({arguments});\n    if (msl_discarded())\n        return;\n{after}"
+            "    auto msl_out = ::{entry}({arguments});\n    if (msl_discarded() || msl->helper)\n        return;\n{after}"
         )
     };
     Ok(format!(
@@ -432,6 +436,7 @@ fn main_text(job: &Job, signature: &Signature) -> Result<String, Failure> {
          static_assert(msl_parts::count == {params}, \"parameters\");\n\
          {tables}\
          const bool msl_has_barriers = {barriers};\n\
+         const bool msl_has_derivatives = {derivatives};\n\
          void msl_invoke(const msl_call *msl) {{\n{before}{call}}}\n",
         params = signature.params.len(),
         tables = [
@@ -440,6 +445,7 @@ fn main_text(job: &Job, signature: &Signature) -> Result<String, Failure> {
         ]
         .concat(),
         barriers = signature.barriers,
+        derivatives = signature.derivatives,
     ))
 }
 
@@ -494,6 +500,12 @@ impl Glue {
                     self.workgroup.len() - 1
                 )
             }
+            Given::Position(name) if job.stage == Stage::Fragment => match name.as_str() {
+                "position" => format!("msl_glue::vector<{of}>(msl->coord)"),
+                "front_facing" => "true".into(),
+                "sample_id" => "0u".into(),
+                _ => return Err(Failure::refused(format!("`{name}` in this stage"))),
+            },
             Given::Position(name) => {
                 let field = match (name.as_str(), job.stage) {
                     ("vertex_id", Stage::Vertex) => "invocation",
@@ -530,10 +542,14 @@ impl Glue {
         for member in &structure.members {
             let slot = own(job, member)?;
             left.retain(|&i| i != slot);
+            let value = match member.part {
+                // As devices do.
+                Part::Depth => format!("metal::clamp(msl_out.{}, 0.0f, 1.0f)", member.name),
+                _ => format!("msl_out.{}", member.name),
+            };
             let _ = writeln!(
                 self.after,
-                "    msl_glue::put(msl_out.{}, msl->slots[{slot}], msl->invocation);",
-                member.name
+                "    msl_glue::put({value}, msl->slots[{slot}], msl->invocation);"
             );
         }
         match left.first() {
@@ -573,6 +589,7 @@ fn own(job: &Job, member: &Member) -> Result<usize, Failure> {
         }
         Role::Target { location, .. } => member.part == Part::Colour(location),
         Role::Position => member.part == Part::Position,
+        Role::Depth => member.part == Part::Depth,
         _ => false,
     });
     let slot =

@@ -391,6 +391,8 @@ struct Fiber {
     // The barrier that it waits at; 0 for none.
     unsigned waits_at;
     bool done;
+    bool discarded;
+    float value[4];
 };
 ucontext_t scheduler;
 Fiber *fibers = nullptr;
@@ -436,6 +438,7 @@ void run_workgroup(unsigned count) {
     for (unsigned i = 0; i < count; i++) {
         Fiber &f = fibers[i];
         f.done = false;
+        f.discarded = false;
         f.waits_at = 0;
         getcontext(&f.context);
         f.context.uc_stack.ss_sp = stacks + i * stack_bytes + page;
@@ -483,10 +486,22 @@ void msl_barrier(unsigned line) {
     me->waits_at = line;
     swapcontext(&me->context, &scheduler);
 }
-void msl_discard() { discarded = true; }
+unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (*all)[4]) {
+    if (running == nullptr)
+        msl_fail("a derivative outside of a quad");
+    auto me = unsigned(running - fibers);
+    memcpy(running->value, value, count * sizeof(float));
+    msl_barrier(line);
+    for (unsigned i = 0; i < 4; i++)
+        memcpy(all[i], fibers[i].value, count * sizeof(float));
+    msl_barrier(line);
+    return me;
+}
+void msl_discard() { (running == nullptr ? discarded : running->discarded) = true; }
 bool msl_discarded() {
-    bool was = discarded;
-    discarded = false;
+    bool &flag = running == nullptr ? discarded : running->discarded;
+    bool was = flag;
+    flag = false;
     return was;
 }
 }
@@ -675,6 +690,30 @@ void run_compute(msl_call call, const unsigned *threads, const unsigned *groups)
                     run_workgroup(count);
             }
 }
+
+// Fragments lie in rows of so many, as in every column of the matrix.
+constexpr unsigned columns = 64;
+
+void place(msl_call &call, unsigned x, unsigned y) {
+    call.coord[0] = float(x) + 0.5f;
+    call.coord[1] = float(y) + 0.5f;
+    call.coord[2] = 0;
+    call.coord[3] = 1;
+}
+
+// A fragment and its three neighbours, which have its varyings and return nothing.
+void run_quad(msl_call call, unsigned i) {
+    unsigned x = i % columns, y = i / columns;
+    unsigned own = (x & 1) | (y & 1) << 1;
+    make_fibers(4);
+    for (unsigned lane = 0; lane < 4; lane++) {
+        place(call, (x & ~1u) | (lane & 1), (y & ~1u) | lane >> 1);
+        call.helper = lane != own;
+        fibers[lane].call = call;
+    }
+    run_workgroup(4);
+    running = nullptr;
+}
 } // namespace
 
 int main(int argc, char **argv) {
@@ -716,10 +755,16 @@ int main(int argc, char **argv) {
         if (strcmp(stage, "compute") == 0) {
             run_compute(call, threads, groups);
         } else {
+            bool quads = strcmp(stage, "fragment") == 0 && msl_has_derivatives;
             for (unsigned i = 0; i < invocations; i++) {
                 call.invocation[0] = i;
                 // For the words of a fault.
                 call.thread_position_in_grid[0] = i;
+                if (quads) {
+                    run_quad(call, i);
+                    continue;
+                }
+                place(call, i % columns, i / columns);
                 current = &call;
                 msl_invoke(&call);
             }

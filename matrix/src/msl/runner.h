@@ -19,6 +19,10 @@ struct msl_call {
     // Of a vertex or fragment.
     unsigned invocation[3];
     unsigned zero[3];
+    // Of a fragment: its pixel's centre, its depth, and 1 / w.
+    float coord[4];
+    // It runs only for the derivatives of another one.
+    bool helper;
 };
 
 // A parameter that is memory: which slot, or which of the workgroup's; its type's size and alignment.
@@ -40,6 +44,7 @@ extern const unsigned msl_buffer_count;
 extern const msl_memory msl_workgroup[];
 extern const unsigned msl_workgroup_count;
 extern const bool msl_has_barriers;
+extern const bool msl_has_derivatives;
 void msl_invoke(const msl_call *call);
 
 // For the library.
@@ -60,6 +65,8 @@ void msl_gather_float(const msl_texture *texture, unsigned flags, const float *a
                       const int *offset, unsigned channel, float *out);
 // Waits for the workgroup's other threads. `line` tells one barrier from another.
 __attribute__((convergent)) void msl_barrier(unsigned line);
+// The value of each fragment of a quad, of up to four components; gives which of them this one is.
+unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (*all)[4]);
 // What this fragment returns is dropped.
 void msl_discard();
 bool msl_discarded();

@@ -12,6 +12,8 @@ pub struct Signature {
     pub returns: Option<Structure>,
     /// Whether the text has barriers.
     pub barriers: bool,
+    /// Whether the text has derivatives.
+    pub derivatives: bool,
 }
 
 /// A parameter of an entry point.
@@ -73,10 +75,12 @@ pub enum Part {
     Colour(u32),
     /// `[[position]]`.
     Position,
+    /// `[[depth(any)]]`.
+    Depth,
 }
 
 /// Positions and indices that an invocation can ask for.
-const POSITIONS: [&str; 10] = [
+const POSITIONS: [&str; 13] = [
     "thread_position_in_grid",
     "thread_position_in_threadgroup",
     "thread_index_in_threadgroup",
@@ -87,6 +91,9 @@ const POSITIONS: [&str; 10] = [
     "vertex_id",
     "instance_id",
     "base_vertex",
+    "position",
+    "front_facing",
+    "sample_id",
 ];
 
 /// How a value is interpolated: of no interest to whoever gives it ready.
@@ -122,6 +129,9 @@ pub fn parse(text: &str, entry_point: &str) -> Result<Signature, String> {
         params,
         returns,
         barriers: tokens.iter().any(|t| t.ends_with("_barrier")),
+        derivatives: ["dfdx", "dfdy", "fwidth"]
+            .iter()
+            .any(|name| tokens.iter().any(|t| t == name)),
     })
 }
 
@@ -255,6 +265,7 @@ fn parse_member(member: &[String]) -> Result<Member, String> {
                     .ok_or("`user` of no location")?,
             ),
             ("position", None) => Part::Position,
+            ("depth", Some("any")) => Part::Depth,
             (other, None) if INTERPOLATIONS.contains(&other) => continue,
             (other, _) => return Err(format!("attribute `{other}` is not known here")),
         };

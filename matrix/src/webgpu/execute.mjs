@@ -415,7 +415,7 @@ class Maker {
 
     /** The reads of all written slots, in order. */
     inOrder(reads, one) {
-        const written = ["atomic", "write", "storage_texture", "position", "passed", "target"];
+        const written = ["atomic", "write", "storage_texture", "position", "passed", "depth", "target"];
         return this.job.slots.flatMap(({ name, role }, i) => {
             if (!written.includes(role.kind)) return [];
             if (reads.has(i)) return [reads.get(i)];
@@ -476,14 +476,16 @@ class Maker {
 
     /**
      * Draws each point of a case into a pixel of its own. `outputs` are the slots that are read,
-     * each with its target's format; `fragmentOf` makes the fragment stage of a group of them.
+     * each with its target's format; `fragmentOf` makes the fragment stage of a group of them;
+     * `depth` is the slot of the depth that they write, if they do.
      */
-    async draw(one, height, own, vertex, outputs, fragmentOf) {
+    async draw(one, height, own, vertex, outputs, fragmentOf, depth) {
         const limit = this.device.limits.maxTextureDimension2D;
         if (height > limit) throw new Error(`${one.invocations} points need more than ${limit} rows`);
         const layout = await this.layout(one);
         const fillers = await this.fillers(one);
         const groups = groupsOf(outputs.map((o) => o.format), this.device.limits);
+        if (groups.length === 0) groups.push([]);
         if (groups.length > 1 && this.job.slots.some(({ role }) => ["atomic", "write"].includes(role.kind))) {
             throw new Error("its targets need several passes, and it writes buffers");
         }
@@ -496,6 +498,9 @@ class Maker {
                 layout: layout.pipeline,
                 vertex: { ...vertex, buffers },
                 primitive: { topology: "point-list" },
+                depthStencil: depth === undefined
+                    ? undefined
+                    : { format: "depth32float", depthWriteEnabled: true, depthCompare: "always" },
                 fragment,
             })));
         }
@@ -511,8 +516,19 @@ class Maker {
                     colours[at(group, n)] = { view: texture.createView(), loadOp: "clear", storeOp: "store" };
                     reads.set(i, readTexture(texture, one.invocations * take, take));
                 }
+                let depthStencilAttachment;
+                if (depth !== undefined) {
+                    const texture = this.texture("depth32float", [WIDTH, height],
+                        GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC);
+                    depthStencilAttachment = {
+                        view: texture.createView(),
+                        depthClearValue: 0, depthLoadOp: "clear", depthStoreOp: "store",
+                    };
+                    reads.set(depth, readTexture(texture, one.invocations * 4, 4));
+                }
                 const pass = encoder.beginRenderPass({
                     colorAttachments: Array.from(colours, (c) => c ?? null),
+                    depthStencilAttachment,
                 });
                 pass.setPipeline(pipelines[g]);
                 pass.setBindGroup(0, binds);
@@ -534,12 +550,13 @@ class Maker {
             i, location, format: targetFormat(value), take: value.size * 4, at: () => location,
         }));
         const vertex = { module: helper, entryPoint: "hankel_points" };
+        const depth = this.job.slots.findIndex(({ role }) => role.kind === "depth");
         return this.draw(one, height, varyings, vertex, outputs, (group) => {
             const targets = [];
             for (const n of group) targets[outputs[n].location] = { format: outputs[n].format };
             const all = Array.from(targets, (t) => t ?? null);
             return { module, entryPoint: this.job.entry_point, targets: all };
-        });
+        }, depth < 0 ? undefined : depth);
     }
 
     async vertex(one) {

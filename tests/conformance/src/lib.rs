@@ -11,6 +11,8 @@ use hankel_dsl::{
 };
 
 pub mod general;
+pub mod stage;
+pub mod texture;
 pub mod workgroup;
 
 hankel_dsl::kernels![
@@ -46,6 +48,17 @@ hankel_dsl::kernels![
     general::cells,
     general::counted,
     general::several,
+    stage::numbered,
+    stage::flat,
+    stage::holes,
+    stage::deep,
+    stage::only_deep,
+    stage::slopes,
+    stage::grained_slopes,
+    stage::sample,
+    texture::mirror,
+    texture::spread,
+    texture::corners,
 ];
 
 /// A point and its weight.

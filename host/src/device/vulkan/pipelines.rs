@@ -846,11 +846,13 @@ impl VulkanDevice {
             return Err(wrong_stage(fragment, "fragment"));
         }
         for Param { name, role } in &fragment.params {
-            let Role::Varying { location, ty } = role else {
+            let Role::Varying { location, ty, .. } = role else {
                 continue;
             };
             let made = vertex.outputs.iter().find_map(|o| match o {
-                Output::Varying { location: l, ty } if l == location => Some(ty),
+                Output::Varying {
+                    location: l, ty, ..
+                } if l == location => Some(ty),
                 _ => None,
             });
             if made != Some(ty) {
@@ -868,6 +870,12 @@ impl VulkanDevice {
             }
         }
         let mut targets = 0;
+        if fragment.outputs.contains(&Output::Depth) && pass.depth.is_none() {
+            return Err(bad(format!(
+                "kernel `{}` writes a depth, but the pass has no depth buffer",
+                fragment.name
+            )));
+        }
         for output in &fragment.outputs {
             let Output::Target { location, ty } = output else {
                 continue;

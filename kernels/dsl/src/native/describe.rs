@@ -174,6 +174,15 @@ pub enum Role {
         /// Shape and texel type.
         texture: TextureKind,
     },
+    /// A texture of which any texel may be written.
+    StorageTexture {
+        /// Number in set 0.
+        binding: u32,
+        /// The format, which is part of the shader.
+        format: TexelFormat,
+        /// 2 or 3.
+        dimensions: u32,
+    },
     /// A sampler.
     Sampler {
         /// Number in set 0.
@@ -215,6 +224,9 @@ pub enum Role {
         location: u32,
         /// Its type.
         ty: Type,
+        /// That of one vertex, not interpolated. Integers always are.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        flat: bool,
     },
 }
 
@@ -230,6 +242,16 @@ pub enum BuiltIn {
     GroupId,
     /// How many workgroups the range needs.
     GroupCount,
+    /// The vertex's number (vertex stage).
+    VertexIndex,
+    /// The instance's number (vertex stage).
+    InstanceIndex,
+    /// Where the fragment is in the target, and its depth (fragment stage).
+    FragCoord,
+    /// Whether the fragment's primitive faces the viewer (fragment stage).
+    FrontFacing,
+    /// Which sample of its pixel the fragment is (fragment stage).
+    SampleIndex,
 }
 
 /// Shape of a sampled texture.
@@ -272,7 +294,12 @@ pub enum Output {
         location: u32,
         /// Its type.
         ty: Type,
+        /// Not to be interpolated; see [`Role::Varying`].
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        flat: bool,
     },
+    /// The fragment's depth, in place of that of its primitive (fragment stage).
+    Depth,
     /// A colour attachment (fragment stage).
     Target {
         /// Output location.

@@ -533,26 +533,29 @@ pub fn map_tuple<S: Slices>(
     out: S,
     f: impl Fn(usize) -> S::Values + Sync,
 ) -> Result<(), CallError> {
-    guard(|| tuple_range(mode.parallel, 0, out, &f))
+    guard(|| some_of_range(mode.parallel, 0, out, &|i| Some(f(i))))
 }
 
-fn tuple_range<S: Slices>(
+/// Sets the values of those invocations from `start` on that have any.
+pub(super) fn some_of_range<S: Slices>(
     parallel: bool,
     start: usize,
     mut out: S,
-    f: &(impl Fn(usize) -> S::Values + Sync),
+    f: &(impl Fn(usize) -> Option<S::Values> + Sync),
 ) {
     let count = out.count();
     if parallel && count > CHUNK {
         let mid = count / 2;
         let (low, high) = out.split(mid);
         rayon::join(
-            || tuple_range(parallel, start, low, f),
-            || tuple_range(parallel, start + mid, high, f),
+            || some_of_range(parallel, start, low, f),
+            || some_of_range(parallel, start + mid, high, f),
         );
     } else {
         for i in 0..count {
-            out.set(i, f(start + i));
+            if let Some(values) = f(start + i) {
+                out.set(i, values);
+            }
         }
     }
 }

@@ -5,6 +5,8 @@ pub mod call;
 pub mod describe;
 #[doc(hidden)]
 pub mod exec;
+#[doc(hidden)]
+pub mod fragment;
 pub mod function;
 #[doc(hidden)]
 pub mod lanes;

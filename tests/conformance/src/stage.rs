@@ -1,0 +1,107 @@
+//! What vertex and fragment kernels say beyond their inputs and outputs.
+
+use hankel_dsl::glam::{IVec3, UVec4, Vec2, Vec3, Vec4};
+use hankel_dsl::{
+    Depth, Flat, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth,
+    fwidth_fine, kernel,
+};
+
+/// Numbers of the vertex and of its instance, integers, and a float that is not interpolated.
+#[kernel(vertex)]
+pub fn numbered(
+    #[vertex_index] vertex: u32,
+    #[instance_index] instance: u32,
+    #[attribute] position: Vec4,
+    #[attribute] id: u32,
+    #[attribute] turn: IVec3,
+) -> (Vec4, u32, IVec3, Flat<f32>) {
+    (
+        position,
+        (vertex * 3 + instance * 7) ^ id,
+        turn,
+        Flat(vertex as f32 * 0.5),
+    )
+}
+
+/// Varyings that are not interpolated, to an integer target and a float one.
+#[kernel(fragment)]
+pub fn flat(
+    #[varying] id: u32,
+    #[varying] turn: IVec3,
+    #[varying] weight: Flat<f32>,
+) -> (UVec4, f32) {
+    (
+        UVec4::new(id, turn.x as u32, turn.y as u32, turn.z as u32),
+        weight.0,
+    )
+}
+
+/// Where the fragment is and which way it faces; half of the fragments are dropped.
+#[kernel(fragment)]
+pub fn holes(#[varying] colour: Vec4, #[frag_coord] at: Vec3, #[front_facing] front: bool) -> Vec4 {
+    if colour.x < 0.0 {
+        discard();
+    }
+    let sign = if front { 1.0 } else { -1.0 };
+    Vec4::new(at.x, at.y, at.z + sign, colour.y)
+}
+
+/// A depth beside a colour; some fragments are dropped, of which neither is written.
+#[kernel(fragment)]
+pub fn deep(#[varying] colour: Vec4, #[varying] near: f32) -> (Vec4, Depth) {
+    if colour.x > 0.5 {
+        discard();
+    }
+    (colour, Depth(unit(near)))
+}
+
+/// A depth alone.
+#[kernel(fragment)]
+pub fn only_deep(#[varying] near: f32) -> Depth {
+    Depth(unit(near))
+}
+
+/// The nearest number from 0 to 1.
+fn unit(x: f32) -> f32 {
+    if x < 0.0 {
+        0.0
+    } else if x > 1.0 {
+        1.0
+    } else {
+        x
+    }
+}
+
+/// Derivatives that are the same however coarse they are.
+#[kernel(fragment)]
+pub fn slopes(#[frag_coord] at: Vec3) -> (Vec4, Vec4) {
+    let square = Vec2::new(at.x * at.x, at.y * at.y * 0.5);
+    let (x, y) = (dpdx(square), dpdy(square));
+    let wide = fwidth(Vec3::new(at.x * 3.0 - at.y, at.y * at.y, -at.x * at.x));
+    (
+        Vec4::new(x.x, x.y, y.x, y.y),
+        Vec4::new(wide.x, wide.y, wide.z, dpdx(at.x * -5.0)),
+    )
+}
+
+/// Derivatives of the quad's rows and columns, a derivative of a derivative among them.
+#[kernel(fragment)]
+pub fn grained_slopes(#[frag_coord] at: Vec3) -> (Vec4, Vec4) {
+    let value = at.x * at.x * at.y * at.y;
+    let twisted = dpdy_fine(dpdx_fine(value));
+    (
+        Vec4::new(
+            dpdx_fine(value),
+            dpdy_fine(value),
+            fwidth_fine(value),
+            twisted,
+        ),
+        Vec4::new(dpdx_coarse(at.x * at.x), dpdy_coarse(at.y * at.y), 0.0, 1.0),
+    )
+}
+
+/// The sample of the pixel: the only one where targets have one each.
+#[kernel(fragment)]
+pub fn sample(#[varying] id: u32, #[sample_index] sample: u32) -> u32 {
+    id ^ (sample + 1)
+}
