@@ -62,6 +62,7 @@ pub fn only_deep(#[varying] near: f32) -> Depth {
 }
 
 /// The nearest number from 0 to 1.
+#[allow(clippy::manual_clamp, reason = "core's function has more tests in it")]
 fn unit(x: f32) -> f32 {
     if x < 0.0 {
         0.0
