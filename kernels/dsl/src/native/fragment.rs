@@ -232,6 +232,8 @@ pub fn depth(depth: crate::Depth) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
+
     use crate::{dpdx, dpdx_coarse, dpdy, fwidth};
 
     fn run(count: usize, f: impl Fn(&Fragment) -> f32 + Sync) -> Result<Vec<f32>, CallError> {
