@@ -94,6 +94,10 @@ impl Arguments<'_, '_> {
 
     /// The size that an output asks for; none for other arguments.
     fn size(&self, i: usize) -> Result<Option<[u32; 3]>> {
+        // Outputs come last; a texture before them is a parameter, which may be of any size.
+        if i + self.kernel.outputs.len() < self.slots.len() {
+            return Ok(None);
+        }
         Ok(match (self.slots[i].role, self.given[i]) {
             (Use::Output(_) | Use::Interface(_), _) => Some([self.elements(i)?, 1, 1]),
             (Use::StorageTexture { .. }, Given::Texture { shape, .. }) => Some(shape.size),
