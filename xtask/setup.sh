@@ -62,8 +62,9 @@ if [ "${for_tests:-no}" = yes ]; then
     export HANKEL_TOOLS
     mkdir -p "$HANKEL_TOOLS"
     if ! cmp -s xtask/tools/package-lock.json "$HANKEL_TOOLS/package-lock.json" ||
-        [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ]; then
-        echo "Installing Dawn for Node.js (npm: webgpu, MIT and BSD-3-Clause)"
+        [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ] ||
+        [ ! -e "$HANKEL_TOOLS/node_modules/typescript/package.json" ]; then
+        echo "Installing Dawn for Node.js and TypeScript (npm: webgpu, MIT and BSD-3-Clause; typescript, Apache-2.0)"
         cp xtask/tools/package.json xtask/tools/package-lock.json "$HANKEL_TOOLS"
         npm ci --silent --prefix "$HANKEL_TOOLS"
     fi

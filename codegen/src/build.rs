@@ -3,7 +3,7 @@
 //! ```text
 //! OUT/manifest.json
 //! OUT/LANGUAGE/KERNEL.EXTENSION
-//! OUT/include/hankel.h, OUT/include/hankel.rs
+//! OUT/include/hankel.h, hankel.rs, hankel_wgpu.rs, hankel_bytemuck.rs, hankel.js, hankel.d.ts
 //! ```
 //!
 //! The folder holds what the last build asked for: files that an earlier build wrote and this one
@@ -224,14 +224,9 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
         kernels.insert(kernel.name.clone(), entry);
         files.extend(texts);
     }
-    files.insert(
-        "include/hankel.h".into(),
-        headers::c_header(&layouts).into_bytes(),
-    );
-    files.insert(
-        "include/hankel.rs".into(),
-        headers::rust_module(&layouts).into_bytes(),
-    );
+    for (path, text) in headers::files(&layouts, &kernels) {
+        files.insert(path.into(), text.into_bytes());
+    }
     let file_entry = |bytes: &Vec<u8>| FileEntry {
         sha256: sha256(bytes),
         bytes: bytes.len() as u64,

@@ -125,6 +125,21 @@ fn headers_compile_and_check_themselves() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
+    // For bytemuck, whose traits stand here as they are declared there.
+    let both = "pub mod bytemuck {\n    pub unsafe trait Zeroable {}\n    pub unsafe trait Pod: Zeroable + Copy {}\n}\n\
+                include!(\"include/hankel.rs\");\ninclude!(\"include/hankel_bytemuck.rs\");\n";
+    fs::write(folder.path().join("both.rs"), both).unwrap();
+    let output = Command::new("rustc")
+        .args(["--edition=2021", "--crate-type=lib", "-Dwarnings", "-o"])
+        .arg(folder.path().join("both.rlib"))
+        .arg(folder.path().join("both.rs"))
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     // The checks are checks.
     let text = fs::read_to_string(&header).unwrap();
     fs::write(&header, text.replace("float b3;", "double b3;")).unwrap();
@@ -134,6 +149,60 @@ fn headers_compile_and_check_themselves() {
         .output()
         .unwrap();
     assert!(!output.status.success());
+}
+
+/// The types say what the module has, and refuse what it has not.
+#[test]
+fn typescript_accepts_what_is_there_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    build_all(folder.path());
+    let include = folder.path().join("include");
+    fs::write(
+        include.join("use.ts"),
+        "import { Settings, bound_kernel } from \"./hankel.js\";\n\
+         const view = new DataView(new ArrayBuffer(Settings.size));\n\
+         Settings.write(view, 0, { bias: 1, depth_bias: 2, pad0: 0, pad1: 0 });\n\
+         // @ts-expect-error there is no such field\n\
+         Settings.write(view, 0, { bias: 1, depth: 2 });\n\
+         export const slot: number = bound_kernel.bindings.settings;\n\
+         // @ts-expect-error there is no such binding\n\
+         export const none: number = bound_kernel.bindings.nosuch;\n\
+         export const layout = (device: GPUDevice): GPUBindGroupLayout =>\n    \
+         device.createBindGroupLayout(bound_kernel.layout);\n",
+    )
+    .unwrap();
+    let tools = std::env::var_os("HANKEL_TOOLS").map(std::path::PathBuf::from);
+    let modules = tools
+        .or_else(|| Some(std::env::home_dir()?.join(".cache/hankel/tools")))
+        .unwrap()
+        .join("node_modules");
+    assert!(
+        modules.join("typescript").is_dir(),
+        "typescript is not in {}: `./check` installs it",
+        modules.display()
+    );
+    let output = Command::new("node")
+        .arg(modules.join("typescript/bin/tsc"))
+        .args([
+            "--noEmit", "--strict", "--target", "es2022", "--module", "es2022",
+        ])
+        .args([
+            "--moduleResolution",
+            "bundler",
+            "--types",
+            "@webgpu/types",
+            "--typeRoots",
+        ])
+        .arg(&modules)
+        .arg("use.ts")
+        .current_dir(&include)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stdout)
+    );
 }
 
 #[test]

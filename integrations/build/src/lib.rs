@@ -1,0 +1,397 @@
+//! Shaders of a kernel crate for a build script.
+//!
+//! ```no_run
+//! // build.rs
+//! hankel_build::Build::of("../kernels/Cargo.toml").run_or_exit();
+//! ```
+//!
+//! ```ignore
+//! // main.rs
+//! mod shaders {
+//!     include!(concat!(env!("HANKEL_SHADERS"), "/include/hankel.rs"));
+//!     include!(concat!(env!("HANKEL_SHADERS"), "/include/hankel_wgpu.rs")); // for users of wgpu
+//! }
+//! ```
+//!
+//! The module has a module for each kernel, with its texts, entry points, workgroup size and
+//! bindings, and the structures of its buffers. The build script runs again when a file changes that
+//! the shaders are made from.
+//!
+//! The work is done by the program `hankel`: the one that the environment variable `HANKEL` names, or
+//! else the one in `PATH`. This crate only starts it, so that a build script compiles in seconds.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fmt;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use sha2::{Digest, Sha256};
+
+/// The environment variable that names the program.
+const PROGRAM: &str = "HANKEL";
+
+/// What the including crate finds the folder by.
+const FOLDER: &str = "HANKEL_SHADERS";
+
+/// Which shaders are wanted.
+#[derive(Clone, Debug)]
+pub struct Build {
+    manifest: PathBuf,
+    committed: Option<PathBuf>,
+    arguments: Vec<OsString>,
+    program: Option<PathBuf>,
+}
+
+/// Why there are no shaders.
+#[derive(Debug)]
+pub enum BuildError {
+    /// A variable that cargo sets for build scripts is not there.
+    NoBuildScript(&'static str),
+    /// The program is not there, or does not start.
+    NoProgram {
+        /// Its name or path.
+        program: PathBuf,
+        /// Why it does not start.
+        source: io::Error,
+    },
+    /// The program failed.
+    Failed {
+        /// What it said.
+        said: String,
+        /// Its exit code: 1, a kernel; 2, an argument; 3, the machine.
+        code: Option<i32>,
+    },
+    /// A file that was read or written.
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoBuildScript(name) => write!(
+                f,
+                "{name} is not set: call hankel_build in a build script, which cargo runs"
+            ),
+            Self::NoProgram { program, source } => write!(
+                f,
+                "cannot run `{}`: {source}; install it (cargo install --path cli, in Hankel's \
+                 repository), or name it in the environment variable {PROGRAM}",
+                program.display()
+            ),
+            Self::Failed { said, code } => {
+                let code = code.map_or("a signal".into(), |code| format!("exit code {code}"));
+                write!(f, "hankel build failed ({code}):\n{}", said.trim_end())
+            }
+            Self::File { path, problem } => write!(f, "{}: {problem}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}
+
+impl Build {
+    /// All kernels of the crate whose Cargo.toml is at `manifest`, in every language.
+    pub fn of(manifest: impl Into<PathBuf>) -> Self {
+        Self {
+            manifest: manifest.into(),
+            committed: None,
+            arguments: Vec::new(),
+            program: None,
+        }
+    }
+
+    /// Only kernels of this name, where `*` stands for any letters. May be called again.
+    #[must_use]
+    pub fn kernel(self, pattern: &str) -> Self {
+        self.argument("--kernel").argument(pattern)
+    }
+
+    /// Only this language, by its name on the command line: `wgsl`, `spirv`, … May be called again.
+    #[must_use]
+    pub fn target(self, language: &str) -> Self {
+        self.argument("--target").argument(language)
+    }
+
+    /// Any other argument of `hankel build`; `hankel build --help` has them.
+    #[must_use]
+    pub fn argument(mut self, argument: impl Into<OsString>) -> Self {
+        self.arguments.push(argument.into());
+        self
+    }
+
+    /// A folder that `hankel build` wrote and that is under version control. It is used where there
+    /// is no program `hankel`: as it stands, if every file is as its manifest says, and with a
+    /// warning, since only `hankel check` can tell whether it follows from the present sources.
+    #[must_use]
+    pub fn committed(mut self, folder: impl Into<PathBuf>) -> Self {
+        self.committed = Some(folder.into());
+        self
+    }
+
+    /// The program, instead of what `HANKEL` or `PATH` says.
+    #[must_use]
+    pub fn program(mut self, program: impl Into<PathBuf>) -> Self {
+        self.program = Some(program.into());
+        self
+    }
+
+    /// Builds, and tells cargo: what to watch, and in `HANKEL_SHADERS` where the shaders are. Gives
+    /// that folder.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`].
+    pub fn run(&self) -> Result<PathBuf, BuildError> {
+        let variable = |name| std::env::var_os(name).ok_or(BuildError::NoBuildScript(name));
+        let here = PathBuf::from(variable("CARGO_MANIFEST_DIR")?);
+        let out = PathBuf::from(variable("OUT_DIR")?);
+        let (folder, lines) = self.make(&here, &out)?;
+        println!("cargo::rerun-if-env-changed={PROGRAM}");
+        for line in lines {
+            println!("cargo::{line}");
+        }
+        println!("cargo::rustc-env={FOLDER}={}", folder.display());
+        Ok(folder)
+    }
+
+    /// Builds, and ends the build script with the error's text if there are no shaders.
+    pub fn run_or_exit(&self) {
+        if let Err(error) = self.run() {
+            for line in error.to_string().lines() {
+                println!("cargo::error={line}");
+            }
+            std::process::exit(1);
+        }
+    }
+
+    /// As [`Self::run_or_exit`], for a `main` that gives an exit code.
+    #[must_use]
+    pub fn run_as_main(&self) -> ExitCode {
+        self.run_or_exit();
+        ExitCode::SUCCESS
+    }
+
+    /// The folder of the shaders, and what cargo is told.
+    fn make(&self, here: &Path, out: &Path) -> Result<(PathBuf, Vec<String>), BuildError> {
+        let named = self
+            .program
+            .clone()
+            .or_else(|| std::env::var_os(PROGRAM).map(Into::into));
+        let program = named.clone().unwrap_or_else(|| "hankel".into());
+        let manifest = here.join(&self.manifest);
+        let (folder, dependencies) = (out.join("shaders"), out.join("shaders.d"));
+        let mut command = Command::new(&program);
+        // What cargo sets for this build script is not meant for the cargo that hankel runs; and the
+        // target folder in use is locked until this script ends.
+        for (name, _) in std::env::vars_os() {
+            if name.to_str().is_some_and(is_of_this_build) {
+                command.env_remove(name);
+            }
+        }
+        let ran = command
+            .env("CARGO_TARGET_DIR", out.join("target"))
+            .args(["--quiet", "build", "--manifest-path"])
+            .arg(&manifest)
+            .arg("--out")
+            .arg(&folder)
+            .arg("--depfile")
+            .arg(&dependencies)
+            .args(&self.arguments)
+            .output();
+        let output = match ran {
+            Ok(output) => output,
+            Err(source) => {
+                let missing = named.is_none() && source.kind() == io::ErrorKind::NotFound;
+                return match &self.committed {
+                    Some(folder) if missing => as_committed(&here.join(folder)),
+                    _ => Err(BuildError::NoProgram { program, source }),
+                };
+            }
+        };
+        if !output.status.success() {
+            return Err(BuildError::Failed {
+                said: String::from_utf8_lossy(&output.stderr).into_owned(),
+                code: output.status.code(),
+            });
+        }
+        let text = std::fs::read_to_string(&dependencies).map_err(|e| at(&dependencies, e))?;
+        let lines = prerequisites(&text).map(|path| format!("rerun-if-changed={path}"));
+        Ok((folder, lines.collect()))
+    }
+}
+
+/// Whether cargo set a variable for this build script alone.
+fn is_of_this_build(name: &str) -> bool {
+    const OTHERS: [&str; 12] = [
+        "DEBUG",
+        "HOST",
+        "MAKEFLAGS",
+        "NUM_JOBS",
+        "OPT_LEVEL",
+        "OUT_DIR",
+        "PROFILE",
+        "RUSTC",
+        "RUSTC_LINKER",
+        "RUSTDOC",
+        "RUSTFLAGS",
+        "TARGET",
+    ];
+    // What says where cargo keeps and gets things stays.
+    const KEPT: [&str; 6] = [
+        "CARGO_ALIAS_",
+        "CARGO_HOME",
+        "CARGO_HTTP_",
+        "CARGO_NET_",
+        "CARGO_REGISTR",
+        "CARGO_SOURCE_",
+    ];
+    let of_cargo = name.starts_with("CARGO") && !KEPT.iter().any(|kept| name.starts_with(kept));
+    of_cargo || OTHERS.contains(&name)
+}
+
+fn at(path: &Path, problem: impl fmt::Display) -> BuildError {
+    BuildError::File {
+        path: path.to_owned(),
+        problem: problem.to_string(),
+    }
+}
+
+/// What the first rule of a file in Make's syntax depends on.
+fn prerequisites(text: &str) -> impl Iterator<Item = String> {
+    let joined = text.replace("\\\n", " ");
+    // `$` is doubled and spaces are escaped in Make's syntax; a colon with a space ends the targets.
+    let rule = joined.lines().next().unwrap_or_default();
+    let all = rule.split_once(": ").map_or("", |(_, all)| all);
+    let mut paths = vec![String::new()];
+    let mut letters = all.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let last = paths.len() - 1;
+        match letter {
+            '\\' if letters
+                .peek()
+                .is_some_and(|next| matches!(next, ' ' | '#' | '\\')) =>
+            {
+                paths[last].extend(letters.next());
+            }
+            '$' if letters.peek() == Some(&'$') => paths[last].extend(letters.next()),
+            ' ' => paths.push(String::new()),
+            other => paths[last].push(other),
+        }
+    }
+    paths.into_iter().filter(|path| !path.is_empty())
+}
+
+/// A committed folder, if nothing in it was changed or lost.
+fn as_committed(folder: &Path) -> Result<(PathBuf, Vec<String>), BuildError> {
+    #[derive(serde::Deserialize)]
+    struct Manifest {
+        files: BTreeMap<String, File>,
+    }
+    #[derive(serde::Deserialize)]
+    struct File {
+        sha256: String,
+    }
+    let path = folder.join("manifest.json");
+    let text = std::fs::read(&path).map_err(|e| at(&path, e))?;
+    let manifest: Manifest = serde_json::from_slice(&text).map_err(|e| at(&path, e))?;
+    let mut lines = vec![format!("rerun-if-changed={}", path.display())];
+    for (name, file) in &manifest.files {
+        let inside = Path::new(name)
+            .components()
+            .all(|part| matches!(part, Component::Normal(_)));
+        if !inside {
+            return Err(at(
+                &path,
+                format!("`{name}` is not a path inside of the folder"),
+            ));
+        }
+        let path = folder.join(name);
+        let bytes = std::fs::read(&path).map_err(|e| at(&path, e))?;
+        let hash: String = Sha256::digest(&bytes)
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        if hash != file.sha256 {
+            return Err(at(
+                &path,
+                "it is not as hankel wrote it; restore it, or build the folder anew with hankel",
+            ));
+        }
+        lines.push(format!("rerun-if-changed={}", path.display()));
+    }
+    lines.push(format!(
+        "warning=there is no program `hankel`: the shaders of {} are used as they are; `hankel check` \
+         tells whether they follow from their sources",
+        folder.display()
+    ));
+    Ok((folder.to_owned(), lines))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_read_as_make_reads_them() {
+        let text = "/out/a.json: /src/lib.rs \\\n  /a\\ b/$$c.rs /d\\#e.rs\n\n/src/lib.rs:\n";
+        let paths: Vec<String> = prerequisites(text).collect();
+        assert_eq!(paths, ["/src/lib.rs", "/a b/$c.rs", "/d#e.rs"]);
+    }
+
+    #[test]
+    fn a_missing_program_is_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let build = Build::of("Cargo.toml").program("/nonexistent/hankel");
+        let error = build
+            .make(folder.path(), folder.path())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("/nonexistent/hankel") && error.contains(PROGRAM),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn committed_shaders_are_used_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).expect("the folder can be written");
+        };
+        let hash: String = Sha256::digest(b"text")
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
+        write("a.wgsl", "text");
+        write(
+            "manifest.json",
+            &format!("{{\"files\":{{\"a.wgsl\":{{\"sha256\":\"{hash}\"}}}}}}"),
+        );
+        let (_, lines) = as_committed(folder.path()).expect("it is whole");
+        assert!(
+            lines
+                .iter()
+                .any(|l| l.starts_with("warning=") && l.contains("hankel check"))
+        );
+        assert!(
+            lines
+                .iter()
+                .any(|l| l.starts_with("rerun-if-changed=") && l.ends_with("a.wgsl"))
+        );
+
+        write("a.wgsl", "other");
+        let error = as_committed(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("a.wgsl"), "{error}");
+        let outside = "{\"files\":{\"../b\":{\"sha256\":\"\"}}}";
+        write("manifest.json", outside);
+        let error = as_committed(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("../b"), "{error}");
+    }
+}
