@@ -122,8 +122,7 @@ fn ty(binding: &Binding, filters: bool) -> String {
             )
         }
         BindingKind::StorageTexture => {
-            let format = binding.format.as_deref().unwrap_or_default();
-            let format = format[..1].to_uppercase() + &format[1..];
+            let format = texture_format(binding.format.as_deref().unwrap_or_default());
             format!(
                 "wgpu::BindingType::StorageTexture {{ access: wgpu::StorageTextureAccess::WriteOnly, \
                  format: wgpu::TextureFormat::{format}, view_dimension: wgpu::TextureViewDimension::{dimension} }}"
@@ -131,6 +130,37 @@ fn ty(binding: &Binding, filters: bool) -> String {
         }
         BindingKind::Sampler => {
             "wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)".into()
+        }
+    }
+}
+
+/// wgpu's spelling of a format: `rgba16unorm` is `Rgba16Unorm`.
+fn texture_format(name: &str) -> String {
+    let kind = name
+        .rfind(|c: char| c.is_ascii_digit())
+        .map_or(0, |digit| digit + 1);
+    let letters = name.char_indices();
+    letters
+        .map(|(i, letter)| match i == 0 || i == kind {
+            true => letter.to_ascii_uppercase(),
+            false => letter,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::texture_format;
+
+    #[test]
+    fn formats_are_spelt_as_in_wgpu() {
+        for (name, spelt) in [
+            ("rgba16unorm", "Rgba16Unorm"),
+            ("r32uint", "R32Uint"),
+            ("rgb10a2unorm", "Rgb10a2Unorm"),
+            ("rgba8unorm", "Rgba8Unorm"),
+        ] {
+            assert_eq!(texture_format(name), spelt);
         }
     }
 }
