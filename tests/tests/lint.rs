@@ -37,12 +37,14 @@ fn maps_over_rows_are_clean() {
     }
     let names: Vec<&str> = maps.iter().map(|(name, _)| name.as_str()).collect();
     let bounds = (1..=5).flat_map(|n| {
-        let kinds = ["moment_bound", "moment_bound_adjoint"];
+        let kinds = [
+            "moment_bound",
+            "moment_bound_adjoint",
+            "moment_bound_compensated",
+        ];
         kinds.map(|kind| format!("{kind}_n{n}"))
     });
     let others = [
-        "moment_bound_compensated_n2",
-        "moment_bound_compensated_n3",
         "hamburger_4msm",
         "hausdorff_4msm",
         "hamburger_6msm",

@@ -39,7 +39,8 @@ macro_rules! order {
         $n:literal; $($m:ident $d_m:ident $k:literal),*;
         $Row:ident, $AdjointRow:ident, $Derivative:ident;
         $(#[$bound_doc:meta])* $bound:ident,
-        $(#[$adjoint_doc:meta])* $adjoint:ident
+        $(#[$adjoint_doc:meta])* $adjoint:ident,
+        $(#[$compensated_doc:meta])* $compensated:ident
     ) => {
         /// Moments and a query point.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -100,6 +101,18 @@ macro_rules! order {
             }
         }
 
+        $(#[$compensated_doc])*
+        #[kernel(compute, threads(64), precision(f32, f64), pinned)]
+        pub fn $compensated<R: Real>(
+            #[uniform] settings: &BoundSettings<R>,
+            #[element] row: $Row<R>,
+        ) -> Bound<R> {
+            let m = biased::<R, $n>(row.moments(), settings);
+            Bound {
+                bound: bound_compensated::<R, $n>(m, row.eta).blend(settings.overestimation),
+            }
+        }
+
         $(#[$adjoint_doc])*
         #[kernel(
             compute,
@@ -140,7 +153,10 @@ order! {
     /// Bound on the amount below a query point, from two power moments and their total.
     moment_bound_n1,
     /// Derivatives of the bound from two power moments and their total, times `d_bound`.
-    moment_bound_adjoint_n1
+    moment_bound_adjoint_n1,
+    /// Bound on the amount below a query point, from two power moments and their total, with what
+    /// is ill-conditioned in about twice the digits.
+    moment_bound_compensated_n1
 }
 
 order! {
@@ -149,7 +165,10 @@ order! {
     /// Bound on the amount below a query point, from four power moments and their total.
     moment_bound_n2,
     /// Derivatives of the bound from four power moments and their total, times `d_bound`.
-    moment_bound_adjoint_n2
+    moment_bound_adjoint_n2,
+    /// Bound on the amount below a query point, from four power moments and their total, with what
+    /// is ill-conditioned in about twice the digits.
+    moment_bound_compensated_n2
 }
 
 order! {
@@ -158,7 +177,10 @@ order! {
     /// Bound on the amount below a query point, from six power moments and their total.
     moment_bound_n3,
     /// Derivatives of the bound from six power moments and their total, times `d_bound`.
-    moment_bound_adjoint_n3
+    moment_bound_adjoint_n3,
+    /// Bound on the amount below a query point, from six power moments and their total, with what
+    /// is ill-conditioned in about twice the digits.
+    moment_bound_compensated_n3
 }
 
 order! {
@@ -167,7 +189,10 @@ order! {
     /// Bound on the amount below a query point, from eight power moments and their total.
     moment_bound_n4,
     /// Derivatives of the bound from eight power moments and their total, times `d_bound`.
-    moment_bound_adjoint_n4
+    moment_bound_adjoint_n4,
+    /// Bound on the amount below a query point, from eight power moments and their total, with what
+    /// is ill-conditioned in about twice the digits.
+    moment_bound_compensated_n4
 }
 
 order! {
@@ -176,31 +201,8 @@ order! {
     /// Bound on the amount below a query point, from ten power moments and their total.
     moment_bound_n5,
     /// Derivatives of the bound from ten power moments and their total, times `d_bound`.
-    moment_bound_adjoint_n5
-}
-
-/// Bound on the amount below a query point, from four power moments and their total, with the
-/// ill-conditioned part in about twice the digits.
-#[kernel(compute, threads(64), precision(f32, f64), pinned)]
-pub fn moment_bound_compensated_n2<R: Real>(
-    #[uniform] settings: &BoundSettings<R>,
-    #[element] row: Row2<R>,
-) -> Bound<R> {
-    let m = biased::<R, 2>(row.moments(), settings);
-    Bound {
-        bound: bound_compensated::<R, 2>(m, row.eta).blend(settings.overestimation),
-    }
-}
-
-/// Bound on the amount below a query point, from six power moments and their total, with the
-/// ill-conditioned part in about twice the digits.
-#[kernel(compute, threads(64), precision(f32, f64), pinned)]
-pub fn moment_bound_compensated_n3<R: Real>(
-    #[uniform] settings: &BoundSettings<R>,
-    #[element] row: Row3<R>,
-) -> Bound<R> {
-    let m = biased::<R, 3>(row.moments(), settings);
-    Bound {
-        bound: bound_compensated::<R, 3>(m, row.eta).blend(settings.overestimation),
-    }
+    moment_bound_adjoint_n5,
+    /// Bound on the amount below a query point, from ten power moments and their total, with what
+    /// is ill-conditioned in about twice the digits.
+    moment_bound_compensated_n5
 }

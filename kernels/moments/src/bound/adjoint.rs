@@ -83,12 +83,12 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
 ) -> Gradient<R> {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let recurrence = Recurrence::new::<A, N>(m, eta, floor);
-    let kernel = Kernel::new::<N>(&recurrence);
+    let recurrence = Recurrence::<R, A>::new::<N>(m, eta, floor);
+    let kernel = Kernel::<R, A>::new::<N>(&recurrence);
 
     // All in powers of u times the reach. (K(u) / K(0))², K(u) being Σ e_i u^i.
     let own = squared::<R, N>(&kernel.e);
-    let minor = minor::<R, N>(&kernel);
+    let minor = minor::<R, A, N>(&kernel);
     let blend = overestimation.saturate();
     let own_share = R::select(kernel.turned, blend - one, blend);
     let minor_share = R::select(kernel.turned, -one, one);
@@ -149,7 +149,7 @@ fn squared<R: Real, const N: usize>(p: &[R; MAX + 1]) -> [R; MAX_MOMENTS] {
 /// The polynomial that is 1 at the negative roots, 0 at the others and at 0, and stationary at all
 /// roots.
 #[inline(always)]
-fn minor<R: Real, const N: usize>(kernel: &Kernel<R>) -> [R; MAX_MOMENTS] {
+fn minor<R: Real, A, const N: usize>(kernel: &Kernel<R, A>) -> [R; MAX_MOMENTS] {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     if const { N == 1 } {

@@ -2,7 +2,7 @@
 
 use hankel_dsl::{Real, lit, unroll};
 
-use super::kernel::Kernel;
+use super::kernel::{Kernel, small_weight_of};
 use super::recurrence::{Recurrence, finite};
 use super::roots::all;
 use super::twofold::{Arithmetic, Plain, Twofold};
@@ -48,8 +48,8 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
     floor: R,
 ) -> Canonical<R> {
     let zero: R = lit!(0.0);
-    let recurrence = Recurrence::new::<A, N>(m, eta, floor);
-    let kernel = Kernel::new::<N>(&recurrence);
+    let recurrence = Recurrence::<R, A>::new::<N>(m, eta, floor);
+    let kernel = Kernel::<R, A>::new::<N>(&recurrence);
     let roots = all::<R, N>(&kernel.e);
     let mut found = Canonical {
         reciprocals: [zero; MAX],
@@ -58,7 +58,7 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
     };
     let per_length = kernel.reach / recurrence.unit;
     unroll!(i in 0..N, max 6, {
-        let weight = kernel.small_weight_of::<N>(roots[i]).clamp(zero, kernel.others);
+        let weight = small_weight_of::<R, A, N>(&kernel, roots[i]).clamp(zero, kernel.others);
         found.weights[i] = weight * recurrence.total;
         found.reciprocals[i] = roots[i] * per_length;
     });

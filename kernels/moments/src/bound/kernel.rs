@@ -4,7 +4,8 @@ use hankel_dsl::{Real, lit, unroll};
 
 use super::MAX;
 use super::recurrence::Recurrence;
-use super::roots::{Monic, least_of_cubic, least_two, whole};
+use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_two, whole};
+use super::twofold::Arithmetic;
 
 /// What a query point makes of a recurrence.
 ///
@@ -16,7 +17,7 @@ use super::roots::{Monic, least_of_cubic, least_two, whole};
 /// The side of the query point with fewer roots is always the negative one: if need be the axis is
 /// turned around.
 #[derive(Clone, Copy)]
-pub(crate) struct Kernel<R: Real> {
+pub(crate) struct Kernel<R: Real, A> {
     /// The recurrence, turned around where `turned`.
     pub a: [R; MAX],
     /// Its other coefficients.
@@ -40,26 +41,48 @@ pub(crate) struct Kernel<R: Real> {
     pub e: Monic<R>,
     /// The root of the sum of all `v²`: no root is nearer than its reciprocal.
     pub reach: R,
+    /// The recurrence, turned around where `turned`, with all its digits.
+    fine_a: [A; MAX],
+    fine_b: [A; MAX + 1],
+    /// `p_{N-1}(0)` and `p_N(0)` with all their digits.
+    fine_y: [A; 2],
     /// Whether the axis was turned around.
     pub turned: R::Mask,
     /// How many roots are on the negative side, 0 to N/2.
     pub few: R,
 }
 
-impl<R: Real> Kernel<R> {
+impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
     /// For N steps of a recurrence.
     #[inline(always)]
-    pub fn new<const N: usize>(recurrence: &Recurrence<R>) -> Self {
+    pub fn new<const N: usize>(recurrence: &Recurrence<R, A>) -> Self {
         let zero: R = lit!(0.0);
         let one: R = lit!(1.0);
         let least: R = lit!(1e-37);
-        let mut a = recurrence.a;
-        let b = recurrence.b;
-        let mut y = [one; MAX + 1];
-        y[1] = -a[0];
-        unroll!(k in 1..N, max 6, {
-            y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
+        let mut fine_a = recurrence.a;
+        let fine_b = recurrence.b;
+        let mut a = [zero; MAX];
+        let mut b = [zero; MAX + 1];
+        unroll!(k in 0..N, max 6, {
+            a[k] = fine_a[k].rounded();
+            b[k + 1] = fine_b[k + 1].rounded();
         });
+        let mut y = [one; MAX + 1];
+        let mut fine_y = [A::of(one); 2];
+        y[1] = -a[0];
+        if const { A::TWICE } {
+            fine_y[1] = fine_a[0].scaled(-one);
+            unroll!(k in 1..N, max 6, {
+                let next = fine_a[k].sum_of_products(fine_y[1], fine_b[k], fine_y[0]).scaled(-one);
+                fine_y[0] = fine_y[1];
+                fine_y[1] = next;
+                y[k + 1] = next.rounded();
+            });
+        } else {
+            unroll!(k in 1..N, max 6, {
+                y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
+            });
+        }
 
         // The roots and the query point interlace with the roots of p_N, and how many of those
         // are below the query point is the number of permanences of sign (Sturm).
@@ -79,6 +102,13 @@ impl<R: Real> Kernel<R> {
                 y[k] *= sign;
             }
         });
+        if const { A::TWICE } {
+            unroll!(k in 0..N, max 6, {
+                fine_a[k] = fine_a[k].scaled(sign);
+            });
+            let odd = const { N % 2 };
+            fine_y[odd] = fine_y[odd].scaled(sign);
+        }
         let few = R::select(turned, count - below, below);
 
         let mut c = [one; MAX + 1];
@@ -148,32 +178,12 @@ impl<R: Real> Kernel<R> {
             others,
             e,
             reach,
+            fine_a,
+            fine_b,
+            fine_y,
             turned,
             few,
         }
-    }
-
-    /// `p_k(u)` for the root `u = 1 / (reach v)`, all times a common factor that keeps them within
-    /// range.
-    #[inline(always)]
-    fn vector<const N: usize>(&self, v: R) -> [R; MAX + 1] {
-        let one: R = lit!(1.0);
-        // u = s / t, and the larger of both is 1.
-        let v = v * self.reach;
-        let is_near = v.abs().gt(one);
-        let t = R::select(is_near, one, v);
-        let s = R::select(is_near, one / R::select(is_near, v, one), one);
-        let mut z = [one; MAX + 1];
-        z[1] = s - self.a[0] * t;
-        unroll!(k in 1..N, max 6, {
-            z[k + 1] = (s - self.a[k] * t) * z[k] - self.b[k] * (t * t) * z[k - 1];
-        });
-        let mut power = t;
-        unroll!(k in 0..N, max 6, {
-            z[N - 1 - k] *= power;
-            power *= t;
-        });
-        z
     }
 
     #[inline(always)]
@@ -183,70 +193,6 @@ impl<R: Real> Kernel<R> {
             sum += self.c[k] * (x[k] * y[k]);
         });
         sum
-    }
-
-    /// The root's vector and its square, both freed of the query point's vector, to which it would
-    /// be orthogonal if the root were exact: what a root's rounding error does to its weight is
-    /// thereby undone to first order.
-    #[inline(always)]
-    fn freed<const N: usize>(&self, v: R) -> ([R; MAX + 1], R) {
-        let z = self.vector::<N>(v);
-        let shared = self.dot::<N>(&z, &self.y) / self.square;
-        let mut x = z;
-        unroll!(k in 0..(N + 1), max 6, {
-            x[k] = z[k] - shared * self.y[k];
-        });
-        let least: R = lit!(1e-37);
-        (x, self.dot::<N>(&x, &x).max(least))
-    }
-
-    /// The weight of a single root.
-    #[inline(always)]
-    pub fn weight_of<const N: usize>(&self, v: R) -> R {
-        let (x, square) = self.freed::<N>(v);
-        self.c[0] * x[0] * (x[0] / square)
-    }
-
-    /// The weight of a single root, small ones to their own last digits: those of roots near
-    /// infinity, which freeing would drown.
-    #[inline(always)]
-    pub fn small_weight_of<const N: usize>(&self, v: R) -> R {
-        let z = self.vector::<N>(v);
-        let least: R = lit!(1e-37);
-        let share = z[0] / self.dot::<N>(&z, &z).max(least);
-        let weight = self.c[0] * z[0] * share;
-        R::select(weight.lt(lit!(1e-3)), weight, self.weight_of::<N>(v))
-    }
-
-    /// The weight of the negative side's roots together.
-    #[inline(always)]
-    pub fn weight<const N: usize>(&self) -> R {
-        let zero: R = lit!(0.0);
-        let one: R = lit!(1.0);
-        let weight = if const { N == 1 } {
-            zero
-        } else if const { N == 2 } {
-            self.lesser_of_two(self.a[0], self.mean_square)
-        } else if const { N == 3 } {
-            self.weight_of::<N>(least_of_cubic(&self.e))
-        } else {
-            let (first, second) = if const { N == 4 } {
-                least_two::<R, 4, 3>(&self.e)
-            } else {
-                least_two::<R, 5, 4>(&self.e)
-            };
-            let (x, x_square) = self.freed::<N>(first);
-            let (z, z_square) = self.freed::<N>(second);
-            let (x_share, z_share) = (x[0] / x_square, z[0] / z_square);
-            let single = self.c[0] * x[0] * x_share;
-            // The length of the first axis' projection into the space of both vectors, which need
-            // not be exactly orthogonal.
-            let overlap = self.dot::<N>(&x, &z);
-            let cosine = ((overlap / x_square) * (overlap / z_square)).min(lit!(0.5));
-            let both = single + self.c[0] * z_share * (z[0] - x_share * overlap * lit!(2.0));
-            R::select(self.few.gt(one), both / (one - cosine), single)
-        };
-        R::select(self.few.gt(zero), weight.clamp(zero, self.others), zero)
     }
 
     /// N = 2, one root on each side: the negative one's weight from total, mean and mean square
@@ -281,6 +227,197 @@ impl<R: Real> Kernel<R> {
         let is_small = wanted.lt(half) | !is_other_exact;
         R::select(is_exact & is_small, wanted, one - (self.own + other))
     }
+}
+
+/// `p_k(u)` for the root `u = 1 / (reach v)`, all times a common factor that keeps them within
+/// range.
+#[inline(always)]
+fn vector<R: Real, A: Arithmetic<R>, const N: usize>(kernel: &Kernel<R, A>, v: R) -> [R; MAX + 1] {
+    let one: R = lit!(1.0);
+    // u = s / t, and the larger of both is 1.
+    let v = v * kernel.reach;
+    let is_near = v.abs().gt(one);
+    let t = R::select(is_near, one, v);
+    let s = R::select(is_near, one / R::select(is_near, v, one), one);
+    if const { A::TWICE } {
+        return refined::<R, A, N>(kernel, s, t, is_near);
+    }
+    let mut z = [one; MAX + 1];
+    z[1] = s - kernel.a[0] * t;
+    unroll!(k in 1..N, max 6, {
+        z[k + 1] = (s - kernel.a[k] * t) * z[k] - kernel.b[k] * (t * t) * z[k - 1];
+    });
+    let mut power = t;
+    unroll!(k in 0..N, max 6, {
+        z[N - 1 - k] *= power;
+        power *= t;
+    });
+    z
+}
+
+/// [`vector`](vector) for the root next to `s / t`, of which `t` is 1 where it `is_near`,
+/// and else `s`.
+///
+/// Where roots are close together, or close to the query point, all of this cancels: the recurrence
+/// and the kernel polynomial are evaluated in twice the digits, at a point that has no rounding
+/// error. From there it is not far to the root, so that single digits are enough for the way.
+#[inline(always)]
+fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
+    kernel: &Kernel<R, A>,
+    s: R,
+    t: R,
+    is_near: R::Mask,
+) -> [R; MAX + 1] {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let s_moves = R::select(is_near, one, zero);
+    let t_moves = one - s_moves;
+    let fine_s = A::of(s);
+    let (square, rest) = t.two_product(t);
+    let t_square = A::of_two(square, rest);
+
+    // Value, first derivative and half the second one, in s or t.
+    let mut z = [one; MAX + 1];
+    let mut d = [zero; MAX + 1];
+    let mut h = [zero; MAX + 1];
+    let mut before = A::of(zero);
+    let mut fine = A::of(one);
+    unroll!(k in 0..N, max 6, {
+        let factor = fine_s.minus(kernel.fine_a[k].times_plain(t));
+        let slope = s_moves - t_moves * kernel.a[k];
+        let f = factor.rounded();
+        if const { k == 0 } {
+            before = fine;
+            fine = factor;
+            d[1] = slope;
+        } else {
+            let by = kernel.fine_b[k].times(t_square);
+            let next = factor.cross(fine, by, before);
+            before = fine;
+            fine = next;
+            let bend = t_moves * kernel.b[k];
+            let b = by.rounded();
+            let steep = (bend + bend) * t;
+            d[k + 1] = f * d[k] + slope * z[k] - b * d[k - 1] - steep * z[k - 1];
+            h[k + 1] = f * h[k] + slope * d[k]
+                - b * h[k - 1]
+                - steep * d[k - 1]
+                - bend * z[k - 1];
+        }
+        z[k + 1] = fine.rounded();
+    });
+
+    // The kernel polynomial times u, by Christoffel and Darboux.
+    let b = kernel.fine_b[N];
+    let across = b.times_plain(t);
+    let [y_before, y] = kernel.fine_y;
+    let along = y.times_plain(s).plus(across.times(y_before));
+    let over = b.times(t_square).times(y);
+    let value = along.cross(fine, over, before).rounded();
+    let (a0, o0) = (along.rounded(), over.rounded());
+    let (y_before, y) = (y_before.rounded(), y.rounded());
+    let b = b.rounded();
+    let a1 = s_moves * y + t_moves * (b * y_before);
+    let o2 = t_moves * (b * y);
+    let o1 = (o2 + o2) * t;
+    let slope = a0 * d[N] + a1 * z[N] - o0 * d[N - 1] - o1 * z[N - 1];
+    let bend = a0 * h[N] + a1 * d[N] - o0 * h[N - 1] - o1 * d[N - 1] - o2 * z[N - 1];
+    // The nearer root of the parabola that touches it: right to third order.
+    let least: R = lit!(1e-37);
+    let scale = one / value.abs().max(slope.abs()).max(bend.abs()).max(least);
+    let (value, slope, bend) = (value * scale, slope * scale, bend * scale);
+    let root = (slope * slope - value * bend * lit!(4.0)).max(zero).sqrt();
+    let step = (value + value) / (slope.abs() + root).max(least);
+    let quarter: R = lit!(0.25);
+    let w = R::select(is_near, s, t).abs() * quarter;
+    let step = R::select(slope.lt(zero), step, -step).clamp(-w, w);
+
+    let mut power = one;
+    let t = t + t_moves * step;
+    unroll!(k in 0..(N + 1), max 6, {
+        z[N - k] = (z[N - k] + step * (d[N - k] + step * h[N - k])) * power;
+        power *= t;
+    });
+    z
+}
+
+/// The root's vector and its square, both freed of the query point's vector, to which it would
+/// be orthogonal if the root were exact: what a root's rounding error does to its weight is
+/// thereby undone to first order.
+#[inline(always)]
+fn freed<R: Real, A: Arithmetic<R>, const N: usize>(
+    kernel: &Kernel<R, A>,
+    v: R,
+) -> ([R; MAX + 1], R) {
+    let z = vector::<R, A, N>(kernel, v);
+    let shared = kernel.dot::<N>(&z, &kernel.y) / kernel.square;
+    let mut x = z;
+    unroll!(k in 0..(N + 1), max 6, {
+        x[k] = z[k] - shared * kernel.y[k];
+    });
+    let least: R = lit!(1e-37);
+    (x, kernel.dot::<N>(&x, &x).max(least))
+}
+
+/// The weight of a single root.
+#[inline(always)]
+pub(crate) fn weight_of<R: Real, A: Arithmetic<R>, const N: usize>(
+    kernel: &Kernel<R, A>,
+    v: R,
+) -> R {
+    let (x, square) = freed::<R, A, N>(kernel, v);
+    kernel.c[0] * x[0] * (x[0] / square)
+}
+
+/// The weight of a single root, small ones to their own last digits: those of roots near
+/// infinity, which freeing would drown.
+#[inline(always)]
+pub(crate) fn small_weight_of<R: Real, A: Arithmetic<R>, const N: usize>(
+    kernel: &Kernel<R, A>,
+    v: R,
+) -> R {
+    let z = vector::<R, A, N>(kernel, v);
+    let least: R = lit!(1e-37);
+    let share = z[0] / kernel.dot::<N>(&z, &z).max(least);
+    let weight = kernel.c[0] * z[0] * share;
+    R::select(
+        weight.lt(lit!(1e-3)),
+        weight,
+        weight_of::<R, A, N>(kernel, v),
+    )
+}
+
+/// The weight of the negative side's roots together.
+#[inline(always)]
+pub(crate) fn weight<R: Real, A: Arithmetic<R>, const N: usize>(kernel: &Kernel<R, A>) -> R {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let weight = if const { N == 1 } {
+        zero
+    } else if const { N == 2 && A::TWICE } {
+        weight_of::<R, A, N>(kernel, least_of_quadratic(&kernel.e))
+    } else if const { N == 2 } {
+        kernel.lesser_of_two(kernel.a[0], kernel.mean_square)
+    } else if const { N == 3 } {
+        weight_of::<R, A, N>(kernel, least_of_cubic(&kernel.e))
+    } else {
+        let (first, second) = if const { N == 4 } {
+            least_two::<R, 4, 3>(&kernel.e)
+        } else {
+            least_two::<R, 5, 4>(&kernel.e)
+        };
+        let (x, x_square) = freed::<R, A, N>(kernel, first);
+        let (z, z_square) = freed::<R, A, N>(kernel, second);
+        let (x_share, z_share) = (x[0] / x_square, z[0] / z_square);
+        let single = kernel.c[0] * x[0] * x_share;
+        // The length of the first axis' projection into the space of both vectors, which need
+        // not be exactly orthogonal.
+        let overlap = kernel.dot::<N>(&x, &z);
+        let cosine = ((overlap / x_square) * (overlap / z_square)).min(lit!(0.5));
+        let both = single + kernel.c[0] * z_share * (z[0] - x_share * overlap * lit!(2.0));
+        R::select(kernel.few.gt(one), both / (one - cosine), single)
+    };
+    R::select(kernel.few.gt(zero), weight.clamp(zero, kernel.others), zero)
 }
 
 /// The polynomial in the reciprocal, made monic, with its roots divided by the reach that is

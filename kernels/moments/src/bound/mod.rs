@@ -4,7 +4,7 @@
 //! Among all distributions with moments `m_0` to `m_2N`, the share below a query point is least and
 //! greatest for one that consists of the query point and N others. It is found in two steps:
 //!
-//! 1. [`recurrence`]: the moments' three-term recurrence. The only ill-conditioned step.
+//! 1. [`recurrence`]: the moments' three-term recurrence. It is the step that loses digits.
 //! 2. [`kernel`]: the N points are roots of a polynomial. Only those on the side of the query point
 //!    that has fewer are needed, at most two ([`roots`]), and weights follow from the recurrence as
 //!    quotients of sums of squares: no Vandermonde system, no order to choose.
@@ -24,7 +24,7 @@ pub use adjoint::{Gradient, bound_adjoint, bound_adjoint_compensated, mix_bias_a
 pub use canonical::{Canonical, canonical, canonical_compensated};
 use kernel::Kernel;
 use recurrence::Recurrence;
-use twofold::{Plain, Twofold};
+use twofold::{Arithmetic, Plain, Twofold};
 
 /// The largest N.
 pub const MAX: usize = 5;
@@ -52,34 +52,40 @@ impl<R: Real> Bounds<R> {
 
 /// The bounds at `eta` for moments `m_0` to `m_2N`, N from 1 to 5; the rest of `m` is not used.
 ///
-/// Depths may be anywhere. Anything is accepted: moments that no distribution has give the bounds
+/// Depths may be anywhere: their mean square from 1e-25 to 1e9, and the query point from -1e9 to 1e9.
+/// Anything is accepted: moments that no distribution has give the bounds
 /// of others, what is not a number or beyond range (1e37, and 1e25 times the total) counts as 0,
 /// and a total that is not positive gives 0.
 #[inline(always)]
 pub fn bound<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> {
     let floor = R::epsilon() * lit!(0.25);
-    bounds::<R, N>(&Recurrence::new::<Plain<R>, N>(m, eta, floor))
+    bounds::<R, Plain<R>, N>(&Recurrence::<R, Plain<R>>::new::<N>(m, eta, floor))
 }
 
-/// [`bound`], with the recurrence computed in about twice the digits of the number type. Moments
-/// of tight surfaces lose most of their digits there and next to none elsewhere.
+/// [`bound`] in about twice the digits of the number type wherever digits are lost: in the recurrence,
+/// where tight surfaces lose most of them, and at the query point and at the roots, where the recurrence
+/// cancels once more.
+///
+/// The error is a few roundings: within the range of [`bound`], at most four times what rounding each
+/// argument and the result once does to the answer. That is measured, not proved, for rows of every kind
+/// that a renderer meets, in `f32` and `f64`; the worst of them has 1.8 times.
 #[inline(always)]
 pub fn bound_compensated<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> {
-    let floor = R::epsilon() * R::epsilon();
-    bounds::<R, N>(&Recurrence::new::<Twofold<R>, N>(m, eta, floor))
+    let floor = R::epsilon() * (R::epsilon() * R::epsilon());
+    bounds::<R, Twofold<R>, N>(&Recurrence::<R, Twofold<R>>::new::<N>(m, eta, floor))
 }
 
 #[inline(always)]
-fn bounds<R: Real, const N: usize>(recurrence: &Recurrence<R>) -> Bounds<R> {
+fn bounds<R: Real, A: Arithmetic<R>, const N: usize>(recurrence: &Recurrence<R, A>) -> Bounds<R> {
     const { assert!(N >= 1 && N <= MAX) }
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let kernel = Kernel::new::<N>(recurrence);
-    let weight = kernel.weight::<N>();
+    let kernel = Kernel::<R, A>::new::<N>(recurrence);
+    let weight = kernel::weight::<R, A, N>(&kernel);
     let share = R::select(kernel.turned, kernel.others - weight, weight);
     // Mean and variance alone bound it (Cantelli); more moments never leave that, rounding does.
     let spread = recurrence.spread;
-    let is_above = recurrence.a[0].lt(zero);
+    let is_above = recurrence.a[0].rounded().lt(zero);
     let least = R::select(is_above, recurrence.rest, zero);
     let most = R::select(is_above, one, spread);
     let lower = share.clamp(least, most).saturate();

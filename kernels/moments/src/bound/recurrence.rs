@@ -7,8 +7,8 @@
 //! `α_k` the difference of two entries below the diagonal.
 //!
 //! What low precision loses of tight surfaces it loses here, where pivots are small differences of
-//! moments. All that follows from the coefficients is well conditioned. So this is the one place
-//! where the compensated variant computes with twice the digits.
+//! moments. The compensated variant computes them with twice the digits, and the first row of
+//! differences, of products of two moments each, with all that are left.
 
 use hankel_dsl::{Real, lit, unroll};
 
@@ -16,21 +16,22 @@ use super::twofold::Arithmetic;
 use super::{MAX, MAX_MOMENTS};
 
 /// The recurrence about the query point, in a unit of length that keeps powers of depths within
-/// range.
+/// range. Its coefficients keep all digits that they were computed with.
 #[derive(Clone, Copy)]
-pub(crate) struct Recurrence<R> {
+pub(crate) struct Recurrence<R, A> {
     /// `α_k` minus the query point; `a[0]` is the mean.
-    pub a: [R; MAX],
+    pub a: [A; MAX],
     /// `β_k` from index 1 on; `b[1]` is the variance.
-    pub b: [R; MAX + 1],
+    pub b: [A; MAX + 1],
     /// Mean square distance to the query point: `a[0]² + b[1]`.
     pub square: R,
     /// The variance's share of it.
     pub spread: R,
     /// The squared mean's share of it.
     pub rest: R,
-    /// The unit of length: 1 for N up to 2, where no high powers occur and a rounding less counts;
-    /// else the root of the mean square distance.
+    /// The unit of length, near the root of the mean square distance: a power of two in twice the
+    /// digits. Otherwise 1 for N up to 2, where no high powers occur and a rounding less counts, and
+    /// else the root itself.
     pub unit: R,
     /// `m_0`, or 0 if it is not a positive number.
     pub total: R,
@@ -43,11 +44,23 @@ pub(crate) fn finite<R: Real>(x: R, largest: R) -> R {
 }
 
 /// The largest |a| that is used: 2N factors of that size and a few more stay within the type's
-/// range for the largest N.
+/// range.
 #[inline(always)]
-pub(crate) fn farthest<R: Real>() -> R {
-    let half: R = lit!(0.5);
-    half / R::epsilon().sqrt()
+fn farthest<R: Real, A: Arithmetic<R>, const N: usize>() -> R {
+    if const { !A::TWICE } {
+        let half: R = lit!(0.5);
+        half / R::epsilon().sqrt()
+    } else if const { R::IS_WIDE } {
+        lit!(1e12)
+    } else if const { N < 3 } {
+        lit!(1e7)
+    } else if const { N == 3 } {
+        lit!(1e5)
+    } else if const { N == 4 } {
+        lit!(6e3)
+    } else {
+        lit!(1.4e3)
+    }
 }
 
 /// 2 to that power, of which the exponent is in `f64`'s range.
@@ -108,7 +121,88 @@ fn raise<R: Real>(scale: &mut R, scaled: &mut R, power: R, limit: R) {
     *scaled *= factor;
 }
 
-impl<R: Real> Recurrence<R> {
+/// One step of [`power_of_two`].
+#[inline(always)]
+fn halve<R: Real>(square: &mut R, unit: &mut R, below: R, squared: R, by: R) {
+    let small = square.lt(below);
+    *square = R::select(small, *square * squared, *square);
+    *unit = R::select(small, *unit * by, *unit);
+}
+
+/// A power of two from half the root of `square` to twice that, for squares from 1e-24 to 1e24.
+#[inline(always)]
+fn power_of_two<R: Real>(square: R) -> R {
+    let mut square = square;
+    let mut unit: R = lit!(1.0);
+    let large = square.gt(lit!(1.0));
+    square = R::select(large, square * lit!(two_to(-80)), square);
+    unit = R::select(large, lit!(two_to(40)), unit);
+    halve(
+        &mut square,
+        &mut unit,
+        lit!(two_to(-64)),
+        lit!(two_to(64)),
+        lit!(two_to(-32)),
+    );
+    halve(
+        &mut square,
+        &mut unit,
+        lit!(two_to(-32)),
+        lit!(two_to(32)),
+        lit!(two_to(-16)),
+    );
+    halve(
+        &mut square,
+        &mut unit,
+        lit!(two_to(-16)),
+        lit!(two_to(16)),
+        lit!(two_to(-8)),
+    );
+    halve(
+        &mut square,
+        &mut unit,
+        lit!(two_to(-8)),
+        lit!(two_to(8)),
+        lit!(two_to(-4)),
+    );
+    halve(
+        &mut square,
+        &mut unit,
+        lit!(two_to(-4)),
+        lit!(two_to(4)),
+        lit!(two_to(-2)),
+    );
+    halve(
+        &mut square,
+        &mut unit,
+        lit!(two_to(-2)),
+        lit!(two_to(2)),
+        lit!(two_to(-1)),
+    );
+    unit
+}
+
+/// [`power_of_two`] of a mean square depth, of which the power for the last moment is within range,
+/// too.
+#[inline(always)]
+fn depth_unit<R: Real, const N: usize>(mean_square: R) -> R {
+    let unit = power_of_two(mean_square.clamp(lit!(1e-37), lit!(1e24)));
+    if const { R::IS_WIDE } {
+        unit
+    } else if const { N == 1 } {
+        unit.clamp(lit!(two_to(-50)), lit!(two_to(50)))
+    } else if const { N == 2 } {
+        unit.clamp(lit!(two_to(-26)), lit!(two_to(26)))
+    } else if const { N == 3 } {
+        unit.clamp(lit!(two_to(-18)), lit!(two_to(18)))
+    } else if const { N == 4 } {
+        unit.clamp(lit!(two_to(-13)), lit!(two_to(13)))
+    } else {
+        unit.clamp(lit!(two_to(-10)), lit!(two_to(10)))
+    }
+}
+
+impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
     /// The first N steps for moments `m_0` to `m_2N`, of any value, and query point `eta`.
     ///
     /// What is not a number, or too large (the query point above 1e12, a moment above 1e25 times
@@ -117,7 +211,7 @@ impl<R: Real> Recurrence<R> {
     /// Pivots are lifted to the size of their own rounding errors, `floor` times the moment on the
     /// diagonal: `ε/4` for plain arithmetic.
     #[inline(always)]
-    pub fn new<A: Arithmetic<R>, const N: usize>(m: [R; MAX_MOMENTS], eta: R, floor: R) -> Self {
+    pub fn new<const N: usize>(m: [R; MAX_MOMENTS], eta: R, floor: R) -> Self {
         let zero: R = lit!(0.0);
         let largest: R = lit!(1e25);
         let far: R = if const { N > 2 } {
@@ -129,33 +223,70 @@ impl<R: Real> Recurrence<R> {
         let lift = lift(total);
         let lifted = total * lift;
         let scale = scale(lifted);
-        let eta = finite(eta, far);
-        let query = A::of(eta);
+        let mut eta = finite(eta, far);
 
         let mut current = [A::of(zero); MAX_MOMENTS];
         let scaled_total = (lifted * scale).max(lit!(1e-12));
         // Far below what rounding leaves of a pivot, and far above what is too small to divide by.
-        let least = R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)));
+        let least = if const { A::TWICE } {
+            scaled_total * lit!(1e-26)
+        } else {
+            R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)))
+        };
         current[0] = A::of(scaled_total);
         unroll!(k in 1..(2 * N + 1), max 11, {
             current[k] = A::of(finite(finite(m[k], lit!(1e37)) * lift * scale, largest));
         });
+        // In a length near the root of the mean square depth, even moments are 1 and more.
+        let one: R = lit!(1.0);
+        let mut length = one;
+        if const { A::TWICE } {
+            length = depth_unit::<R, N>(current[2].rounded() / scaled_total);
+            let per_length = one / length;
+            let mut power = one;
+            unroll!(k in 1..(2 * N + 1), max 11, {
+                power *= per_length;
+                let scaled = current[k].rounded() * power;
+                current[k] = A::of(finite(scaled, largest));
+            });
+            // No distribution has larger ones of these within that range: their products are finite.
+            let (most, most_square): (R, R) = if const { N == 1 } {
+                (lit!(1e17), largest)
+            } else {
+                (lit!(1e12), lit!(1e17))
+            };
+            current[1] = A::of(finite(current[1].rounded(), most));
+            current[2] = A::of(finite(current[2].rounded(), most_square));
+            eta = (eta * per_length).clamp(-far, far);
+        }
+        let query = A::of(eta);
         let raw = current;
         let mut previous = current;
 
         let mut slope = current[1].over(current[0]);
         let mut alpha = slope.within(-far, far);
+        // With `scaled`, entries of the first row and all that follow are `m_0` times what they are
+        // otherwise: without a quotient, they are all but exact.
         let mut beta = A::of(zero);
         let mut square = scaled_total;
         let mut unit = scaled_total;
         let mut limit = far;
-        let mut a = [zero; MAX];
-        let mut b = [zero; MAX + 1];
-        a[0] = alpha.minus(query).rounded();
+        let mut a = [A::of(zero); MAX];
+        let mut b = [A::of(zero); MAX + 1];
+        a[0] = if const { A::TWICE } {
+            let difference = A::difference(current[1].rounded(), one, eta, scaled_total);
+            difference.over(current[0]).within(-far - far, far + far)
+        } else {
+            alpha.minus(query)
+        };
         unroll!(k in 1..(N + 1), max 6, {
             let mut next = current;
             unroll!(l in 1..10, max 11, {
-                if const { l >= k && l + k <= 2 * N } {
+                if const { A::TWICE && k == 1 && l < 2 * N } {
+                    let (of_this, of_next) = (raw[l].rounded(), raw[l + 1].rounded());
+                    let t = A::difference(scaled_total, of_next, raw[1].rounded(), of_this);
+                    next[l] = t.within(-largest, largest);
+                } else if const { l >= k && l + k <= 2 * N } {
                     let mut t = current[l + 1].minus(alpha.times(current[l]));
                     if const { k > 1 } {
                         t = t.minus(beta.times(previous[l]));
@@ -166,39 +297,66 @@ impl<R: Real> Recurrence<R> {
             if const { k == 2 } {
                 // As the Cholesky factorisation has it: where a bias is all that is left of the
                 // pivot, this keeps more of it.
-                let mean_square = raw[2].over(raw[0]);
-                let t = raw[4].minus(mean_square.times(raw[2]));
+                let t = if const { A::TWICE } {
+                    let square = raw[2].rounded();
+                    A::difference(scaled_total, raw[4].rounded(), square, square)
+                } else {
+                    let mean_square = raw[2].over(raw[0]);
+                    raw[4].minus(mean_square.times(raw[2]))
+                };
                 let t = t.minus(slope.times(current[2]));
                 next[2] = t.within(-largest, largest);
             }
             let noise = raw[2 * k].rounded().abs() * floor;
             next[k] = next[k].at_least(noise.max(least));
-            beta = next[k].over(current[k - 1]).within(zero, far);
-            b[k] = beta.rounded();
+            let most_beta = if const { A::TWICE && k == 1 } {
+                lit!(1e12)
+            } else {
+                far
+            };
+            beta = next[k].over(current[k - 1]).within(zero, most_beta);
+            b[k] = if const { A::TWICE && k == 1 } {
+                beta.over(current[0]).within(zero, far)
+            } else {
+                beta
+            };
             if const { k == 1 } {
-                square = b[1] + a[0] * a[0];
-                unit = square.sqrt();
-                limit = (unit * farthest::<R>()).min(far);
+                square = b[1].rounded() + a[0].rounded() * a[0].rounded();
+                unit = if const { A::TWICE } {
+                    power_of_two(square)
+                } else {
+                    square.sqrt()
+                };
+                limit = (unit * farthest::<R, A, N>()).min(far);
             }
             if const { k < N } {
                 let below = next[k + 1].over(next[k]);
                 alpha = below.minus(slope).within(eta - limit, eta + limit);
                 slope = below;
-                a[k] = alpha.minus(query).rounded();
+                a[k] = alpha.minus(query);
             }
             previous = current;
             current = next;
         });
 
-        let spread = b[1] / square;
-        let one: R = lit!(1.0);
+        let (mean, variance) = (a[0].rounded(), b[1].rounded());
+        let spread = variance / square;
         // The complement where that rounds less.
-        let rest = R::select(spread.lt(lit!(0.5)), one - spread, a[0] * a[0] / square);
-        if const { N > 2 } {
-            let most = farthest::<R>() * farthest::<R>();
+        let rest = R::select(spread.lt(lit!(0.5)), one - spread, mean * mean / square);
+        let most = farthest::<R, A, N>() * farthest::<R, A, N>();
+        if const { A::TWICE } {
+            let per_unit = one / unit;
+            let per_square = per_unit * per_unit;
             unroll!(k in 0..N, max 6, {
-                a[k] = a[k] / unit;
-                b[k + 1] = (b[k + 1] / square).min(most);
+                a[k] = a[k].scaled(per_unit);
+                b[k + 1] = b[k + 1].scaled(per_square).within(zero, most);
+            });
+            square *= per_square;
+            unit *= length;
+        } else if const { N > 2 } {
+            unroll!(k in 0..N, max 6, {
+                a[k] = A::of(a[k].rounded() / unit);
+                b[k + 1] = A::of((b[k + 1].rounded() / square).min(most));
             });
             square = one;
         } else {

@@ -3,22 +3,18 @@
 //! Polynomials are monic and given by their other coefficients: `e[i]` belongs to
 //! `v^(degree - i)`, `e[0]` is 1. Roots are expected in [-1, 1].
 
-use hankel_dsl::{Real, lit, unroll};
+use hankel_dsl::{Mask, Real, lit, unroll};
 
 use super::MAX;
-
-/// The same where every root is wanted, to the last digit.
-const FOR_ALL: u32 = 16;
 
 /// Coefficients of a monic polynomial, highest power first.
 pub(crate) type Monic<R> = [R; MAX + 1];
 
-/// Steps of Laguerre's method towards the least root of a polynomial. Each is cubic once it is
-/// nearer to that root than to the next; where roots lie close together on the way, it starts
-/// with a few that are not.
-const FROM_OUTSIDE: u32 = 8;
-/// Steps from a stationary point to a neighbouring root.
-const FROM_STATIONARY: u32 = 6;
+/// The most steps of Laguerre's method towards a root. Near a root each is cubic, and three or four
+/// are enough. Of a distant group of roots each only takes off a share of the distance, for four of five
+/// roots five eighths: so many steps go down to a rounding error of the largest root.
+const STEPS: u32 = 18;
+const STEPS_WIDE: u32 = 40;
 
 /// Small whole numbers, which compilers fold into constants.
 #[inline(always)]
@@ -53,17 +49,18 @@ fn value<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R, R) {
     (p, d, h)
 }
 
-/// Length of Laguerre's step. For a polynomial with real roots only, it never passes the next root
+/// Value, and length of Laguerre's step. For a polynomial with real roots only, it never passes the next root
 /// on the side that it is taken to (A. Householder, *The Numerical Treatment of a Single Nonlinear
 /// Equation*, 1970, section 4.4).
 #[inline(always)]
-fn laguerre<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> R {
+fn laguerre<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R) {
     let (p, d, h) = value::<R, DEGREE>(e, v);
     let zero: R = lit!(0.0);
     let less = whole::<R>(DEGREE - 1);
     let least: R = lit!(1e-30);
     let square = less * (less * (d * d) - whole::<R>(2 * DEGREE) * (p * h));
-    whole::<R>(DEGREE) * p.abs() / (d.abs() + square.max(zero).sqrt()).max(least)
+    let length = whole::<R>(DEGREE) * p.abs() / (d.abs() + square.max(zero).sqrt()).max(least);
+    (p, length)
 }
 
 /// One step of Newton's method, kept within the bracket.
@@ -75,6 +72,41 @@ fn newton<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R, low: R, high: R) -> 
     (v - p / slope).clamp(low, high)
 }
 
+/// Laguerre's steps in one direction, 1 or -1, within limits, until they are as short as rounding or
+/// rounding has taken them past the root: before it, the polynomial has the sign that is given, 1 or
+/// -1.
+///
+/// Each lane stops on its own, so that its result does not depend on its neighbours.
+#[inline(always)]
+fn approach<R: Real, const DEGREE: usize>(
+    e: &Monic<R>,
+    from: R,
+    direction: R,
+    sign: R,
+    low: R,
+    high: R,
+) -> R {
+    let most = if const { R::IS_WIDE } {
+        STEPS_WIDE
+    } else {
+        STEPS
+    };
+    let zero: R = lit!(0.0);
+    let mut v = from;
+    let mut goes_on = zero.le(zero);
+    let mut i = 0;
+    while i < most {
+        if goes_on.any() {
+            let (value, length) = laguerre::<R, DEGREE>(e, v);
+            goes_on = goes_on & (value * sign).gt(zero);
+            v = R::select(goes_on, (v + direction * length).clamp(low, high), v);
+            goes_on = goes_on & length.gt(v.abs() * R::epsilon());
+        }
+        i += 1;
+    }
+    v
+}
+
 /// The least root, from the left: Laguerre's step from minus infinity, and then steps that never
 /// pass it.
 #[inline(always)]
@@ -83,13 +115,9 @@ fn from_outside<R: Real, const DEGREE: usize>(e: &Monic<R>) -> R {
     let one: R = lit!(1.0);
     let less = whole::<R>(DEGREE - 1);
     let square = less * (less * (e[1] * e[1]) - whole::<R>(2 * DEGREE) * e[2]);
-    let mut v = -(e[1] + square.max(zero).sqrt()) * (one / whole::<R>(DEGREE));
-    let mut i = 0;
-    while i < FROM_OUTSIDE {
-        v = (v + laguerre::<R, DEGREE>(e, v)).min(one);
-        i += 1;
-    }
-    v
+    let v = -(e[1] + square.max(zero).sqrt()) * (one / whole::<R>(DEGREE));
+    let sign = if const { DEGREE % 2 == 0 } { one } else { -one };
+    approach::<R, DEGREE>(e, v, one, sign, v, one)
 }
 
 /// The least root of a quadratic, if it is negative; else 0.
@@ -107,8 +135,7 @@ pub(crate) fn least_of_quadratic<R: Real>(e: &Monic<R>) -> R {
 pub(crate) fn least_of_cubic<R: Real>(e: &Monic<R>) -> R {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
-    let v = from_outside::<R, 3>(e).clamp(-one, zero);
-    newton::<R, 3>(e, v, -one, zero)
+    from_outside::<R, 3>(e).clamp(-one, zero)
 }
 
 /// The two least roots, where they are negative; else 0. DEGREE is 4 or 5, REDUCED one less.
@@ -126,17 +153,11 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
         derivative[i] = e[i] * (whole::<R>(DEGREE - i) / whole::<R>(DEGREE));
     });
     let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
-    let mut first = between;
-    let mut second = between;
-    let mut i = 0;
-    while i < FROM_STATIONARY {
-        first = (first - laguerre::<R, DEGREE>(e, first)).max(-one);
-        second = (second + laguerre::<R, DEGREE>(e, second)).min(zero);
-        i += 1;
-    }
+    // Between both, the polynomial has the sign that it does not have on the left.
+    let sign = if const { DEGREE % 2 == 0 } { -one } else { one };
     (
-        newton::<R, DEGREE>(e, first, -one, between),
-        newton::<R, DEGREE>(e, second, between, zero),
+        approach::<R, DEGREE>(e, between, -one, sign, -one, zero),
+        approach::<R, DEGREE>(e, between, one, sign, -one, zero),
     )
 }
 
@@ -171,17 +192,18 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
                     // From the stationary point above, or for the last one from that below.
                     let low = if const { i == 0 } { -one } else { stationary[i - 1] };
                     let high = if const { i + 1 == d } { one } else { stationary[i] };
-                    let mut v = if const { i + 1 == d } { low } else { high };
-                    let mut step = 0;
-                    while step < FOR_ALL {
-                        let length = laguerre::<R, d>(&derivative, v);
-                        v = if const { i + 1 == d } {
-                            (v + length).min(one)
-                        } else {
-                            (v - length).max(-one)
-                        };
-                        step += 1;
-                    }
+                    let (from, direction) = if const { i + 1 == d } {
+                        (low, one)
+                    } else {
+                        (high, -one)
+                    };
+                    // Above root i for all but the last, below that.
+                    let sign = if const { i + 1 == d || (d + i) % 2 == 0 } {
+                        -one
+                    } else {
+                        one
+                    };
+                    let v = approach::<R, d>(&derivative, from, direction, sign, -one, one);
                     roots[i] = newton::<R, d>(&derivative, v, low, high);
                 }
             });

@@ -4,14 +4,30 @@ use hankel_dsl::{Real, lit};
 
 /// The arithmetic that the recurrence needs.
 pub(crate) trait Arithmetic<R: Real>: Copy {
+    /// Whether it has about twice the digits of the base type.
+    const TWICE: bool;
     /// Exactly `x`.
     fn of(x: R) -> Self;
+    /// `high + low`, of which `low` is a rounding error of `high`.
+    fn of_two(high: R, low: R) -> Self;
+    /// `a b - c d`
+    fn difference(a: R, b: R, c: R, d: R) -> Self;
     /// The nearest number of the base type.
     fn rounded(self) -> R;
     /// Difference.
     fn minus(self, other: Self) -> Self;
     /// Product.
     fn times(self, other: Self) -> Self;
+    /// Product with a number of the base type.
+    fn times_plain(self, x: R) -> Self;
+    /// Product with a power of two.
+    fn scaled(self, power: R) -> Self;
+    /// Sum.
+    fn plus(self, other: Self) -> Self;
+    /// `self a + b c`
+    fn sum_of_products(self, a: Self, b: Self, c: Self) -> Self;
+    /// `self a - b c`
+    fn cross(self, a: Self, b: Self, c: Self) -> Self;
     /// Quotient. Its magnitude is limited to 2⁸⁰, so that a vanishing divisor (which must not be
     /// negative) does no harm.
     fn over(self, positive: Self) -> Self;
@@ -34,9 +50,18 @@ fn divisor<R: Real>(numerator: R, positive: R) -> R {
 pub(crate) struct Plain<R>(R);
 
 impl<R: Real> Arithmetic<R> for Plain<R> {
+    const TWICE: bool = false;
     #[inline(always)]
     fn of(x: R) -> Self {
         Self(x)
+    }
+    #[inline(always)]
+    fn of_two(high: R, _low: R) -> Self {
+        Self(high)
+    }
+    #[inline(always)]
+    fn difference(a: R, b: R, c: R, d: R) -> Self {
+        Self(a * b - c * d)
     }
     #[inline(always)]
     fn rounded(self) -> R {
@@ -49,6 +74,26 @@ impl<R: Real> Arithmetic<R> for Plain<R> {
     #[inline(always)]
     fn times(self, other: Self) -> Self {
         Self(self.0 * other.0)
+    }
+    #[inline(always)]
+    fn times_plain(self, x: R) -> Self {
+        Self(self.0 * x)
+    }
+    #[inline(always)]
+    fn scaled(self, power: R) -> Self {
+        Self(self.0 * power)
+    }
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        Self(self.0 + other.0)
+    }
+    #[inline(always)]
+    fn sum_of_products(self, a: Self, b: Self, c: Self) -> Self {
+        Self(self.0 * a.0 + b.0 * c.0)
+    }
+    #[inline(always)]
+    fn cross(self, a: Self, b: Self, c: Self) -> Self {
+        Self(self.0 * a.0 - b.0 * c.0)
     }
     #[inline(always)]
     fn over(self, positive: Self) -> Self {
@@ -82,15 +127,39 @@ impl<R: Real> Twofold<R> {
         let (high, low) = high.two_sum(low);
         Self { high, low }
     }
+
+    /// The product: rounded, and what that took off.
+    #[inline(always)]
+    fn product(self, other: Self) -> (R, R) {
+        let (product, error) = self.high.two_product(other.high);
+        (
+            product,
+            error + (self.high * other.low + self.low * other.high),
+        )
+    }
 }
 
 impl<R: Real> Arithmetic<R> for Twofold<R> {
+    const TWICE: bool = true;
     #[inline(always)]
     fn of(x: R) -> Self {
         Self {
             high: x,
             low: lit!(0.0),
         }
+    }
+    #[inline(always)]
+    fn of_two(high: R, low: R) -> Self {
+        Self { high, low }
+    }
+    #[inline(always)]
+    fn difference(a: R, b: R, c: R, d: R) -> Self {
+        let (first, rest) = a.two_product(b);
+        let (second, other) = c.two_product(d);
+        let (sum, error) = first.two_sum(-second);
+        // Where the products cancel, their errors are all that is left.
+        let (sum, left) = sum.two_sum(rest - other);
+        Self::of_parts(sum, error + left)
     }
     #[inline(always)]
     fn rounded(self) -> R {
@@ -103,9 +172,37 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     }
     #[inline(always)]
     fn times(self, other: Self) -> Self {
-        let (product, error) = self.high.two_product(other.high);
-        let cross = self.high * other.low + self.low * other.high;
-        Self::of_parts(product, error + cross)
+        let (product, rest) = self.product(other);
+        Self::of_parts(product, rest)
+    }
+    #[inline(always)]
+    fn times_plain(self, x: R) -> Self {
+        let (product, error) = self.high.two_product(x);
+        Self::of_parts(product, error + self.low * x)
+    }
+    #[inline(always)]
+    fn scaled(self, power: R) -> Self {
+        Self {
+            high: self.high * power,
+            low: self.low * power,
+        }
+    }
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        let (sum, error) = self.high.two_sum(other.high);
+        Self::of_parts(sum, error + (self.low + other.low))
+    }
+    #[inline(always)]
+    fn sum_of_products(self, a: Self, b: Self, c: Self) -> Self {
+        let one: R = lit!(1.0);
+        self.cross(a, b.scaled(-one), c)
+    }
+    #[inline(always)]
+    fn cross(self, a: Self, b: Self, c: Self) -> Self {
+        let (first, rest) = self.product(a);
+        let (second, other) = b.product(c);
+        let (sum, error) = first.two_sum(-second);
+        Self::of_parts(sum, error + (rest - other))
     }
     #[inline(always)]
     fn over(self, positive: Self) -> Self {
