@@ -32,7 +32,7 @@ fn native(options: &Options) -> Stress {
 fn no_family_makes_a_kernel_fail() {
     let stress = native(&options(&[], 200));
     let mut seen = 0;
-    for c in &stress.cells {
+    for c in stress.cells.iter().filter(|c| c.solver.is_kernel()) {
         let key = (&c.family, c.n, c.precision, c.solver, &c.backend);
         assert_eq!(
             (c.non_finite, c.out_of_range, c.other_bits.unwrap_or(0)),
@@ -62,7 +62,8 @@ fn no_family_makes_a_kernel_fail() {
 #[test]
 fn errors_of_easy_rows_are_rounding_errors() {
     let stress = native(&options(&["paper", "generic-symmetric"], 500));
-    for c in stress.cells.iter().filter(|c| c.n <= 2) {
+    let kernels = stress.cells.iter().filter(|c| c.solver.is_kernel());
+    for c in kernels.filter(|c| c.n <= 2) {
         let epsilon = match c.precision {
             Precision::F32 => f64::from(f32::EPSILON),
             Precision::F64 => f64::EPSILON,
@@ -72,6 +73,22 @@ fn errors_of_easy_rows_are_rounding_errors() {
         assert!(error.median <= error.ninety && error.ninety <= error.ninety_nine);
         assert!(error.ninety_nine <= error.greatest);
     }
+}
+
+#[test]
+fn compensated_bounds_are_as_exact_as_their_inputs() {
+    let stress = native(&options(&[], 1000));
+    let mut cells = 0;
+    for c in &stress.cells {
+        let Some(over) = c.over.filter(|_| c.solver == Solver::Compensated) else {
+            continue;
+        };
+        let key = (&c.family, c.n, c.precision, &c.backend, c.worst);
+        assert!(over.greatest <= 4.0, "{key:?}: {over:?}");
+        cells += 1;
+    }
+    // By family, n, format and backend.
+    assert!(cells > 300, "{cells}");
 }
 
 #[test]
@@ -203,7 +220,8 @@ fn what_a_backend_lacks_is_noted_and_what_fails_is_an_error() {
     let mut scalar = Native::scalar();
     let stress = run(&options, &mut [&mut scalar, &mut lacks], &mut |_| ()).unwrap();
     assert!(stress.notes.iter().any(|n| n.contains("no such numbers")));
-    assert!(stress.cells.iter().all(|c| c.backend == "native"));
+    let mut kernels = stress.cells.iter().filter(|c| c.solver.is_kernel());
+    assert!(kernels.all(|c| c.backend == "native"));
 
     let mut fails = Unable(BackendError::Failed("gone".into()));
     let error = run(&options, &mut [&mut fails], &mut |_| ()).unwrap_err();

@@ -83,7 +83,7 @@ impl Neg for DoubleDouble {
 
 impl Add for DoubleDouble {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn add(self, other: Self) -> Self {
         let (s, s_error) = self.high.two_sum(other.high);
         let (t, t_error) = self.low.two_sum(other.low);
@@ -94,7 +94,7 @@ impl Add for DoubleDouble {
 
 impl Mul for DoubleDouble {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         let (p, error) = product(self.high, other.high);
         let cross = self.high * other.low + self.low * other.high;
@@ -104,7 +104,7 @@ impl Mul for DoubleDouble {
 
 impl Div for DoubleDouble {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn div(self, other: Self) -> Self {
         let quotient = self.high / other.high;
         let (p, error) = product(quotient, other.high);
@@ -129,7 +129,7 @@ impl Real for DoubleDouble {
     fn epsilon() -> Self {
         (f64::EPSILON * f64::EPSILON).into()
     }
-    #[inline(always)]
+    #[inline(never)]
     fn sqrt(self) -> Self {
         let root = self.high.sqrt();
         if root == 0.0 {

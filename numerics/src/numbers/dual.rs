@@ -67,7 +67,7 @@ impl<R: Real> Neg for Dual<R> {
 
 impl<R: Real> Add for Dual<R> {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn add(self, other: Self) -> Self {
         Self {
             value: self.value + other.value,
@@ -78,7 +78,7 @@ impl<R: Real> Add for Dual<R> {
 
 impl<R: Real> Mul for Dual<R> {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         Self {
             value: self.value * other.value,
@@ -89,7 +89,7 @@ impl<R: Real> Mul for Dual<R> {
 
 impl<R: Real> Div for Dual<R> {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
         Self {
@@ -113,7 +113,7 @@ impl<R: Real> Real for Dual<R> {
     fn epsilon() -> Self {
         Self::constant(R::epsilon())
     }
-    #[inline(always)]
+    #[inline(never)]
     fn sqrt(self) -> Self {
         let value = self.value.sqrt();
         let is_positive = value.gt(lit!(0.0));

@@ -221,7 +221,7 @@ impl Neg for Interval {
 
 impl Add for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn add(self, other: Self) -> Self {
         let (lower, lower_error) = self.lower.two_sum(other.lower);
         let (upper, upper_error) = self.upper.two_sum(other.upper);
@@ -234,7 +234,7 @@ impl Add for Interval {
 
 impl Mul for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         Self::of_corners(self, other, product_of_ends)
     }
@@ -242,7 +242,7 @@ impl Mul for Interval {
 
 impl Div for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn div(self, other: Self) -> Self {
         let is_inside = other.lower < 0.0 && other.upper > 0.0;
         if is_inside || (other.lower == 0.0 && other.upper == 0.0) {
@@ -276,7 +276,7 @@ impl Real for Interval {
     fn epsilon() -> Self {
         f64::EPSILON.into()
     }
-    #[inline(always)]
+    #[inline(never)]
     fn sqrt(self) -> Self {
         if self.upper < 0.0 {
             return Self::ENTIRE;

@@ -16,6 +16,9 @@
 //! in a wider type is another function wherever a floor or a clamp is made of it. To see rounding
 //! errors and nothing else, evaluate in [`Unrounded`].
 //!
+//! Operations that are more than a few instructions are functions that are called: a kernel is one long
+//! stretch of them, and takes minutes to compile where each is written out.
+//!
 //! Kernels divide by nothing that can be zero and take no root of what can be negative. Where one
 //! does nevertheless, [`Wide`] is undefined from there on, as a NaN is; [`DoubleDouble`] is a NaN or
 //! infinite; and [`Interval`] is the whole line.

@@ -508,8 +508,11 @@ pub fn per_row(function: &str, n: usize, rows: &[Row<f32>]) -> Option<Operations
         moment_bound_n3 3 Row3 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 };
         moment_bound_n4 4 Row4 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 };
         moment_bound_n5 5 Row5 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 };
+        moment_bound_compensated_n1 1 Row1 -> Bound { m0 0, m1 1, m2 2 };
         moment_bound_compensated_n2 2 Row2 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4 };
         moment_bound_compensated_n3 3 Row3 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 };
+        moment_bound_compensated_n4 4 Row4 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 };
+        moment_bound_compensated_n5 5 Row5 -> Bound { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 };
         moment_bound_adjoint_n1 1 AdjointRow1 -> Derivative1 { m0 0, m1 1, m2 2 } d_bound;
         moment_bound_adjoint_n2 2 AdjointRow2 -> Derivative2 { m0 0, m1 1, m2 2, m3 3, m4 4 } d_bound;
         moment_bound_adjoint_n3 3 AdjointRow3 -> Derivative3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 } d_bound;

@@ -4,7 +4,8 @@
 //! All rows count when it is asked whether a result is a number from 0 to m_0. Errors are taken over
 //! *valid* rows only, those whose own numbers, rounded as they are, make a positive definite Hankel
 //! matrix; others have no right answer. An error is a share of m_0, the larger one of the lower and
-//! the upper bound's. The reference is the same source in double-double, or with 300 bits where that
+//! the upper bound's. The main figure is the error over the *sensitivity*, which is what rounding each
+//! of a row's numbers and the result once does to the answer: a hard row is no bad algorithm. The reference is the same source in double-double, or with 300 bits where that
 //! is not enough; samples of it are compared with 300 bits and with the linear programme.
 
 mod backend;
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::families::{FAMILIES, Family, Format, ORDERS, Precision, Row, Validity};
 use crate::peer::{Peer, PeerError, Quantity};
+use crate::published::{self, Float};
 use crate::speed::Quantiles;
 
 /// Why bounds could not be put under stress.
@@ -146,6 +148,8 @@ pub enum Solver {
     Plain,
     /// `moment_bound_compensated_nN`.
     Compensated,
+    /// Algorithm 1 of the 2025 paper, as [`published::moment_bound`] has it.
+    Published,
     /// `diffmoments`.
     Peer,
 }
@@ -157,8 +161,15 @@ impl Solver {
         match self {
             Self::Plain => "plain",
             Self::Compensated => "compensated",
+            Self::Published => "published",
             Self::Peer => "diffmoments",
         }
+    }
+
+    /// Whether it is a kernel.
+    #[must_use]
+    pub const fn is_kernel(self) -> bool {
+        matches!(self, Self::Plain | Self::Compensated)
     }
 
     /// The kernel function of an order; `None` for what is no kernel.
@@ -166,7 +177,7 @@ impl Solver {
         match self {
             Self::Plain => Some(format!("moment_bound_n{n}")),
             Self::Compensated => Some(format!("moment_bound_compensated_n{n}")),
-            Self::Peer => None,
+            Self::Published | Self::Peer => None,
         }
     }
 }
@@ -200,7 +211,9 @@ pub struct Cell {
     pub other_bits: Option<u64>,
     /// Errors over the valid rows, as shares of m_0; `None` without valid rows.
     pub error: Option<Quantiles>,
-    /// The number of the worst valid row.
+    /// Their errors over their sensitivities.
+    pub over: Option<Quantiles>,
+    /// The number of the valid row with the greatest quotient.
     pub worst: Option<u64>,
 }
 
@@ -225,16 +238,13 @@ pub struct Stress {
 
 impl Stress {
     /// Whether every kernel gave a number from 0 to m_0 for every row, and lanes the scalar bits.
-    /// `diffmoments` is not asked.
+    /// What is no kernel is not asked.
     #[must_use]
     pub fn passed(&self) -> bool {
-        self.cells
-            .iter()
-            .filter(|c| c.solver != Solver::Peer)
-            .all(|c| {
-                let same = c.backend != LANES || c.other_bits.unwrap_or(0) == 0;
-                c.non_finite == 0 && c.out_of_range == 0 && same
-            })
+        self.cells.iter().filter(|c| c.solver.is_kernel()).all(|c| {
+            let same = c.backend != LANES || c.other_bits.unwrap_or(0) == 0;
+            c.non_finite == 0 && c.out_of_range == 0 && same
+        })
     }
 }
 
@@ -287,7 +297,7 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    fn run<T: Format>(
+    fn run<T: Float>(
         &mut self,
         backends: &mut [&mut dyn Backend],
         peer: Option<&mut Peer>,
@@ -339,6 +349,19 @@ impl Case<'_> {
                 self.stress.cells.push(cell);
             }
         }
+        let bounds: Vec<[T; 2]> = rows
+            .par_iter()
+            .map(|row| published::moment_bound(n, row.m, row.eta))
+            .map(|b| [b.lower, b.upper])
+            .collect();
+        let cell = self.cell(
+            Solver::Published,
+            "library".into(),
+            &rows,
+            &judgements,
+            &bounds,
+        );
+        self.stress.cells.push(cell);
         if let Some(peer) = peer {
             peer.load(n, &rows)?;
             let mut both = [Vec::new(), Vec::new()];
@@ -380,16 +403,16 @@ impl Case<'_> {
             .zip(bounds)
             .filter(|(row, b)| is_finite(b) && !in_range(row, b))
             .count();
-        let errors: Vec<(u64, f64)> = judgements
+        let errors: Vec<(u64, f64, f64)> = judgements
             .par_iter()
             .zip(bounds)
             .enumerate()
             .filter_map(|(index, (judgement, b))| {
-                let truth = judgement.truth?;
-                Some((index as u64, truth.error(b.map(T::widen))))
+                let (truth, b) = (judgement.truth?, b.map(T::widen));
+                Some((index as u64, truth.error(b), truth.over_sensitivity(b)))
             })
             .collect();
-        let worst = errors.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let worst = errors.iter().max_by(|a, b| a.2.total_cmp(&b.2));
         let undecided = |j: &&Judgement| j.validity == Validity::Undecided;
         Cell {
             family: self.family.name.into(),
@@ -405,7 +428,8 @@ impl Case<'_> {
             other_bits: None,
             worst: worst.map(|w| w.0),
             error: (!errors.is_empty())
-                .then(|| Quantiles::of(errors.into_iter().map(|e| e.1).collect())),
+                .then(|| Quantiles::of(errors.iter().map(|e| e.1).collect())),
+            over: (!errors.is_empty()).then(|| Quantiles::of(errors.iter().map(|e| e.2).collect())),
         }
     }
 

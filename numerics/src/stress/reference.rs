@@ -76,6 +76,9 @@ pub fn gradient_by_duals(n: usize, m: [DoubleDouble; 11], eta: DoubleDouble) -> 
 pub struct Truth {
     /// Lower and upper.
     pub shares: [DoubleDouble; 2],
+    /// What rounding each of the row's numbers and the result once does to them at most, to first
+    /// order; 1 where that is more.
+    pub sensitivities: [f64; 2],
     /// Binary exponent of the power of two that the moments were multiplied by.
     exponent: i32,
     mass: f64,
@@ -86,15 +89,29 @@ impl Truth {
     /// What is not a number is wrong by 1.
     #[must_use]
     pub fn error(&self, bounds: [f64; 2]) -> f64 {
-        let mut worst = 0.0_f64;
-        for (bound, share) in bounds.iter().zip(self.shares) {
+        let [lower, upper] = self.errors(bounds);
+        lower.max(upper)
+    }
+
+    /// The error over the sensitivity: the larger quotient of both bounds.
+    #[must_use]
+    pub fn over_sensitivity(&self, bounds: [f64; 2]) -> f64 {
+        let errors = self.errors(bounds);
+        (errors[0] / self.sensitivities[0]).max(errors[1] / self.sensitivities[1])
+    }
+
+    fn errors(&self, bounds: [f64; 2]) -> [f64; 2] {
+        let mut errors = [1.0; 2];
+        for ((error, bound), share) in errors.iter_mut().zip(bounds).zip(self.shares) {
             let e = self.exponent;
             let scaled = bound * 2.0_f64.powi(-e / 2) * 2.0_f64.powi(-e + e / 2);
-            let error = DoubleDouble::from(scaled) / DoubleDouble::from(self.mass) - share;
-            let error = f64::from(error).abs();
-            worst = worst.max(if error.is_finite() { error } else { 1.0 });
+            let distance = DoubleDouble::from(scaled) / DoubleDouble::from(self.mass) - share;
+            let distance = f64::from(distance).abs();
+            if distance.is_finite() {
+                *error = distance;
+            }
         }
-        worst
+        errors
     }
 }
 
@@ -103,7 +120,7 @@ impl Truth {
 pub struct Judgement {
     /// Whether its moments are those of a distribution that is not degenerate.
     pub validity: Validity,
-    /// Its bounds, if they are.
+    /// Its bounds, if they are, and within the range that [`bound`] is documented for.
     pub truth: Option<Truth>,
 }
 
@@ -114,7 +131,8 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
         validity: Validity::Not,
         truth: None,
     };
-    let Some((row, exponent)) = scaled(&row.map(T::widen)) else {
+    let given = row.map(T::widen);
+    let Some((row, exponent)) = scaled(&given) else {
         return nothing;
     };
     let validity = validity(n, &row);
@@ -124,22 +142,86 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
             ..nothing
         };
     };
+    if !is_in_range(n, &given) {
+        return Judgement {
+            validity,
+            truth: None,
+        };
+    }
+    let rounding = Rounding {
+        half: 0.5 * T::epsilon().widen(),
+        least: 0.5 * T::LEAST_NORMAL * T::epsilon().widen(),
+        exponent,
+    };
     let mass = row.m[0];
-    let shares = if left < NEEDS_WIDE {
-        shares_wide(n, &row)
+    let (shares, sensitivities) = if left < NEEDS_WIDE {
+        (
+            shares_wide(n, &row),
+            rounding.sensitivities::<Wide>(n, &row),
+        )
     } else {
         let mass = DoubleDouble::from(mass);
         let m = row.m.map(DoubleDouble::from);
         let bounds = bounds_of(n, m, DoubleDouble::from(row.eta));
-        [bounds.lower / mass, bounds.upper / mass]
+        (
+            [bounds.lower / mass, bounds.upper / mass],
+            rounding.sensitivities::<DoubleDouble>(n, &row),
+        )
     };
     Judgement {
         validity,
         truth: Some(Truth {
             shares,
+            sensitivities,
             exponent,
             mass,
         }),
+    }
+}
+
+/// Whether a valid row is within the range that [`bound`] is documented for.
+fn is_in_range(n: usize, row: &Row<f64>) -> bool {
+    let mass = row.m[0];
+    let moments_are = row.m[..=2 * n]
+        .iter()
+        .all(|m| m.abs() <= (1e25 * mass).min(1e37));
+    let square_is = (1e-25 * mass..=1e9 * mass).contains(&row.m[2]);
+    moments_are && square_is && row.eta.abs() <= 1e9
+}
+
+/// What rounding once does to a number, of which the moments were multiplied by a power of two.
+struct Rounding {
+    /// Half a unit in the last place of 1.
+    half: f64,
+    /// Half of the smallest number.
+    least: f64,
+    exponent: i32,
+}
+
+impl Rounding {
+    /// The largest rounding error of a number near `x` that was multiplied by 2 to that power.
+    fn of(&self, x: f64, exponent: i32) -> f64 {
+        let least = self.least * 2.0_f64.powi(exponent / 2) * 2.0_f64.powi(exponent - exponent / 2);
+        let of_nothing = if x == 0.0 { 0.0 } else { least };
+        (self.half * x.abs()).max(of_nothing)
+    }
+
+    /// Of both bounds, as shares of the total: a rounding of the result, which is the total at most,
+    /// and what a rounding of each number is worth by the bounds' derivatives.
+    fn sensitivities<R: Real + From<f64>>(&self, n: usize, row: &Row<f64>) -> [f64; 2]
+    where
+        f64: From<R>,
+    {
+        let m = row.m.map(R::from);
+        let of_moment = |m: f64| self.of(m, -self.exponent);
+        [0.0, 1.0].map(|overestimation| {
+            let gradient = gradient_of(n, m, R::from(row.eta), R::from(overestimation));
+            let of_query = f64::from(gradient.eta).abs() * self.of(row.eta, 0);
+            let of_moments =
+                (0..=2 * n).map(|k| f64::from(gradient.m[k]).abs() * of_moment(row.m[k]));
+            let sum: f64 = of_moments.chain([of_query]).sum();
+            ((of_moment(row.m[0]) + sum) / row.m[0]).min(1.0)
+        })
     }
 }
 
@@ -276,6 +358,8 @@ mod tests {
             let off = truth.error([(exact[0] + 0.25) * mass, exact[1] * mass]);
             assert!((off - 0.25).abs() < 1e-3, "{mass}: {off}");
             assert_eq!(truth.error([f64::NAN, 0.0]), 1.0);
+            let over = truth.over_sensitivity([f64::NAN, exact[1] * mass]);
+            assert_eq!(over, 1.0 / truth.sensitivities[0]);
         }
     }
 }

@@ -20,7 +20,9 @@ impl Stress {
         }
         report.notes.extend(self.notes.iter().cloned());
         report.tables.push(self.totals());
-        report.tables.push(self.overview());
+        for solver in [Solver::Compensated, Solver::Plain, Solver::Published] {
+            report.tables.push(self.overview(solver));
+        }
         report.tables.push(self.errors());
         if self.peer.is_some() {
             report.tables.push(self.against());
@@ -91,24 +93,20 @@ impl Stress {
         table
     }
 
-    /// The 90 % errors of what is run first, a line for each family and precision.
-    fn overview(&self) -> Table {
-        let solvers = ORDERS
-            .map(|n| (Solver::Plain, n))
-            .chain([2, 3].map(|n| (Solver::Compensated, n)));
-        let columns: Vec<(Solver, usize)> = solvers
-            .filter(|&(solver, n)| self.cells.iter().any(|c| (c.solver, c.n) == (solver, n)))
+    /// The main figure, by family and order: the worst row.
+    fn overview(&self, solver: Solver) -> Table {
+        let orders: Vec<usize> = ORDERS
+            .filter(|&n| self.cells.iter().any(|c| c.n == n))
             .collect();
-        let headings = columns.iter().map(|(solver, n)| {
-            Column::number(match solver {
-                Solver::Compensated => format!("n = {n}, compensated"),
-                _ => format!("n = {n}"),
-            })
-        });
+        let headings = orders.iter().map(|n| Column::number(format!("n = {n}")));
         let mut table = Table::new(
-            "overview",
-            "90 % errors of valid rows as shares of m_0 (nothing: too few valid rows, or another \
-             number of moments)",
+            &format!("over-{}", solver.name()),
+            &format!(
+                "Error over sensitivity of the {} solver: the greatest of all valid rows. The \
+                 sensitivity is what rounding each number of the row and the result once does to the \
+                 answer (nothing: no valid rows, or another number of moments)",
+                solver.name()
+            ),
             [Column::text("family"), Column::text("precision")]
                 .into_iter()
                 .chain(headings),
@@ -117,12 +115,12 @@ impl Stress {
             for (family, _) in &self.agreement {
                 let mut row: Vec<crate::report::Cell> =
                     vec![family.as_str().into(), precision.to_string().into()];
-                for &(solver, n) in &columns {
+                for &n in &orders {
                     let cell = self.cells.iter().find(|c| {
                         (c.family.as_str(), c.precision) == (family, precision)
                             && (c.solver, c.n) == (solver, n)
                     });
-                    row.push(cell.and_then(|c| c.error).map(|e| e.ninety).into());
+                    row.push(cell.and_then(|c| c.over).map(|o| o.greatest).into());
                 }
                 if row[2..].iter().any(|c| *c != crate::report::Cell::Empty) {
                     table.push(row);
@@ -150,6 +148,9 @@ impl Stress {
                 Column::number("90 %"),
                 Column::number("99 %"),
                 Column::number("max"),
+                Column::number("over sensitivity 50 %"),
+                Column::number("99 %"),
+                Column::number("max"),
                 Column::count("not finite"),
                 Column::count("out of range"),
                 Column::count("undecided"),
@@ -169,6 +170,9 @@ impl Stress {
                 c.error.map(|e| e.ninety).into(),
                 c.error.map(|e| e.ninety_nine).into(),
                 c.error.map(|e| e.greatest).into(),
+                c.over.map(|o| o.median).into(),
+                c.over.map(|o| o.ninety_nine).into(),
+                c.over.map(|o| o.greatest).into(),
                 c.non_finite.into(),
                 c.out_of_range.into(),
                 c.undecided.into(),
