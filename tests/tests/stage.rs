@@ -1,6 +1,6 @@
 //! What vertex and fragment kernels say is in the texts and in the manifest, or is refused.
 
-use hankel_codegen::Language::{Essl310, Hlsl, Msl, Wgsl};
+use hankel_codegen::Language::{Essl300, Essl310, Hlsl, Msl, Wgsl};
 use hankel_codegen::build::Generated;
 use hankel_tests::Crate;
 
@@ -55,4 +55,7 @@ fn what_a_language_cannot_ask_for_is_refused() {
     }
     let sample = &generated.manifest.kernels["sample"];
     assert!(sample.unsupported.contains_key(&Essl310));
+    let gathered = &generated.manifest.kernels["gathered"];
+    assert!(gathered.unsupported[&Essl300].contains("gather"));
+    assert!(gathered.languages.contains_key(&Essl310));
 }

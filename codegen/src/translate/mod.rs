@@ -510,6 +510,11 @@ impl Ir {
             if matches!(kernel.stage, Stage::Compute { .. }) {
                 return Some(format!("{language} has no compute shaders"));
             }
+            if self.gathers() {
+                return Some(format!(
+                    "{language} does not gather texels: it came with 3.10"
+                ));
+            }
             if self
                 .globals()
                 .any(|(global, _)| matches!(global.space, AddressSpace::Storage { .. }))
@@ -593,14 +598,32 @@ impl Ir {
 
     /// Whether there are derivatives that must be coarse or fine.
     fn has_grained_derivatives(&self) -> bool {
+        self.has(|expression| {
+            matches!(expression, Expression::Derivative { ctrl, .. } if *ctrl != naga::DerivativeControl::None)
+        })
+    }
+
+    /// Whether texels are gathered.
+    fn gathers(&self) -> bool {
+        self.has(|expression| {
+            matches!(
+                expression,
+                Expression::ImageSample {
+                    gather: Some(_),
+                    ..
+                }
+            )
+        })
+    }
+
+    /// Whether any expression of any function is like that.
+    fn has(&self, like: impl Fn(&Expression) -> bool) -> bool {
         let functions = self.module.functions.iter().map(|(_, function)| function);
         let entries = self.module.entry_points.iter().map(|entry| &entry.function);
         functions
             .chain(entries)
             .flat_map(|function| function.expressions.iter())
-            .any(|(_, expression)| {
-                matches!(expression, Expression::Derivative { ctrl, .. } if *ctrl != naga::DerivativeControl::None)
-            })
+            .any(|(_, expression)| like(expression))
     }
 
     fn globals(&self) -> impl Iterator<Item = (&naga::GlobalVariable, &TypeInner)> {

@@ -59,6 +59,7 @@ hankel_dsl::kernels![
     texture::mirror,
     texture::spread,
     texture::corners,
+    texture::gathered,
 ];
 
 /// A point and its weight.

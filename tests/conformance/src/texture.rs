@@ -1,7 +1,7 @@
 //! Textures that are written anywhere, and texels that are gathered.
 
 use hankel_dsl::format::{R32Uint, Rgba8Unorm, Rgba32Float};
-use hankel_dsl::glam::{UVec2, UVec3, Vec2, Vec4};
+use hankel_dsl::glam::{UVec2, UVec3, Vec2, Vec3, Vec4};
 use hankel_dsl::{Sampler, StorageTexture2d, StorageTexture3d, Texture2d, kernel};
 
 /// Each invocation writes the texel that is opposite to its own, in two textures.
@@ -51,4 +51,16 @@ pub fn corners(
     let size = source.size();
     let corner = Vec2::new(at.x as f32 / size.x as f32, at.y as f32 / size.y as f32);
     source.gather::<1>(sampler, corner)
+}
+
+/// The first channels of the texels around the lower right corner of the fragment's own.
+#[kernel(fragment, parity(ulp = 0, absolute = 0.0, why = "texels as they are"))]
+pub fn gathered(
+    #[frag_coord] at: Vec3,
+    #[texture] source: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    let size = source.size();
+    let corner = Vec2::new((at.x + 0.5) / size.x as f32, (at.y + 0.5) / size.y as f32);
+    source.gather::<0>(sampler, corner)
 }
