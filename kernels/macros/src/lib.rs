@@ -42,6 +42,7 @@ use syn::parse_macro_input;
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
 /// | `#[texture] x: Texture2d<'_>` | also `Texture2dMultisampled`, `Texture3d` |
+/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of [`format`](mod@format) |
 /// | `#[sampler] x: Sampler` | a sampler |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |

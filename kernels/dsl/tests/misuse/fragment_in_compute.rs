@@ -1,3 +1,4 @@
+#![allow(unused_imports)]
 use hankel_dsl::glam::Vec3;
 use hankel_dsl::kernel;
 
