@@ -72,8 +72,8 @@ fn newton<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R, low: R, high: R) -> 
     (v - p / slope).clamp(low, high)
 }
 
-/// Laguerre's steps in one direction, 1 or -1, within limits, until they are as short as rounding or
-/// rounding has taken them past the root: before it, the polynomial has the sign that is given, 1 or
+/// Laguerre's steps in one direction, 1 or -1, within limits, until they are so short that another would
+/// change nothing, or rounding has taken them past the root: before it, the polynomial has the sign that is given, 1 or
 /// -1.
 ///
 /// Each lane stops on its own, so that its result does not depend on its neighbours.
@@ -92,6 +92,12 @@ fn approach<R: Real, const DEGREE: usize>(
         STEPS
     };
     let zero: R = lit!(0.0);
+    // The next step would be cubic in this one.
+    let short: R = if const { R::IS_WIDE } {
+        lit!(1e-9)
+    } else {
+        R::epsilon()
+    };
     let mut v = from;
     let mut goes_on = zero.le(zero);
     let mut i = 0;
@@ -100,7 +106,7 @@ fn approach<R: Real, const DEGREE: usize>(
             let (value, length) = laguerre::<R, DEGREE>(e, v);
             goes_on = goes_on & (value * sign).gt(zero);
             v = R::select(goes_on, (v + direction * length).clamp(low, high), v);
-            goes_on = goes_on & length.gt(v.abs() * R::epsilon());
+            goes_on = goes_on & length.gt(v.abs() * short);
         }
         i += 1;
     }
