@@ -63,13 +63,13 @@ const KNOWN: [(&[&str], &str); 22] = [
     ),
     (
         &["no method named", "f32"],
-        "a shader's crate has no `std`: `use num_traits::Float` (with its feature `libm`), call \
-         `libm::sinf(x)`, or take the function of `Real`",
+        "a shader's crate has no `std`: call the function of `hankel_dsl::math`, `math::sin(x)`, which \
+         has the same bits everywhere, or the device's own, `math::native::sin(x)`",
     ),
     (
         &["no method named", "f64"],
-        "a shader's crate has no `std`: `use num_traits::Float` (with its feature `libm`), call \
-         `libm::sin(x)`, or take the function of `Real`",
+        "a shader's crate has no `std`: call the function of `hankel_dsl::math`, `math::sin(x)`, which \
+         has the same bits everywhere",
     ),
     (
         &["signum"],
@@ -321,7 +321,7 @@ mod tests {
     #[test]
     fn known_messages_say_what_to_write() {
         let said = "no method named `sin` found for type `f32` in the current scope";
-        assert!(advice(said).unwrap().contains("libm::sinf"));
+        assert!(advice(said).unwrap().contains("`math::sin(x)`"));
         assert!(
             advice("saturating_sub is not implemented yet")
                 .unwrap()

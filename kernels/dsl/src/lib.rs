@@ -56,6 +56,7 @@ extern crate std;
 extern crate self as hankel_dsl;
 
 mod atomics;
+pub mod math;
 mod memory;
 #[cfg(not(target_arch = "spirv"))]
 pub mod native;

@@ -1,9 +1,9 @@
 //! Arithmetic that a kernel may use: [`Real`], [`Mask`] and the [`lit!`](crate::lit) macro.
 //!
-//! What is here rounds the same way on every backend or says that it does not. There is no `%`,
-//! no `mix`, no `smoothstep` and no library transcendental: their results differ between
-//! implementations. `min`, `max` and `select` are single instructions, without the NaN tests that
-//! `core`'s carry; a kernel is built never to make a NaN, so none is needed.
+//! What is here rounds the same way on every backend or says that it does not. There is no `%`: its
+//! result differs between implementations. Sines, powers and the like are in
+//! [`math`](crate::math). `min`, `max` and `select` are single instructions, without the NaN tests
+//! that `core`'s carry; a kernel is built never to make a NaN, so none is needed.
 //!
 //! Shader compilers may still reorder a sum unless they are told not to, which not every language
 //! can. They move constant summands to the front and take common factors out, so a kernel that

@@ -509,7 +509,7 @@ impl Kernel {
                     #call
                 }
                 #[inline(always)]
-                fn many<L: layout::Lane<Scalar = #scalar>>(
+                fn many<L: layout::Lane<Scalar = #scalar> + ::hankel_dsl::math::Elementary>(
                     &self,
                     uniforms: &Self::Uniforms<L>,
                     start: usize,

@@ -16,6 +16,7 @@ use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef};
 use super::describe::TexelFormat;
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
+use crate::math::Elementary;
 use crate::{Real, Texel};
 
 /// Invocations that a thread takes at once.
@@ -384,7 +385,7 @@ pub trait LaneBody: Sync {
     /// Invocation `i`.
     fn one(&self, i: usize) -> Self::Out;
     /// Invocations from `start` on, as many as `L` has lanes, into `out`, which is that long.
-    fn many<L: Lane<Scalar = Self::Scalar>>(
+    fn many<L: Lane<Scalar = Self::Scalar> + Elementary>(
         &self,
         uniforms: &Self::Uniforms<L>,
         start: usize,

@@ -12,6 +12,7 @@ use fearless_simd::{Level, Simd};
 
 use super::layout::Lane;
 use super::transpose;
+use crate::math::Elementary;
 use crate::{Mask, Real};
 
 /// The instruction sets that this processor has and lanes gain from, widest first, each by its
@@ -129,30 +130,6 @@ fn picks<S: Simd>() -> bool {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Level::Sse2(_) | Level::Sse4_2(_) | Level::Avx2(_) | Level::Avx512(_) => true,
         _ => false,
-    }
-}
-
-/// A number as the sum of two halves, by clearing or rounding away the lower half of its bits.
-trait Split: Sized {
-    /// The upper half; the number less it is the lower half, exactly, and products of halves are
-    /// exact.
-    fn upper(self) -> Self;
-}
-
-impl<S: Simd> Split for F32s<S> {
-    #[inline(always)]
-    fn upper(self) -> Self {
-        let bits: S::u32s = self.0.bitcast();
-        Self((bits & 0xffff_f000).bitcast())
-    }
-}
-
-impl<S: Simd> Split for F64s<S> {
-    // 53 bits are cut into 26, a sign and 26: the upper half must be rounded (Veltkamp).
-    #[inline(always)]
-    fn upper(self) -> Self {
-        let scaled = self.0 * 134_217_729.0;
-        Self(scaled - (scaled - self.0))
     }
 }
 
@@ -348,10 +325,160 @@ lanes!(
     put_column_f64
 );
 
+/// Operations on bits that the elementary functions are made of; what has no instruction goes
+/// through the lanes one by one, which is what the scalar does.
+macro_rules! elementary {
+    (
+        $name:ident, $float:ident, $vector:ident, $signed:ident, $unsigned:ident, $bits:ident,
+        $digits:literal, $bias:literal, $root:literal, $fraction:literal
+    ) => {
+        impl<S: Simd> $name<S> {
+            #[inline(always)]
+            fn bits(self) -> S::$unsigned {
+                self.0.bitcast()
+            }
+            #[inline(always)]
+            fn of_bits(bits: S::$unsigned) -> Self {
+                Self(bits.bitcast())
+            }
+            #[inline(always)]
+            fn each<const N: usize>(self, function: impl Fn($float) -> [$float; N]) -> [Self; N] {
+                let mut lanes = [[0.0; 16]; N];
+                let lanes_of = <Self as Lane>::LANES;
+                for i in 0..lanes_of {
+                    let values = function(self.0[i]);
+                    for (all, value) in lanes.iter_mut().zip(values) {
+                        all[i] = value;
+                    }
+                }
+                lanes.map(|all| Self(S::$vector::from_slice(token::<S>(), &all[..lanes_of])))
+            }
+        }
+
+        impl<S: Simd> Elementary for $name<S> {
+            #[inline(always)]
+            fn largest() -> Self {
+                Self::splat($float::MAX)
+            }
+            #[inline(always)]
+            fn guard(self) -> Self {
+                self
+            }
+            #[inline(always)]
+            fn upper(self) -> Self {
+                elementary!(@upper $float, self)
+            }
+            #[inline(always)]
+            fn decompose(self) -> (Self, Self) {
+                let from_root = self.bits() - $root;
+                let signed: S::$signed = from_root.bitcast();
+                let exponent = S::$vector::float_from(signed >> $digits);
+                (Self(exponent), Self::of_bits((from_root & $fraction) + $root))
+            }
+            #[inline(always)]
+            fn power_of_two(self) -> Self {
+                let n = S::$signed::truncate_from(self.0) + $bias;
+                Self((n << $digits).bitcast())
+            }
+            #[inline(always)]
+            fn copy_sign(self, sign: Self) -> Self {
+                Self(self.0.copysign(sign.0))
+            }
+            #[inline(always)]
+            fn flip_sign(self, sign: Self) -> Self {
+                let sign = sign.bits() & (1 << ($bits::BITS - 1));
+                Self::of_bits(self.bits() ^ sign)
+            }
+            #[inline(always)]
+            fn reciprocal_seed(self) -> Self {
+                elementary!(@seed $float, self, reciprocal_seed, |bits: S::u32s| {
+                    S::u32s::simd_from(token::<S>(), 0x7ef3_11c7) - bits
+                })
+            }
+            #[inline(always)]
+            fn inverse_root_seed(self) -> Self {
+                elementary!(@seed $float, self, inverse_root_seed, |bits: S::u32s| {
+                    S::u32s::simd_from(token::<S>(), 0x5f37_5a86) - (bits >> 1)
+                })
+            }
+            #[inline(always)]
+            fn reduce_large(self) -> (Self, Self, Self) {
+                let [q, high, low] = self.each(|x| {
+                    // A lane that is no large number is not asked for.
+                    let x = if x > 3200.0 && x <= $float::MAX { x } else { $float::MAX };
+                    let (q, high, low) = x.reduce_large();
+                    [q, high, low]
+                });
+                (q, high, low)
+            }
+            #[inline(always)]
+            fn odd_sum(self, other: Self) -> Self {
+                let (sum, error) = self.two_sum(other);
+                let bits = sum.bits();
+                let zero = Self::splat(0.0);
+                let (low, negative) = (error.lt(zero), sum.lt(zero));
+                let away = (low & negative) | (!low & !negative);
+                let odd = Self::select(away, sum, Self::of_bits(bits - 1));
+                let odd = Self::of_bits(odd.bits() | 1);
+                Self::select(error.eq(zero), sum, odd)
+            }
+            #[inline(always)]
+            fn not_a_number(self) -> Self {
+                Self::of_bits(self.bits() | $float::NAN.to_bits())
+            }
+            #[inline(always)]
+            fn unbounded(self) -> Self {
+                Self::of_bits(self.bits() | $float::INFINITY.to_bits())
+            }
+        }
+    };
+    (@upper f32, $self:ident) => {
+        Self::of_bits($self.bits() & 0xffff_f000)
+    };
+    // 53 bits are cut into 26, a sign and 26: the upper half must be rounded (Veltkamp).
+    (@upper f64, $self:ident) => {{
+        let scaled = $self.0 * 134_217_729.0;
+        Self(scaled - (scaled - $self.0))
+    }};
+    (@seed f32, $self:ident, $method:ident, $bits:expr) => {
+        Self::of_bits($bits($self.bits()))
+    };
+    // From `f32`, as on devices without integers of 64 bits.
+    (@seed f64, $self:ident, $method:ident, $bits:expr) => {{
+        let [seed] = $self.each(|x| [x.$method()]);
+        seed
+    }};
+}
+
+elementary!(
+    F32s,
+    f32,
+    f32s,
+    i32s,
+    u32s,
+    u32,
+    23,
+    127,
+    0x3f35_04f3,
+    0x007f_ffff
+);
+elementary!(
+    F64s,
+    f64,
+    f64s,
+    i64s,
+    u64s,
+    u64,
+    52,
+    1023,
+    0x3fe6_a09e_667f_3bcd,
+    0x000f_ffff_ffff_ffff
+);
+
 /// A scalar that has lanes.
-pub trait Scalar: Real {
+pub trait Scalar: Elementary {
     /// Lanes of it.
-    type Lanes<S: Simd>: Lane<Scalar = Self>;
+    type Lanes<S: Simd>: Lane<Scalar = Self> + Elementary;
 }
 
 impl Scalar for f32 {
