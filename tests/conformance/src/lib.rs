@@ -11,6 +11,7 @@ use hankel_dsl::{
 };
 
 pub mod general;
+pub mod math;
 pub mod stage;
 pub mod texture;
 pub mod workgroup;
@@ -60,6 +61,19 @@ hankel_dsl::kernels![
     texture::spread,
     texture::corners,
     texture::gathered,
+    math::angles,
+    math::angles_free,
+    math::arcs,
+    math::arcs_free,
+    math::exponentials,
+    math::exponentials_free,
+    math::powers,
+    math::powers_free,
+    math::steps,
+    math::native_angles,
+    math::native_powers,
+    math::vectors,
+    math::waves,
 ];
 
 /// A point and its weight.
