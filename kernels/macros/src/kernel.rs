@@ -267,6 +267,7 @@ impl Role {
             Self::Texture(_) => Holder::Texture,
             Self::Constant { .. } => Holder::Constant,
             Self::Atomic { .. }
+            | Self::StorageTexture { .. }
             | Self::Sampler
             | Self::Index
             | Self::BuiltIn(_)
