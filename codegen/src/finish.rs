@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use hankel_dsl::native::describe::{Kernel, Role};
+use hankel_dsl::native::describe::{Kernel, Role, Rounding};
 use rspirv::dr::Module;
 use spirv_tools::TargetEnv;
 use spirv_tools::opt::{Optimizer, Passes};
@@ -66,7 +66,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
             panicked: false,
         });
     }
-    if kernel.exact || kernel.pinned {
+    if kernel.rounding != Rounding::Free {
         exact::keep(&mut module);
     }
     trim::debug(&mut module);

@@ -181,13 +181,28 @@ pub struct KernelEntry {
     pub findings: Vec<Finding>,
     /// How closely backends agree with the native scalar run.
     pub tolerance: Tolerance,
-    /// Arithmetic must be done as it is written, which the files ask of their compilers.
-    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
-    pub exact: bool,
+    /// What compilers and drivers may do with its floating-point arithmetic.
+    #[serde(default)]
+    pub rounding: Rounding,
     /// The text in each language.
     pub languages: BTreeMap<Language, LanguageEntry>,
     /// Languages that cannot express it, and why.
     pub unsupported: BTreeMap<Language, String>,
+}
+
+/// What compilers and drivers may do with a kernel's floating-point arithmetic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Rounding {
+    /// Contract a product and a sum into one operation, and reorder sums.
+    #[default]
+    Free,
+    /// Neither, which the files of languages that can ask for it do. In the others the result is
+    /// as good, but has other bits.
+    Pinned,
+    /// Neither, which all files ask for: otherwise the result is wrong. Hand SPIR-V to the driver
+    /// as it is; naga, and so wgpu, would drop what forbids it.
+    Exact,
 }
 
 /// A pipeline stage.
@@ -292,6 +307,9 @@ pub struct Tolerance {
     pub ulp: u32,
     /// Or an absolute difference.
     pub absolute: f64,
+    /// Finite inputs may give results that are not finite.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub non_finite: bool,
     /// Why.
     pub why: String,
 }
@@ -452,9 +470,14 @@ pub(crate) fn entry(
         tolerance: Tolerance {
             ulp: kernel.tolerance.ulp,
             absolute: kernel.tolerance.absolute,
+            non_finite: kernel.tolerance.non_finite,
             why: kernel.tolerance.why.clone(),
         },
-        exact: kernel.exact,
+        rounding: match kernel.rounding {
+            describe::Rounding::Free => Rounding::Free,
+            describe::Rounding::Pinned => Rounding::Pinned,
+            describe::Rounding::Exact => Rounding::Exact,
+        },
         languages: BTreeMap::new(),
         unsupported: BTreeMap::new(),
     }

@@ -8,8 +8,9 @@ use std::process::Command;
 use hankel_codegen::Language;
 use hankel_codegen::build::generate;
 use hankel_codegen::finish;
+use hankel_codegen::manifest;
 use hankel_codegen::translate::{Ir, Options, Text, Written};
-use hankel_dsl::native::describe::{Kernel, Stage};
+use hankel_dsl::native::describe::{Kernel, Rounding, Stage};
 
 fn ir(kernel: &Kernel) -> Ir {
     let finished = finish::finish(&support::spirv(&kernel.name), kernel).unwrap();
@@ -306,7 +307,11 @@ fn exact_arithmetic_is_unsupported_where_the_language_cannot() {
     let kernel = support::rounding();
     let generated = generate(&support::request(), &support::modules()).unwrap();
     let entry = &generated.manifest.kernels["rounding"];
-    assert!(entry.exact && !generated.manifest.kernels["bound"].exact);
+    assert_eq!(entry.rounding, manifest::Rounding::Exact);
+    assert_eq!(
+        generated.manifest.kernels["bound"].rounding,
+        manifest::Rounding::Free
+    );
     for (language, why) in [
         (Language::Wgsl, "every implementation"),
         (Language::Msl, "MSL 2.4"),
@@ -339,13 +344,15 @@ fn exact_arithmetic_is_unsupported_where_the_language_cannot() {
 fn descriptions_without_the_attribute_are_read() {
     let kernel = support::bound();
     let mut json = serde_json::to_value(&kernel).unwrap();
-    assert!(json.get("exact").is_none(), "{json}");
+    assert_eq!(json["rounding"], "free");
+    json.as_object_mut().unwrap().remove("rounding");
     assert_eq!(
         serde_json::from_value::<Kernel>(json.clone()).unwrap(),
         kernel
     );
-    json["exact"] = true.into();
-    assert!(serde_json::from_value::<Kernel>(json).unwrap().exact);
+    json["rounding"] = "exact".into();
+    let read: Kernel = serde_json::from_value(json).unwrap();
+    assert_eq!(read.rounding, Rounding::Exact);
 }
 
 #[test]

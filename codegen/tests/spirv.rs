@@ -4,7 +4,7 @@ mod support;
 
 use hankel_codegen::finish::{cost_after_optimisation, finish};
 use hankel_codegen::{Step, cost};
-use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::describe::{Kernel, Rounding};
 use rspirv::binary::Disassemble;
 
 fn disassembled(name: &str) -> String {
@@ -120,8 +120,7 @@ fn an_exact_kernel_forbids_contraction_for_good() {
     }
     // Without the attribute, nothing is.
     let free = Kernel {
-        exact: false,
-        pinned: false,
+        rounding: Rounding::Free,
         ..kernel
     };
     let finished = finish(&support::spirv("rounding"), &free).unwrap();

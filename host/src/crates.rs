@@ -9,6 +9,8 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::inputs::{Given, Request};
+use hankel_dsl::native::plugin;
 use hankel_dsl::native::{Call, CallError, Entry};
 use hankel_system::process::Program as Running;
 use serde::Deserialize;
@@ -57,6 +59,9 @@ impl Native<'_> {
     }
 }
 
+/// Makes an entry point's own inputs, if it has any.
+type Inputs = dyn Fn(&Request) -> Result<Option<Vec<Given>>, String> + Send + Sync;
+
 type Run = dyn Fn(&mut Call<'_>) -> Result<(), CallError> + Send + Sync;
 
 /// An entry point of a crate, wherever its native code comes from.
@@ -65,6 +70,7 @@ pub struct KernelEntry {
     /// What it is.
     pub kernel: Kernel,
     run: Arc<Run>,
+    inputs: Option<Arc<Inputs>>,
 }
 
 impl fmt::Debug for KernelEntry {
@@ -77,9 +83,13 @@ impl fmt::Debug for KernelEntry {
 
 impl From<Entry> for KernelEntry {
     fn from(entry: Entry) -> Self {
+        let inputs = entry.inputs.map(|make| -> Arc<Inputs> {
+            Arc::new(move |request: &Request| plugin::made(make, request).map(Some))
+        });
         Self {
             kernel: entry.kernel,
             run: Arc::new(entry.run),
+            inputs,
         }
     }
 }
@@ -93,7 +103,26 @@ impl KernelEntry {
         Self {
             kernel,
             run: Arc::new(run),
+            inputs: None,
         }
+    }
+
+    /// The same with inputs of its own for parity.
+    #[must_use]
+    pub fn with_inputs(
+        mut self,
+        make: impl Fn(&Request) -> Result<Option<Vec<Given>>, String> + Send + Sync + 'static,
+    ) -> Self {
+        self.inputs = Some(Arc::new(make));
+        self
+    }
+
+    /// The inputs that the author makes; none where the kernel names no function that does.
+    ///
+    /// # Errors
+    /// The function panicked, or its process ended.
+    pub fn own_inputs(&self, request: &Request) -> Result<Option<Vec<Given>>, String> {
+        self.inputs.as_ref().map_or(Ok(None), |make| make(request))
     }
 
     /// Runs the native code.
@@ -201,8 +230,10 @@ impl KernelCrate {
             .into_iter()
             .enumerate()
             .map(|(i, kernel)| {
-                let (workers, described) = (Arc::clone(&workers), kernel.clone());
-                KernelEntry::new(kernel, move |call| workers.run(i, &described, call))
+                let (runs, makes) = (Arc::clone(&workers), Arc::clone(&workers));
+                let described = kernel.clone();
+                let entry = KernelEntry::new(kernel, move |call| runs.run(i, &described, call));
+                entry.with_inputs(move |request| makes.inputs(i, request))
             })
             .collect();
         Ok(Self {

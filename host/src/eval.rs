@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use hankel_dsl::native::CallError;
 use hankel_dsl::native::call::Ending;
-use hankel_dsl::native::describe::{Kernel, Output, Precision, Range, Role, Scalar, Stage};
+use hankel_dsl::native::describe::{Kernel, Output, Param, Precision, Range, Role, Scalar, Stage};
 use hankel_system::input::{self, InputError, Lines};
 use hankel_system::output::{self, OutputError};
 
@@ -197,18 +197,6 @@ pub fn select<'a>(
         })
 }
 
-/// The default that a field's documentation gives: `default 0.5`, `defaults to 0.5`.
-fn documented_default(summary: &str) -> Option<f64> {
-    let lower = summary.to_lowercase();
-    let (_, after) = lower.split_once("default")?;
-    let word = after
-        .split_whitespace()
-        .find(|w| !matches!(*w, "s" | "to" | "is" | ":" | "="))?
-        .trim_start_matches([':', '='])
-        .trim_end_matches(['.', ',', ';', ')']);
-    word.parse().ok().filter(|x: &f64| x.is_finite())
-}
-
 /// A plain value's name stands for the whole; a field's stands alone where no other has it.
 fn short_names<'a>(all: impl Iterator<Item = (&'a str, &'a Leaf)> + Clone) -> Vec<String> {
     let short = |(param, leaf): (&str, &Leaf)| {
@@ -231,10 +219,6 @@ fn short_names<'a>(all: impl Iterator<Item = (&'a str, &'a Leaf)> + Clone) -> Ve
         }
     })
     .collect()
-}
-
-fn zero(scalar: Scalar) -> Number {
-    Number::read(scalar, &[0; 8])
 }
 
 fn from_f64(scalar: Scalar, x: f64) -> Number {
@@ -280,7 +264,7 @@ impl Table {
         };
         let mut arguments = Vec::new();
         let mut elements: Vec<(&str, usize, Leaf)> = Vec::new();
-        let mut uniforms: Vec<(&str, usize, Leaf)> = Vec::new();
+        let mut uniforms: Vec<(&Param, usize, Leaf)> = Vec::new();
         let mut constants: Vec<(&str, u32)> = Vec::new();
         for param in &kernel.params {
             let (layout, is_element) = match &param.role {
@@ -298,17 +282,14 @@ impl Table {
                     )));
                 }
             };
-            let list = if is_element {
-                &mut elements
-            } else {
-                &mut uniforms
-            };
             let index = arguments.len();
-            list.extend(
-                flat::leaves(layout)
-                    .into_iter()
-                    .map(|l| (param.name.as_str(), index, l)),
-            );
+            for leaf in flat::leaves(layout) {
+                if is_element {
+                    elements.push((param.name.as_str(), index, leaf));
+                } else {
+                    uniforms.push((param, index, leaf));
+                }
+            }
             arguments.push((is_element, layout.size as usize));
         }
         if elements.is_empty() {
@@ -338,16 +319,18 @@ impl Table {
                 place: (0, leaf.offset),
             })
             .collect();
-        let names = short_names(uniforms.iter().map(|(p, _, l)| (*p, l)));
+        let names = short_names(uniforms.iter().map(|(p, _, l)| (p.name.as_str(), l)));
         let mut settings: Vec<Setting> = uniforms
             .iter()
             .zip(names)
             .map(|((param, index, leaf), name)| Setting {
                 name,
-                full: flat::join(param, &leaf.path),
+                full: flat::join(&param.name, &leaf.path),
                 scalar: leaf.scalar,
-                default: documented_default(&leaf.summary)
-                    .map_or(zero(leaf.scalar), |x| from_f64(leaf.scalar, x)),
+                default: from_f64(
+                    leaf.scalar,
+                    leaf.inputs.within(&param.inputs).default.unwrap_or(0.0),
+                ),
                 summary: leaf.summary.clone(),
                 place: Place::Uniform(*index, leaf.offset),
             })
@@ -764,19 +747,6 @@ mod tests {
         ] {
             let error = parse(scalar, text).unwrap_err();
             assert!(error.contains(words), "{text}: {error}");
-        }
-    }
-
-    #[test]
-    fn documentation_gives_defaults() {
-        for (text, value) in [
-            ("Bias; default 0.5.", Some(0.5)),
-            ("Defaults to 3e-5, as published.", Some(3e-5)),
-            ("Bias (default: 2)", Some(2.0)),
-            ("The default one.", None),
-            ("Bias.", None),
-        ] {
-            assert_eq!(documented_default(text), value, "{text}");
         }
     }
 

@@ -1,12 +1,12 @@
 //! Structures taken apart into their numbers: one name, type and place for each, as columns of a
 //! table or as values to generate and compare.
 
-use hankel_dsl::native::describe::{Layout, Scalar, Type};
+use hankel_dsl::native::describe::{Inputs, Layout, Scalar, Type};
 
 use crate::device::slots::scalar_bytes;
 
 /// A number inside a value.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Leaf {
     /// Where it is: `field`, `field.x`, `field[2]`, `outer.inner`; empty for a plain number,
     /// `.x` for a part of a plain vector.
@@ -17,13 +17,17 @@ pub struct Leaf {
     pub offset: usize,
     /// The documentation of the field that it belongs to.
     pub summary: String,
+    /// What the attributes of the field, and of those around it, say of it.
+    pub inputs: Inputs,
+    /// Which component of a vector it is, and of how many; 0 of 1 for a scalar.
+    pub component: (usize, usize),
 }
 
 /// The numbers of a structure or a plain value, in the order of their places.
 #[must_use]
 pub fn leaves(layout: &Layout) -> Vec<Leaf> {
     let mut all = Vec::new();
-    layout_leaves(layout, "", 0, &mut all);
+    layout_leaves(layout, "", 0, &Inputs::default(), &mut all);
     all
 }
 
@@ -31,7 +35,7 @@ pub fn leaves(layout: &Layout) -> Vec<Leaf> {
 #[must_use]
 pub fn type_leaves(ty: &Type) -> Vec<Leaf> {
     let mut all = Vec::new();
-    collect(ty, "", "", 0, &mut all);
+    collect(ty, "", "", 0, &Inputs::default(), &mut all);
     all
 }
 
@@ -45,30 +49,28 @@ pub fn join(prefix: &str, path: &str) -> String {
     }
 }
 
-fn layout_leaves(layout: &Layout, prefix: &str, at: usize, all: &mut Vec<Leaf>) {
+fn layout_leaves(layout: &Layout, prefix: &str, at: usize, outer: &Inputs, all: &mut Vec<Leaf>) {
     for field in &layout.fields {
         let path = join(prefix, &field.name);
-        collect(
-            &field.ty,
-            &path,
-            &field.summary,
-            at + field.offset as usize,
-            all,
-        );
+        let inputs = field.inputs.within(outer);
+        let at = at + field.offset as usize;
+        collect(&field.ty, &path, &field.summary, at, &inputs, all);
     }
 }
 
-fn collect(ty: &Type, path: &str, summary: &str, at: usize, all: &mut Vec<Leaf>) {
-    let mut push = |path: String, scalar, offset| {
+fn collect(ty: &Type, path: &str, summary: &str, at: usize, inputs: &Inputs, all: &mut Vec<Leaf>) {
+    let mut push = |path: String, scalar, offset, component| {
         all.push(Leaf {
             path,
             scalar,
             offset,
             summary: summary.into(),
+            inputs: inputs.clone(),
+            component,
         });
     };
     match ty {
-        Type::Scalar { scalar } => push(path.into(), *scalar, at),
+        Type::Scalar { scalar } => push(path.into(), *scalar, at, (0, 1)),
         Type::Vector { scalar, size } => {
             for (i, axis) in ["x", "y", "z", "w"]
                 .into_iter()
@@ -79,6 +81,7 @@ fn collect(ty: &Type, path: &str, summary: &str, at: usize, all: &mut Vec<Leaf>)
                     format!("{path}.{axis}"),
                     *scalar,
                     at + i * scalar_bytes(*scalar),
+                    (i, *size as usize),
                 );
             }
         }
@@ -89,10 +92,11 @@ fn collect(ty: &Type, path: &str, summary: &str, at: usize, all: &mut Vec<Leaf>)
         } => {
             for i in 0..*length as usize {
                 let path = format!("{path}[{i}]");
-                collect(element, &path, summary, at + i * *stride as usize, all);
+                let at = at + i * *stride as usize;
+                collect(element, &path, summary, at, inputs, all);
             }
         }
-        Type::Struct { layout } => layout_leaves(layout, path, at, all),
+        Type::Struct { layout } => layout_leaves(layout, path, at, inputs, all),
     }
 }
 
@@ -171,6 +175,7 @@ mod tests {
             ty,
             offset,
             size,
+            inputs: Inputs::default(),
         };
         let inner = Layout {
             name: "Inner".into(),

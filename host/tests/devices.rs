@@ -665,7 +665,7 @@ fn bad_code_is_refused_with_the_kernels_name() {
 #[test]
 fn an_exact_kernel_runs_as_untouched_spirv_alone() {
     let mut kernel = affine();
-    kernel.kernel.exact = true;
+    kernel.kernel.rounding = Rounding::Exact;
     let mut gpu = vulkan();
     let program = kernel.program(Way::Passthrough);
     assert_eq!(affine_on(&mut gpu, &program, &[2.0, 4.0]), [1.475]);

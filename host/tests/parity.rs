@@ -4,7 +4,10 @@
 mod common;
 
 use common::*;
+use hankel_dsl::native::describe::{Domain, Kernel, Length, Role, Rounding};
+use hankel_dsl::native::inputs::{Given, Request};
 use hankel_dsl::native::{Arg, CallError, Mode};
+use hankel_host::crates::KernelEntry;
 use hankel_host::device::{NativeDevice, Shader};
 use hankel_host::inputs::{self, Class};
 use hankel_host::parity::execute;
@@ -42,7 +45,7 @@ fn found(sample: &Sample, path: Path, seed: u64) -> Result<Found, String> {
     let numbers = Numbers::of(kernel);
     let rules = Rules::of(kernel, kernel.tolerance.clone());
     let mut found = Found::default();
-    for case in inputs::cases(kernel, seed) {
+    for case in inputs::cases(kernel, seed).unwrap() {
         let reference =
             execute::dispatch(&mut scalar, &program, &case).map_err(|e| e.to_string())?;
         let written = if path == Path::Lanes {
@@ -97,14 +100,20 @@ fn every_stage_agrees_on_every_path() {
 #[test]
 fn the_same_seed_makes_the_same_inputs_and_another_others() {
     let kernel = &affine().kernel;
-    assert_eq!(inputs::cases(kernel, 5), inputs::cases(kernel, 5));
-    assert_ne!(inputs::cases(kernel, 5), inputs::cases(kernel, 6));
+    assert_eq!(
+        inputs::cases(kernel, 5).unwrap(),
+        inputs::cases(kernel, 5).unwrap()
+    );
+    assert_ne!(
+        inputs::cases(kernel, 5).unwrap(),
+        inputs::cases(kernel, 6).unwrap()
+    );
 }
 
 #[test]
 fn hostile_inputs_are_absurd_but_finite() {
     for sample in all_samples() {
-        for case in inputs::cases(&sample.kernel, 11) {
+        for case in inputs::cases(&sample.kernel, 11).unwrap() {
             assert!(
                 inputs::is_finite(&sample.kernel, &case),
                 "{}",
@@ -114,6 +123,7 @@ fn hostile_inputs_are_absurd_but_finite() {
     }
     let largest = |class: Class| {
         inputs::cases(&affine().kernel, 11)
+            .unwrap()
             .iter()
             .filter(|c| c.class == class)
             .flat_map(|c| match &c.args[1] {
@@ -213,7 +223,7 @@ fn a_panic_names_its_input() {
     let program = entry.program(None, &[]);
     let mut native = NativeDevice::with_mode(Mode::REFERENCE);
     let mut fails = |case: &inputs::Case| execute::dispatch(&mut native, &program, case).is_err();
-    let cases = inputs::cases(&sample.kernel, 1);
+    let cases = inputs::cases(&sample.kernel, 1).unwrap();
     let case = cases.iter().find(|case| fails(case));
     let case = case.expect("an i32 takes the value 0 somewhere in the inputs");
     let words = panics::culprit(&sample.kernel, case, fails).unwrap();
@@ -259,7 +269,110 @@ fn the_driver_does_not_reorder_what_naga_wrote_of_a_pinned_kernel() {
         Ok(())
     };
     assert!(!passes(&sample, Path::Wgsl), "the driver reorders");
-    sample.kernel.pinned = true;
+    sample.kernel.rounding = Rounding::Pinned;
     assert!(passes(&sample, Path::SpirvNaga));
     assert!(passes(&sample, Path::Wgsl));
+}
+
+fn said(sample: &mut Sample, name: &str, domain: Domain) {
+    let param = sample.kernel.params.iter_mut().find(|p| p.name == name);
+    param.unwrap().inputs.domain = Some(domain);
+}
+
+#[test]
+fn attributes_decide_inputs_and_names_do_not() {
+    let mut sample = affine();
+    let range = Domain::Range {
+        least: 40.0,
+        most: 41.0,
+    };
+    said(&mut sample, "pair", range);
+    for case in inputs::cases(&sample.kernel, 1).unwrap() {
+        let inputs::Input::Bytes(bytes) = &case.args[1] else {
+            panic!("a buffer is bytes");
+        };
+        let all: Vec<f32> = bytemuck::pod_collect_to_vec(bytes);
+        let inside = all.iter().all(|x| (40.0..=41.0).contains(x));
+        assert_eq!(inside, case.class != Class::Hostile, "{}", case.class);
+    }
+}
+
+#[test]
+fn the_authors_own_inputs_are_the_ordinary_ones() {
+    let kernel: Kernel = affine().kernel;
+    let name = kernel.params[1].name.clone();
+    let own = |given: Vec<Given>| {
+        let entry = KernelEntry::new(kernel.clone(), affine().native);
+        let entry = entry.with_inputs(move |_: &Request| Ok(Some(given.clone())));
+        inputs::of_entry(&entry, 1)
+    };
+    let pairs = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0];
+    let cases = own(vec![Given::new("three pairs").buffer(&name, &pairs)]).unwrap();
+    let ordinary: Vec<_> = cases
+        .iter()
+        .filter(|c| c.class == Class::Ordinary)
+        .collect();
+    assert_eq!(ordinary.len(), 1);
+    assert_eq!(ordinary[0].invocations, 3);
+    assert_eq!(ordinary[0].called(), "ordinary inputs (three pairs)");
+    let bytes = bytemuck::cast_slice(&pairs).to_vec();
+    assert_eq!(ordinary[0].args[1], inputs::Input::Bytes(bytes));
+    // The others are as without.
+    assert!(
+        cases
+            .iter()
+            .any(|c| c.class == Class::Hostile && c.invocations > 1000)
+    );
+    for (given, words) in [
+        (
+            Given::new("x").buffer("nosuch", &pairs),
+            "no such parameter",
+        ),
+        (Given::new("x").buffer(&name, &[1.0f32]), "whole number"),
+    ] {
+        let error = own(vec![given]).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    assert!(own(Vec::new()).is_err());
+}
+
+#[test]
+fn lengths_and_constants_are_what_their_attributes_say() {
+    let mut kernel = affine().kernel;
+    let pairs = kernel.params[1].name.clone();
+    let Role::Element { layout, .. } = kernel.params[1].role.clone() else {
+        panic!("the second parameter is read row by row");
+    };
+    kernel.params[1].inputs.length = Some(Length::Between { least: 5, most: 9 });
+    let mut table = param("table", Role::Storage { binding: 7, layout });
+    table.inputs.length = Some(Length::Of {
+        param: pairs,
+        times: 3,
+        plus: 1,
+    });
+    kernel.params.push(table);
+    let way = Role::Constant { id: 0, default: 2 };
+    let mut way = param("way", way);
+    way.inputs.domain = Some(Domain::Values {
+        values: vec![0.0, 1.0, 2.0],
+    });
+    kernel.params.push(way);
+    for case in inputs::cases(&kernel, 1).unwrap() {
+        assert!((5..=9).contains(&case.invocations));
+        let count = |i: usize| match &case.args[i] {
+            inputs::Input::Bytes(bytes) => bytes.len() / 8,
+            _ => 0,
+        };
+        assert_eq!(count(1), case.invocations);
+        assert_eq!(count(2), 3 * case.invocations + 1);
+    }
+    // The default comes first.
+    assert_eq!(inputs::constants(&kernel), [[2], [0], [1]]);
+    kernel.params[3].inputs.length = Some(Length::Of {
+        param: "tabel".into(),
+        times: 1,
+        plus: 0,
+    });
+    let error = inputs::cases(&kernel, 1).unwrap_err().to_string();
+    assert!(error.contains("`tabel`"), "{error}");
 }

@@ -66,7 +66,7 @@ summary { cursor: pointer; overflow-wrap: anywhere; }
 ";
 
 /// What cells read (as [`sort`] says it), and what that means.
-const LEGEND: [(&str, &str); 12] = [
+const LEGEND: [(&str, &str); 13] = [
     (
         "same",
         "ran, and gave the same bits as the native scalar run; zeros of either sign are equal, and so \
@@ -89,6 +89,10 @@ const LEGEND: [(&str, &str); 12] = [
         "something that the column takes is not installed",
     ),
     ("FAIL", "ran, and gave other numbers than it may"),
+    (
+        "INFINITE",
+        "finite inputs give infinities or NaN natively, and the kernel does not declare it",
+    ),
     (
         "NATIVE",
         "the native run itself failed: there is nothing to compare with",
@@ -211,7 +215,7 @@ fn brief(cell: &Cell) -> String {
 
 fn class(word: &str) -> &str {
     match word {
-        "FAIL" | "NATIVE" | "REFUSED" | "CRASHED" | "TIMEOUT" => "fail",
+        "FAIL" | "INFINITE" | "NATIVE" | "REFUSED" | "CRASHED" | "TIMEOUT" => "fail",
         "-" => "none",
         other => other,
     }
@@ -328,6 +332,9 @@ fn block(i: usize, row: &Row, column: Column, cell: &Cell, open: bool) -> String
     body += &facts(&known);
     if let Outcome::Foreign { failure } = outcome {
         body += &format!("<pre>{}</pre>\n", escape(&failure.to_string()));
+    }
+    if let Outcome::NotFinite { count } = outcome {
+        body += &format!("<p>{}.</p>\n", escape(&crate::table::not_finite(*count)));
     }
     if let Outcome::NoReference { problem } = outcome {
         body += &format!("<pre>{}</pre>\n", escape(problem));

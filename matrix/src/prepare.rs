@@ -8,7 +8,7 @@ use hankel_dsl::native::describe::{self, Kernel, Output, TextureKind, Type};
 use hankel_dsl::native::{Address, Filter};
 use hankel_host::device::extent;
 use hankel_host::device::slots::{self, Given, Use};
-use hankel_host::inputs::{self, Case as HostCase, Input};
+use hankel_host::inputs::{Case as HostCase, Input};
 use hankel_host::parity::execute::Written;
 
 use crate::job::{Arg, Case, Job, Place, Role, Scalar, Slot, Stage, Value};
@@ -24,12 +24,11 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Makes the inputs of `kernel` from `seed`, and writes their bytes to `file`.
+    /// Writes the inputs of `kernel` to `file`.
     ///
     /// # Errors
     /// Writing the file.
-    pub fn new(kernel: &Kernel, seed: u64, file: &Path) -> io::Result<Self> {
-        let cases = inputs::cases(kernel, seed);
+    pub fn new(kernel: &Kernel, cases: Vec<HostCase>, file: &Path) -> io::Result<Self> {
         let mut bytes = Vec::new();
         let runs = cases.iter().map(|c| run(kernel, c, &mut bytes)).collect();
         fs::write(file, bytes)?;

@@ -91,6 +91,12 @@ pub enum Outcome {
     Passed,
     /// Some are not.
     Differs,
+    /// Finite inputs give natively what is not finite, and the kernel does not say so:
+    /// `parity(non_finite, why = "…")`.
+    NotFinite {
+        /// How many numbers.
+        count: u64,
+    },
     /// There is nothing to compare with: the native scalar run failed, or there are no inputs.
     NoReference {
         /// Why, and with which input.
@@ -138,6 +144,7 @@ impl Outcome {
         match self {
             Self::Passed => "pass",
             Self::Differs => "FAIL",
+            Self::NotFinite { .. } => "INFINITE",
             Self::NoReference { .. } => "NATIVE",
             Self::Foreign { failure } => match failure {
                 Failure::Refused { .. } => "REFUSED",
@@ -157,7 +164,10 @@ impl Outcome {
     pub const fn fails(&self) -> bool {
         matches!(
             self,
-            Self::Differs | Self::NoReference { .. } | Self::Foreign { .. }
+            Self::Differs
+                | Self::NotFinite { .. }
+                | Self::NoReference { .. }
+                | Self::Foreign { .. }
         )
     }
 }

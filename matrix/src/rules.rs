@@ -16,6 +16,7 @@ pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
         let exact = Tolerance {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: "the same operations, neither fused nor reordered".into(),
         };
         return Rules::of(kernel, exact);

@@ -231,7 +231,9 @@ pub(crate) fn tally(report: &Report) -> String {
         ("not run", &["lacks", "-", "missing"]),
         (
             "failing",
-            &["FAIL", "NATIVE", "REFUSED", "CRASHED", "TIMEOUT"],
+            &[
+                "FAIL", "INFINITE", "NATIVE", "REFUSED", "CRASHED", "TIMEOUT",
+            ],
         ),
     ];
     let parts: Vec<String> = parts
@@ -275,6 +277,7 @@ pub(crate) fn note(outcome: &Outcome) -> Option<Note<'_>> {
         Outcome::NotInstalled { what, install } => (what, Some(install), None),
         Outcome::Passed
         | Outcome::Differs
+        | Outcome::NotFinite { .. }
         | Outcome::NoReference { .. }
         | Outcome::Foreign { .. } => return None,
     };
@@ -355,12 +358,24 @@ fn section(
     writeln!(f)
 }
 
+/// What is said of results that are not finite.
+pub(crate) fn not_finite(numbers: u64) -> String {
+    let numbers = usize::try_from(numbers).unwrap_or(usize::MAX);
+    format!(
+        "{} of the native results not finite, though all inputs are; if that is meant, the kernel declares it: `parity(non_finite, why = \"…\")`",
+        count(numbers, "number")
+    )
+}
+
 fn failure(f: &mut fmt::Formatter<'_>, name: &str, cell: &Cell) -> fmt::Result {
     write!(f, "{name}: {}", cell.outcome.word())?;
     if let Some(found) = &cell.found {
         write!(f, ": {}", sentence(found))?;
     }
     writeln!(f)?;
+    if let Outcome::NotFinite { count } = &cell.outcome {
+        writeln!(f, "    {}", not_finite(*count))?;
+    }
     if let Outcome::Foreign { failure } = &cell.outcome {
         let words = failure.to_string();
         let mut lines = words.lines().filter(|l| !l.trim().is_empty());
@@ -461,6 +476,7 @@ pub(crate) mod tests {
                 tolerance: Tolerance {
                     ulp: 4,
                     absolute: 1e-6,
+                    non_finite: false,
                     why: say("a square root"),
                 },
                 flushes: true,

@@ -149,6 +149,7 @@ fn cases(job: &Job, inputs: &[u8]) -> Result<Vec<Case>, String> {
         .map(|case| {
             Ok(Case {
                 class: Class::Ordinary,
+                what: None,
                 args: case.args.iter().map(arg).collect::<Result<_, _>>()?,
                 invocations: case.invocations as usize,
             })

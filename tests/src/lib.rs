@@ -85,16 +85,26 @@ impl Crate {
     /// Everything that is generated from it.
     #[must_use]
     pub fn generate(&self) -> Generated {
-        let request = Request {
+        generate(&self.request(), &self.modules()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// The committed modules, for a build.
+    #[must_use]
+    pub fn modules(&self) -> Modules {
+        Modules::Final(self.bundle.modules.clone())
+    }
+
+    /// A build of all kernels in all languages.
+    #[must_use]
+    pub fn request(&self) -> Request {
+        Request {
             crate_name: self.bundle.origin.crate_name.clone(),
             kernels: self.entries.iter().map(|e| e.kernel.clone()).collect(),
             filter: Vec::new(),
             targets: Vec::new(),
             options: Options::default(),
             rust_gpu: self.bundle.origin.made_by.rust_gpu.clone(),
-        };
-        let modules = Modules::Final(self.bundle.modules.clone());
-        generate(&request, &modules).unwrap_or_else(|e| panic!("{e}"))
+        }
     }
 
     /// The modules as words.

@@ -19,9 +19,11 @@ use hankel_codegen::functions::{self, FORMS, crates};
 use hankel_codegen::translate::Place;
 use hankel_dsl::native::call::{Arg, CallError};
 use hankel_dsl::native::describe::{
-    Field, Kernel, Layout, Output, Param, Range, Role, Scalar, Stage, Tolerance, Type,
+    Domain, Field, Inputs, Kernel, Layout, Output, Param, Range, Role, Rounding, Scalar, Stage,
+    Tolerance, Type,
 };
 use hankel_dsl::native::function::Function;
+use hankel_dsl::native::inputs::{self, Given, Source};
 use hankel_host::crates::KernelEntry;
 use hankel_matrix::column::Column;
 use hankel_matrix::known::Known;
@@ -112,21 +114,35 @@ fn results(function: &Function) -> Vec<Word> {
         .collect()
 }
 
+/// Where the numbers of an argument lie.
+fn inputs_of(word: &Word) -> Inputs {
+    let (least, most) = match word.name.as_str() {
+        "one" => (1.0, 16_777_216.0),
+        "texels" => (1.0, 1024.0),
+        "total" | "leak" | "overestimation" | "strength" => (0.0, 1.0),
+        name if ["channels", "first", "second"]
+            .iter()
+            .any(|n| name.starts_with(n)) =>
+        {
+            (0.0, 1.0)
+        }
+        _ if word.scalar == Scalar::F32 => (-1.0, 1.0),
+        _ => return Inputs::default(),
+    };
+    Inputs {
+        domain: Some(Domain::Range { least, most }),
+        ..Inputs::default()
+    }
+}
+
 fn layout(name: &str, words: &[Word]) -> Layout {
     let fields = words.iter().enumerate().map(|(i, w)| Field {
         name: w.name.clone(),
-        summary: match w.name.as_str() {
-            "depth" => "from -1 to 1",
-            "one" => "from 1 to 16777216",
-            "texels" => "from 1 to 1024",
-            name if name.starts_with("channels") => "from 0 to 1",
-            name if name.starts_with("first") || name.starts_with("second") => "from 0 to 1",
-            _ => "",
-        }
-        .into(),
+        summary: String::new(),
         ty: Type::Scalar { scalar: w.scalar },
         offset: 4 * i as u32,
         size: 4,
+        inputs: inputs_of(w),
     });
     Layout {
         name: name.into(),
@@ -162,6 +178,7 @@ fn entry(function: &Function) -> KernelEntry {
                 binding: 0,
                 layout: layout("Row", &arguments(function)),
             },
+            inputs: Inputs::default(),
         }],
         outputs: vec![Output::Buffer {
             binding: 1,
@@ -170,12 +187,12 @@ fn entry(function: &Function) -> KernelEntry {
         tolerance: Tolerance {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: String::new(),
         },
-        exact: false,
-        pinned: true,
+        rounding: Rounding::Pinned,
     };
-    let (run, words) = (function.run, arguments(function).len());
+    let (run, words, described) = (function.run, arguments(function).len(), function.clone());
     KernelEntry::new(kernel, move |call| {
         let wrong = CallError::Count {
             expected: 2,
@@ -187,6 +204,36 @@ fn entry(function: &Function) -> KernelEntry {
         out.copy_from_slice(&mapped(run, rows, words));
         Ok(())
     })
+    .with_inputs(move |request| Ok(Some(vec![of_distributions(&described, request)])))
+}
+
+/// Rows whose moments are those of distributions of depths.
+fn of_distributions(function: &Function, request: &inputs::Request) -> Given {
+    let mut source = Source::new(request.seed);
+    let words = arguments(function);
+    let is_moment = |word: &Word| {
+        let digits = word.name.strip_prefix('b').unwrap_or_default();
+        !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    let moments = words.iter().filter(|w| is_moment(w)).count();
+    let mut rows: Vec<u32> = Vec::new();
+    for _ in 0..2000 {
+        let mut powers = hankel_shadows::inputs::powers(moments, &mut source).into_iter();
+        for word in &words {
+            let own = is_moment(word).then(|| powers.next()).flatten();
+            let (least, most) = match inputs_of(word).domain {
+                Some(Domain::Range { least, most }) => (least, most),
+                _ => (0.0, f64::from(u32::MAX)),
+            };
+            let number = own.unwrap_or_else(|| source.between(least, most));
+            rows.push(match word.scalar {
+                Scalar::F32 => (number as f32).to_bits(),
+                Scalar::I32 => number as i32 as u32,
+                _ => number as u32,
+            });
+        }
+    }
+    Given::new("moments of distributions").buffer("row", &rows)
 }
 
 /// Runs a function on rows of words.
@@ -492,6 +539,7 @@ fn subject(function: &Function, msl_file: &Path) -> Subject {
         (language, code)
     });
     Subject {
+        name: stub_name(function),
         entry: entry(function),
         codes: codes.into(),
     }
@@ -554,7 +602,8 @@ fn every_function_computes_the_native_bits_in_every_language() {
 
 /// Rows for a function: depths' moments, and numbers of all kinds.
 fn rows(function: &Function) -> Vec<u8> {
-    let cases = hankel_host::inputs::cases(&entry(function).kernel, 1);
+    let cases =
+        hankel_host::inputs::of_entry(&entry(function), 1).unwrap_or_else(|e| panic!("{e}"));
     let mut all = Vec::new();
     for case in cases {
         if let Some(hankel_host::inputs::Input::Bytes(bytes)) = case.args.first() {

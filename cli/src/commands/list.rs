@@ -2,7 +2,9 @@ use hankel_codegen::Language;
 use hankel_codegen::build::generate;
 use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
-use hankel_dsl::native::describe::{BuiltIn, Kernel, Output, Precision, Role, Stage, Type};
+use hankel_dsl::native::describe::{
+    BuiltIn, Kernel, Output, Precision, Role, Rounding, Stage, Type,
+};
 
 use crate::args::{Format, List};
 use crate::failure::{Outcome, Result};
@@ -75,8 +77,12 @@ fn bindings(kernel: &Kernel) {
             if p == Precision::F32 { "f32" } else { "f64" }
         );
     }
-    if kernel.exact {
-        say!("    arithmetic as it is written: neither contracted nor reordered");
+    match kernel.rounding {
+        Rounding::Free => {}
+        Rounding::Pinned => {
+            say!("    pinned: no contraction or reordering where the language can forbid it");
+        }
+        Rounding::Exact => say!("    exact: no contraction or reordering in any language"),
     }
     for p in &kernel.params {
         let what = match &p.role {

@@ -82,9 +82,10 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let targets: BTreeSet<Language> = columns.iter().filter_map(|c| c.language()).collect();
     let targets = targets.into_iter().collect();
     let request = session.request_for(args.kernels.clone(), targets, options);
-    let generated = generate(&request, &session.modules()?)?;
+    let modules = session.modules()?;
+    let generated = generate(&request, &modules)?;
     let krate = session.native(generated.manifest.kernels.keys(), limit)?;
-    let subjects = Subject::all(&generated, &krate.entries);
+    let subjects = Subject::with_constants(&generated, &request, &modules, &krate.entries)?;
 
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
     let this = std::env::current_exe()

@@ -210,7 +210,7 @@ fn padded(element: &Type, stride: u32) -> Option<(Scalar, u32)> {
 mod tests {
     use std::process::{Command, Output};
 
-    use hankel_dsl::native::describe::Field;
+    use hankel_dsl::native::describe::{Field, Inputs};
 
     use super::*;
 
@@ -223,6 +223,7 @@ mod tests {
             size: size(&ty),
             ty,
             offset,
+            inputs: Inputs::default(),
         };
         let number = |scalar| Type::Scalar { scalar };
         let vec3 = Type::Vector {

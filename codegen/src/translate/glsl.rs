@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use hankel_dsl::native::describe::Rounding;
 use naga::back::glsl::{Error, Options, PipelineOptions, Version, Writer, WriterFlags};
 use naga::{ResourceBinding, ShaderStage};
 
@@ -87,8 +88,8 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         job.precise(source, &types)?
     };
     let mut requires = Vec::new();
-    if job.language == Language::Essl310 && (job.kernel.exact || job.kernel.pinned) {
-        let lines = if job.kernel.exact {
+    if job.language == Language::Essl310 && job.kernel.rounding != Rounding::Free {
+        let lines = if job.kernel.rounding == Rounding::Exact {
             requires.push(ES_PRECISE.to_owned());
             format!("\n#extension {ES_PRECISE} : require\n")
         } else {

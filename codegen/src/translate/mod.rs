@@ -33,7 +33,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-use hankel_dsl::native::describe::{BuiltIn, Kernel, Role, Stage};
+use hankel_dsl::native::describe::{BuiltIn, Kernel, Role, Rounding, Stage};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{
@@ -325,7 +325,7 @@ impl Ir {
             },
             None => raw,
         };
-        if kernel.exact {
+        if kernel.rounding == Rounding::Exact {
             cleanup::name_roundings(&mut ir.module, &ir.info);
         }
         Ok(ir)
@@ -344,8 +344,7 @@ impl Ir {
         {
             cleanup::name_bit_counts(&mut ir.to_mut().module);
         }
-        let pinned = kernel.pinned
-            && !kernel.exact
+        let pinned = kernel.rounding == Rounding::Pinned
             && matches!(
                 language,
                 Language::Hlsl | Language::Glsl | Language::Essl310
@@ -449,7 +448,9 @@ impl Ir {
         if let Some(reason) = &self.dropped.reason {
             return Some(reason.clone());
         }
-        if let Some(reason) = inexact(language, options).filter(|_| kernel.exact) {
+        if kernel.rounding == Rounding::Exact
+            && let Some(reason) = inexact(language, options)
+        {
             return Some(reason);
         }
         if let Some(reason) = self.float_atomics(language, options) {
@@ -876,7 +877,7 @@ impl Job<'_> {
     /// Makes arithmetic exact in GLSL and HLSL, if the kernel asks for it: its results have variables
     /// ([`cleanup::name_roundings`], [`cleanup::name_results`]), which become `precise`.
     fn precise(&self, source: String, scalars: &[&str]) -> Result<String, Failure> {
-        if !self.kernel.exact && !self.kernel.pinned {
+        if self.kernel.rounding == Rounding::Free {
             return Ok(source);
         }
         let functions = self.ir.module.functions.iter().map(|(_, it)| it);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use hankel_dsl::native::describe::Rounding;
 use naga::ResourceBinding;
 use naga::back::msl::{
     self, BindSamplerTarget, BindTarget, EntryPointResources, Error, Options, PipelineOptions,
@@ -88,7 +89,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let source = source
         .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
         .replace(" - 0 - ", " - ");
-    let source = if job.kernel.exact {
+    let source = if job.kernel.rounding == Rounding::Exact {
         exact(&source).ok_or_else(|| Failure {
             construct: Some("`#include`".into()),
             message: "the text has none, after which `#pragma` is expected".into(),

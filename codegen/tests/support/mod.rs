@@ -62,10 +62,10 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         tolerance: Tolerance {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: "only + - * / and sqrt".into(),
         },
-        exact: false,
-        pinned: false,
+        rounding: Rounding::Free,
     }
 }
 
@@ -83,6 +83,7 @@ fn param(name: &str, role: Role) -> Param {
     Param {
         name: name.into(),
         role,
+        inputs: Inputs::default(),
     }
 }
 
@@ -103,6 +104,7 @@ pub fn floats(name: &str, fields: &[&str]) -> Layout {
                 },
                 offset: 4 * index,
                 size: 4,
+                inputs: Inputs::default(),
             })
             .collect(),
     }
@@ -116,6 +118,7 @@ fn plain(scalar: Scalar, name: &str, size: u32) -> Layout {
         ty,
         offset: 0,
         size,
+        inputs: Inputs::default(),
     }];
     Layout {
         name: name.into(),
@@ -185,6 +188,7 @@ pub fn resample() -> Kernel {
     resample.tolerance = Tolerance {
         ulp: 0,
         absolute: 1.5e-5,
+        non_finite: false,
         why: "one step of 16-bit unorm".into(),
     };
     resample
@@ -308,7 +312,7 @@ pub fn rounding() -> Kernel {
             layout: floats("Pair", &["x", "w"]),
         }],
     );
-    rounding.exact = true;
+    rounding.rounding = Rounding::Exact;
     rounding
 }
 

@@ -1,7 +1,7 @@
 //! How a kernel's SPIR-V reaches a Vulkan driver. What the kernel's description says of rounding
 //! decides, here and nowhere else: whoever runs a kernel on Vulkan asks [`Arithmetic::of`].
 
-use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::describe::{Kernel, Rounding};
 
 use super::Shader;
 
@@ -19,8 +19,8 @@ impl Arithmetic {
     /// What `kernels`, which are part of one pipeline, allow: the strictest of them decides, since
     /// wgpu wants both stages of a draw by the same way.
     pub fn of<'a>(kernels: impl IntoIterator<Item = &'a Kernel>) -> Self {
-        let pinned = |kernel: &Kernel| kernel.pinned || kernel.exact;
-        if kernels.into_iter().any(pinned) {
+        let free = |kernel: &Kernel| kernel.rounding == Rounding::Free;
+        if !kernels.into_iter().all(free) {
             Self::Pinned
         } else {
             Self::Free

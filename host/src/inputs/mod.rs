@@ -1,26 +1,28 @@
 //! Inputs for a kernel, made from its description: ordinary ones, ones at the edges of what is
 //! meant, and absurd but finite ones. The same seed makes the same inputs.
 //!
-//! What a number is like follows from, in this order:
-//! 1. a range in its field's documentation, `[0, 1]` or `from 0 to 1`;
-//! 2. its name, see [`values::by_name`];
-//! 3. its type: floats lie in [-1, 1]; a `u32` of a uniform in 0..=8 (counts and radii), elsewhere
-//!    anywhere, 0, 1, -1 and the extremes among them.
+//! What a number is like follows from the attributes of its field or parameter, see
+//! [`describe::Inputs`](hankel_dsl::native::describe::Inputs), and from nothing else. Integers keep
+//! to their ranges in every class: they are counts and indices, and what lies beyond is a mistake of
+//! the caller, not an input.
 //!
-//! Integers keep to their ranges in every class: they are counts and indices, and what lies
-//! beyond is a mistake of the caller, not an input.
+//! A kernel's author may give the ordinary inputs, with a function of their own ([`of_entry`]).
 
 pub mod values;
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use fastrand::Rng;
 use hankel_dsl::native::describe::{
-    Kernel, Layout, Output, Range, Role, Stage, TexelFormat, TextureKind,
+    Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Stage, TexelFormat,
+    TextureKind,
 };
+use hankel_dsl::native::inputs::{Given, Request, Value};
 use hankel_dsl::native::{Address, Filter, Sampler};
 use serde::{Deserialize, Serialize};
 
+use crate::crates::KernelEntry;
 use crate::device::TextureShape;
 use crate::device::slots::{self, Slot, Use};
 use crate::flat;
@@ -74,10 +76,23 @@ pub enum Input {
 pub struct Case {
     /// What they are like.
     pub class: Class,
+    /// What the author calls them, if the author made them.
+    pub what: Option<String>,
     /// One for each of [`slots::slots`].
     pub args: Vec<Input>,
     /// Invocations that write something.
     pub invocations: usize,
+}
+
+impl Case {
+    /// The inputs in words: their class, and what their author calls them.
+    #[must_use]
+    pub fn called(&self) -> String {
+        match &self.what {
+            Some(what) => format!("{} inputs ({what})", self.class),
+            None => format!("{} inputs", self.class),
+        }
+    }
 }
 
 /// The seed unless the user gives one.
@@ -132,9 +147,131 @@ fn magnitudes(kernel: &Kernel) -> (f64, f64) {
     (least, most)
 }
 
-/// The cases of a kernel, several for uniforms to vary: they hold one value for a whole run.
+/// Why there are no inputs for a kernel.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InputError {
+    /// An attribute refers to a parameter that the kernel does not have.
+    #[error(
+        "#[count_of({param})] or #[index_of({param})] or #[length({param})]: the kernel has no buffer or texture `{param}`"
+    )]
+    NoParameter {
+        /// Its name.
+        param: String,
+    },
+    /// Lengths that depend on each other in a circle, or on what comes to nothing.
+    #[error("the length of `{param}`: {problem}")]
+    Length {
+        /// The buffer.
+        param: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The author's function failed, or gave what does not fit.
+    #[error("the kernel's own inputs: {problem}")]
+    Own {
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// All combinations of values that a kernel's specialisation constants are run with: those of
+/// `#[values]` or the ends of a `#[range]`, and the default; one empty combination without constants.
 #[must_use]
-pub fn cases(kernel: &Kernel, seed: u64) -> Vec<Case> {
+pub fn constants(kernel: &Kernel) -> Vec<Vec<u32>> {
+    let mut all: Vec<Vec<u32>> = vec![Vec::new()];
+    for param in &kernel.params {
+        let Role::Constant { default, .. } = param.role else {
+            continue;
+        };
+        let mut values = vec![default];
+        match &param.inputs.domain {
+            Some(Domain::Values { values: listed }) => {
+                values.extend(listed.iter().map(|v| *v as u32));
+            }
+            Some(Domain::Range { least, most } | Domain::Magnitude { least, most }) => {
+                values.extend([*least as u32, *most as u32]);
+            }
+            _ => {}
+        }
+        // The default comes first.
+        values[1..].sort_unstable();
+        let mut seen = Vec::new();
+        values.retain(|v| {
+            !seen.contains(v) && {
+                seen.push(*v);
+                true
+            }
+        });
+        all = all
+            .iter()
+            .flat_map(|before| values.iter().map(|v| [&before[..], &[*v]].concat()))
+            .collect();
+    }
+    all
+}
+
+/// Makes other values the defaults of a kernel's specialisation constants, in their order; gives
+/// the constants' names with the values.
+pub fn set_constants(kernel: &mut Kernel, values: &[u32]) -> BTreeMap<String, u32> {
+    let mut values = values.iter();
+    let mut set = BTreeMap::new();
+    for param in &mut kernel.params {
+        if let Role::Constant { default, .. } = &mut param.role
+            && let Some(value) = values.next()
+        {
+            *default = *value;
+            set.insert(param.name.clone(), *value);
+        }
+    }
+    set
+}
+
+/// The cases of an entry point, for the values that its specialisation constants have by default:
+/// ordinary ones from the author's function, if there is one, else from the attributes; edge and
+/// hostile ones from the attributes.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError> {
+    let kernel = &entry.kernel;
+    let own = |problem: String| InputError::Own { problem };
+    let constants = kernel.params.iter().filter_map(|p| match p.role {
+        Role::Constant { default, .. } => Some((p.name.clone(), default)),
+        _ => None,
+    });
+    let request = Request {
+        seed: mixed(kernel, seed),
+        constants: constants.collect(),
+    };
+    let Some(given) = entry.own_inputs(&request).map_err(own)? else {
+        return cases(kernel, seed);
+    };
+    if given.is_empty() {
+        return Err(own("the function gave none".into()));
+    }
+    let mut all = Vec::new();
+    for (i, given) in given.iter().enumerate() {
+        let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 40));
+        all.push(case(kernel, Class::Ordinary, rng, Some(given))?);
+    }
+    let made = cases(kernel, seed)?;
+    all.extend(made.into_iter().filter(|c| c.class != Class::Ordinary));
+    Ok(all)
+}
+
+/// The name goes in, so that kernels do not share inputs by accident.
+fn mixed(kernel: &Kernel, seed: u64) -> u64 {
+    kernel.function.bytes().fold(seed, |h, b| {
+        (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// The cases of a kernel from its attributes alone, several for uniforms to vary: they hold one
+/// value for a whole run.
+///
+/// # Errors
+/// See [`InputError`].
+pub fn cases(kernel: &Kernel, seed: u64) -> Result<Vec<Case>, InputError> {
     let has_uniform = kernel
         .params
         .iter()
@@ -143,25 +280,40 @@ pub fn cases(kernel: &Kernel, seed: u64) -> Vec<Case> {
     let mut all = Vec::new();
     for (i, class) in Class::ALL.into_iter().enumerate() {
         for run in 0..runs {
-            // The name goes in, so that kernels do not share inputs by accident.
-            let name = kernel.function.bytes().fold(seed, |h, b| {
-                (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
-            });
-            let rng = Rng::with_seed(name ^ ((i as u64) << 32) ^ run);
-            all.push(case(kernel, class, rng));
+            let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 32) ^ run);
+            all.push(case(kernel, class, rng, None)?);
         }
     }
-    all
+    Ok(all)
 }
 
-fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
+/// How much of what a case has.
+struct Extents {
+    /// Invocations.
+    elements: usize,
+    /// Elements of a buffer that is read anywhere and says nothing of its length.
+    table: usize,
+    /// Texels of what is written, and of textures that say nothing of their size.
+    size: [u32; 3],
+    /// Texels of a volume that is written, also beside a flat range.
+    volume: [u32; 3],
+}
+
+fn case(
+    kernel: &Kernel,
+    class: Class,
+    rng: Rng,
+    given: Option<&Given>,
+) -> Result<Case, InputError> {
     let mut values = Values {
         rng,
         class,
         magnitudes: magnitudes(kernel),
+        lengths: BTreeMap::new(),
     };
     let slots = slots::slots(kernel);
-    let size = texels(kernel);
+    let given = Own::new(&slots, given)?;
+    let size = texels(kernel, &given);
     let elements = match (&kernel.stage, size) {
         (Stage::Compute { .. }, Some(size)) => size.iter().map(|&n| n as usize).product(),
         (Stage::Compute { .. }, None) => ELEMENTS,
@@ -173,20 +325,26 @@ fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
     let writes = slots
         .iter()
         .any(|s| matches!(s.role, Use::StorageMut { .. }));
-    let table = match kernel.stage {
-        Stage::Compute { .. } if writes || !over_texels => ELEMENTS.max(elements),
-        _ => TABLE,
+    let mut extents = Extents {
+        elements,
+        table: match kernel.stage {
+            Stage::Compute { .. } if writes || !over_texels => ELEMENTS.max(elements),
+            _ => TABLE,
+        },
+        size: size.unwrap_or(FLAT),
+        volume: match (&kernel.stage, size) {
+            (Stage::Compute { dimensions: 3, .. }, Some(size)) => size,
+            _ => VOLUME,
+        },
     };
-    let size = size.unwrap_or(FLAT);
-    // A volume that is written beside a flat range.
-    let volume = match kernel.stage {
-        Stage::Compute { dimensions: 3, .. } => size,
-        _ => VOLUME,
-    };
+    values.lengths = lengths(kernel, &slots, &given, &mut extents, &mut values.rng)?;
     let mut args: Vec<Input> = slots
         .iter()
-        .map(|s| input(s, &mut values, elements, table, [size, volume]))
-        .collect();
+        .map(|slot| match given.get(&slot.name) {
+            Some(own) => Ok(own.clone()),
+            None => input(kernel, slot, &mut values, &extents),
+        })
+        .collect::<Result<_, _>>()?;
     if let Stage::Compute {
         range: Range::Uniform { param, offset },
         dimensions,
@@ -197,16 +355,26 @@ fn case(kernel: &Kernel, class: Class, rng: Rng) -> Case {
         if let Some(Input::Bytes(bytes)) = said.map(|i| &mut args[i]) {
             let words = bytes.get_mut(*offset as usize..).unwrap_or_default();
             let words = words.chunks_exact_mut(4).take(*dimensions as usize);
-            for (word, n) in words.zip(size_of_range(*dimensions)) {
+            for (word, n) in words.zip(extents.size_of_range(*dimensions)) {
                 word.copy_from_slice(&n.to_le_bytes());
             }
         }
     }
-    let invocations = elements;
-    Case {
+    Ok(Case {
         class,
+        what: given.what,
         args,
-        invocations,
+        invocations: extents.elements,
+    })
+}
+
+impl Extents {
+    /// The size of a range that a uniform says.
+    const fn size_of_range(&self, dimensions: u32) -> [u32; 3] {
+        match dimensions {
+            1 => [self.elements as u32, 1, 1],
+            _ => self.size,
+        }
     }
 }
 
@@ -220,7 +388,7 @@ const fn size_of_range(dimensions: u32) -> [u32; 3] {
 }
 
 /// How far the kernel runs; none for a map over the elements of a buffer.
-fn texels(kernel: &Kernel) -> Option<[u32; 3]> {
+fn texels(kernel: &Kernel, given: &Own) -> Option<[u32; 3]> {
     let Stage::Compute {
         range, dimensions, ..
     } = &kernel.stage
@@ -229,43 +397,326 @@ fn texels(kernel: &Kernel) -> Option<[u32; 3]> {
     };
     match (range, kernel.outputs.first()) {
         (Range::Fixed { size }, _) => Some(*size),
-        (Range::Uniform { .. }, _) | (Range::Outputs, Some(Output::Texture { .. })) => {
-            Some(size_of_range(*dimensions))
+        (Range::Uniform { param, offset }, _) => {
+            let Some(Input::Bytes(bytes)) = given.get(param) else {
+                return Some(size_of_range(*dimensions));
+            };
+            let mut size = [1; 3];
+            let words = bytes.get(*offset as usize..).unwrap_or_default();
+            let words = words.as_chunks().0.iter().take(*dimensions as usize);
+            for (n, word) in size.iter_mut().zip(words) {
+                *n = u32::from_le_bytes(*word);
+            }
+            Some(size)
         }
+        (Range::Outputs, Some(Output::Texture { .. })) => Some(size_of_range(*dimensions)),
         (Range::Outputs | Range::Elements { .. }, _) => None,
     }
 }
 
+/// The arguments that the author's function gave, by the names of parameters.
+#[derive(Default)]
+struct Own {
+    what: Option<String>,
+    args: BTreeMap<String, Input>,
+}
+
+impl Own {
+    fn new(slots: &[Slot<'_>], given: Option<&Given>) -> Result<Self, InputError> {
+        let Some(given) = given else {
+            return Ok(Self::default());
+        };
+        let mut args = BTreeMap::new();
+        for (name, value) in &given.args {
+            let bad = |problem: String| InputError::Own {
+                problem: format!("`{name}` of \"{}\": {problem}", given.what),
+            };
+            let slot = slots
+                .iter()
+                .find(|s| s.name == *name && is_input(&s.role))
+                .ok_or_else(|| bad("the kernel reads no such parameter".into()))?;
+            let arg = own_arg(slot, value).map_err(bad)?;
+            if args.insert(name.clone(), arg).is_some() {
+                return Err(bad("it is given twice".into()));
+            }
+        }
+        Ok(Self {
+            what: Some(given.what.clone()),
+            args,
+        })
+    }
+
+    fn get(&self, name: &str) -> Option<&Input> {
+        self.args.get(name)
+    }
+}
+
+/// What the author gives, if it fits the parameter.
+fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
+    match (value, slot.role) {
+        (Value::Bytes(bytes), role) => {
+            let Some(element) = role.element_bytes() else {
+                return Err("it takes no bytes".into());
+            };
+            let whole = if matches!(role, Use::Uniform(_)) {
+                bytes.len() == element
+            } else {
+                !bytes.is_empty() && bytes.len().is_multiple_of(element.max(1))
+            };
+            if whole {
+                Ok(Input::Bytes(bytes.clone()))
+            } else {
+                Err(format!(
+                    "{} bytes are no whole number of elements of {element} bytes",
+                    bytes.len()
+                ))
+            }
+        }
+        (
+            Value::Texture {
+                size,
+                samples,
+                format,
+                bytes,
+            },
+            Use::Texture(kind),
+        ) => {
+            let shape = match kind {
+                TextureKind::Texture3d => TextureShape::d3(*size, *format),
+                _ => TextureShape::d2(size[0], size[1], *format).multisampled(*samples),
+            };
+            let multisampled = kind == TextureKind::Texture2dMultisampled;
+            if multisampled != (*samples > 1) {
+                return Err(format!("it has {samples} samples in each texel"));
+            }
+            if shape.bytes() == bytes.len() && !bytes.is_empty() {
+                Ok(Input::Texture {
+                    shape,
+                    bytes: bytes.clone(),
+                })
+            } else {
+                Err(format!(
+                    "{} bytes, but its size makes {}",
+                    bytes.len(),
+                    shape.bytes()
+                ))
+            }
+        }
+        (Value::Sampler { linear, repeat }, Use::Sampler) => Ok(Input::Sampler(Sampler {
+            filter: if *linear {
+                Filter::Linear
+            } else {
+                Filter::Nearest
+            },
+            address: if *repeat {
+                Address::Repeat
+            } else {
+                Address::ClampToEdge
+            },
+        })),
+        _ => Err("it is of another kind".into()),
+    }
+}
+
+fn about<'a>(kernel: &'a Kernel, name: &str) -> Option<&'a Param> {
+    kernel.params.iter().find(|p| p.name == name)
+}
+
+/// Whether what it holds before the run matters.
+const fn is_input(role: &Use<'_>) -> bool {
+    !matches!(
+        role,
+        Use::Atomic { .. } | Use::Output(_) | Use::Interface(_) | Use::StorageTexture { .. }
+    )
+}
+
+/// Whether there is one element of it for each invocation.
+fn is_own(kernel: &Kernel, slot: &Slot<'_>) -> bool {
+    match (slot.role, &kernel.stage) {
+        (Use::Element(_) | Use::ElementMut(_) | Use::Attribute(..) | Use::Varying(..), _) => true,
+        (
+            _,
+            Stage::Compute {
+                range: Range::Elements { param },
+                ..
+            },
+        ) => slot.name == *param,
+        _ => false,
+    }
+}
+
+/// How many elements or texels each buffer and texture has; what is read element by element decides
+/// how many invocations run.
+fn lengths(
+    kernel: &Kernel,
+    slots: &[Slot<'_>],
+    given: &Own,
+    extents: &mut Extents,
+    rng: &mut Rng,
+) -> Result<BTreeMap<String, usize>, InputError> {
+    let mut known: BTreeMap<String, usize> = BTreeMap::new();
+    let mut later: Vec<(&str, bool, &Length)> = Vec::new();
+    let mut elements: Option<(String, usize)> = None;
+    for slot in slots.iter().filter(|s| is_input(&s.role)) {
+        let name = slot.name.as_str();
+        let own = is_own(kernel, slot);
+        let count = match given.get(name) {
+            Some(Input::Bytes(bytes)) => {
+                bytes.len() / slot.role.element_bytes().unwrap_or(1).max(1)
+            }
+            Some(Input::Texture { shape, .. }) => shape.size.iter().map(|&n| n as usize).product(),
+            Some(Input::Sampler(_)) => continue,
+            None => match about(kernel, name).and_then(|p| p.inputs.length.as_ref()) {
+                Some(Length::Between { least, most }) => rng.u32(*least..=*most) as usize,
+                Some(of @ Length::Of { .. }) => {
+                    later.push((name, own, of));
+                    continue;
+                }
+                None => continue,
+            },
+        };
+        known.insert(name.into(), count);
+        if own {
+            decide(&mut elements, name, count)?;
+        }
+    }
+    // What depends on another waits for it; what says nothing is known once the elements are.
+    let mut settled = false;
+    loop {
+        let before = later.len();
+        let mut waiting = Vec::new();
+        for (name, own, length) in later {
+            let Length::Of { param, times, plus } = length else {
+                continue;
+            };
+            if !slots.iter().any(|s| s.name == *param) {
+                return Err(InputError::NoParameter {
+                    param: param.clone(),
+                });
+            }
+            match known.get(param) {
+                None => waiting.push((name, own, length)),
+                Some(&n) => {
+                    let count = n as i64 * i64::from(*times) + i64::from(*plus);
+                    let count = usize::try_from(count).map_err(|_| InputError::Length {
+                        param: name.into(),
+                        problem: format!("it comes to {count}, from {n} of `{param}`"),
+                    })?;
+                    known.insert(name.into(), count);
+                    if own {
+                        decide(&mut elements, name, count)?;
+                    }
+                }
+            }
+        }
+        later = waiting;
+        if later.is_empty() && settled {
+            break;
+        }
+        if later.len() == before || later.is_empty() {
+            if settled {
+                let circle: Vec<&str> = later.iter().map(|l| l.0).collect();
+                return Err(InputError::Length {
+                    param: circle.join("`, `"),
+                    problem: "lengths refer to each other in a circle".into(),
+                });
+            }
+            settled = true;
+            for slot in slots.iter().filter(|s| is_input(&s.role)) {
+                if known.contains_key(&slot.name) || later.iter().any(|l| l.0 == slot.name) {
+                    continue;
+                }
+                let count = match slot.role {
+                    _ if is_own(kernel, slot) => {
+                        elements.as_ref().map_or(extents.elements, |e| e.1)
+                    }
+                    Use::Storage(_) | Use::StorageMut { .. } => extents.table,
+                    Use::Texture(kind) => texels_of(kernel, &slot.name, kind, extents.size)
+                        .iter()
+                        .map(|&n| n as usize)
+                        .product(),
+                    _ => continue,
+                };
+                known.insert(slot.name.clone(), count);
+            }
+        }
+    }
+    if let Some((_, count)) = elements {
+        extents.elements = count;
+    }
+    for slot in slots.iter().filter(|s| is_own(kernel, s)) {
+        known.insert(slot.name.clone(), extents.elements);
+    }
+    if extents.elements == 0 {
+        return Err(InputError::Length {
+            param: "output".into(),
+            problem: "there would be no invocation".into(),
+        });
+    }
+    Ok(known)
+}
+
+/// Takes down how many elements are read one by one, which all have alike.
+fn decide(
+    elements: &mut Option<(String, usize)>,
+    name: &str,
+    count: usize,
+) -> Result<(), InputError> {
+    match elements {
+        Some((other, n)) if *n != count => Err(InputError::Length {
+            param: name.into(),
+            problem: format!("{count} elements, but `{other}`, read likewise, has {n}"),
+        }),
+        _ => {
+            *elements = Some((name.into(), count));
+            Ok(())
+        }
+    }
+}
+
+/// The size of a texture that is read.
+fn texels_of(kernel: &Kernel, name: &str, kind: TextureKind, otherwise: [u32; 3]) -> [u32; 3] {
+    match about(kernel, name).and_then(|p| p.inputs.size) {
+        Some(size) => size,
+        None if kind == TextureKind::Texture3d => VOLUME,
+        None => [otherwise[0], otherwise[1], 1],
+    }
+}
+
 fn input(
+    kernel: &Kernel,
     slot: &Slot<'_>,
     values: &mut Values,
-    elements: usize,
-    table: usize,
-    [size, volume]: [[u32; 3]; 2],
-) -> Input {
+    extents: &Extents,
+) -> Result<Input, InputError> {
     let zeros =
         |count: usize| Input::Bytes(vec![0; count * slot.role.element_bytes().unwrap_or(0)]);
-    match slot.role {
-        Use::Uniform(layout) => Input::Bytes(filled(values, &slot.name, layout, 1, true)),
-        Use::Element(layout) | Use::ElementMut(layout) => {
-            Input::Bytes(filled(values, &slot.name, layout, elements, false))
-        }
+    let nothing = Inputs::default();
+    let said = about(kernel, &slot.name).map_or(&nothing, |p| &p.inputs);
+    let length = values.lengths.get(&slot.name).copied();
+    let filled = |values: &mut Values, layout: &Layout, count: usize| {
+        let bytes = values.elements(&flat::leaves(layout), said, layout.size as usize, count);
+        bytes.map(Input::Bytes)
+    };
+    Ok(match slot.role {
+        Use::Uniform(layout) => filled(values, layout, 1)?,
+        Use::Element(layout) | Use::ElementMut(layout) => filled(values, layout, extents.elements)?,
         Use::Storage(layout) | Use::StorageMut { layout, .. } => {
-            Input::Bytes(filled(values, &slot.name, layout, table, false))
+            filled(values, layout, length.unwrap_or(extents.table))?
         }
         Use::Attribute(_, ty) | Use::Varying(_, ty) => {
             let leaves = flat::type_leaves(ty);
             let stride = slots::type_bytes(ty);
-            Input::Bytes(values.elements(&slot.name, &leaves, stride, elements, false))
+            Input::Bytes(values.elements(&leaves, said, stride, extents.elements)?)
         }
         Use::Atomic { .. } => zeros(COUNTERS),
-        Use::Interface(_) => zeros(elements),
-        Use::Output(_) => zeros(elements),
+        Use::Interface(_) | Use::Output(_) => zeros(extents.elements),
         Use::StorageTexture { format, dimensions } => {
+            let [width, height, _] = extents.size;
             let shape = if dimensions == 3 {
-                TextureShape::d3(volume, format)
+                TextureShape::d3(extents.volume, format)
             } else {
-                TextureShape::d2(size[0], size[1], format)
+                TextureShape::d2(width, height, format)
             };
             Input::Texture {
                 shape,
@@ -273,6 +724,7 @@ fn input(
             }
         }
         Use::Texture(kind) => {
+            let size = texels_of(kernel, &slot.name, kind, extents.size);
             let shape = match kind {
                 TextureKind::Texture2d => {
                     TextureShape::d2(size[0], size[1], TexelFormat::Rgba32Float)
@@ -280,9 +732,9 @@ fn input(
                 TextureKind::Texture2dMultisampled => {
                     TextureShape::d2(size[0], size[1], TexelFormat::R32Float).multisampled(4)
                 }
-                TextureKind::Texture3d => TextureShape::d3(VOLUME, TexelFormat::Rgba32Float),
+                TextureKind::Texture3d => TextureShape::d3(size, TexelFormat::Rgba32Float),
             };
-            let bytes = values.texels(&slot.name, &shape);
+            let bytes = values.texels(said, &shape)?;
             Input::Texture { shape, bytes }
         }
         Use::Sampler => Input::Sampler(Sampler {
@@ -292,23 +744,7 @@ fn input(
                 Class::Ordinary | Class::Hostile => Address::ClampToEdge,
             },
         }),
-    }
-}
-
-fn filled(
-    values: &mut Values,
-    name: &str,
-    layout: &Layout,
-    count: usize,
-    is_uniform: bool,
-) -> Vec<u8> {
-    values.elements(
-        name,
-        &flat::leaves(layout),
-        layout.size as usize,
-        count,
-        is_uniform,
-    )
+    })
 }
 
 /// The numbers that one invocation reads as its own, and the uniforms, for a message: name and

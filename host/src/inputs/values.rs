@@ -1,10 +1,12 @@
-//! Single numbers, and groups of numbers that only make sense together: moments, unit vectors.
+//! Single numbers, as the attributes of a field or parameter have them.
+
+use std::collections::BTreeMap;
 
 use fastrand::Rng;
 use hankel_dsl::glam::Vec4;
-use hankel_dsl::native::describe::{Scalar, TexelFormat};
+use hankel_dsl::native::describe::{Domain, Inputs, Scalar, TexelFormat};
 
-use super::Class;
+use super::{Class, InputError};
 use crate::device::TextureShape;
 use crate::flat::{Leaf, Number};
 
@@ -17,163 +19,95 @@ pub struct Values {
     pub class: Class,
     /// The smallest and the largest magnitude of absurd numbers other than zero.
     pub magnitudes: (f64, f64),
+    /// How many elements or texels the kernel's buffers and textures have, by their names.
+    pub lengths: BTreeMap<String, usize>,
 }
 
-/// What a number is like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Domain {
-    /// From one value to another.
-    Range(f64, f64),
-    /// Of any magnitude between two positive ones.
-    Magnitude(f64, f64),
-}
+/// Where floats lie unless an attribute says otherwise.
+const FLOATS: Domain = Domain::Range {
+    least: -1.0,
+    most: 1.0,
+};
 
-/// The domain of numbers with a certain name, for fields whose documentation gives no range. The
-/// last part of the name counts: `settings.moment_bias` is a bias.
-#[must_use]
-pub fn by_name(path: &str) -> Option<Domain> {
-    let last = path
-        .rsplit(['.', '_'])
-        .find(|p| !matches!(*p, "" | "x" | "y" | "z" | "w"))?;
-    let last = last.split('[').next().unwrap_or(last);
-    Some(match last {
-        // Biases and strengths of biases as published lie between these.
-        "bias" | "strength" => Domain::Magnitude(1e-7, 1e-2),
-        "depth" | "receiver" | "visibility" | "shadow" | "weight" | "leak" | "cut"
-        | "intensity" | "reduction" | "uv" | "opacity" | "alpha" => Domain::Range(0.0, 1.0),
-        // A list of weights sums to about one.
-        "weights" => Domain::Range(0.0, 0.15),
-        "radius" | "taps" => Domain::Range(0.0, 4.0),
-        "sigma" => Domain::Range(0.5, 4.0),
-        "scale" | "size" | "width" | "height" => Domain::Range(0.5, 2.0),
-        _ => return None,
-    })
-}
-
-/// The range that a field's documentation gives: the first `[a, b]` or `from a to b`.
-#[must_use]
-pub fn documented(summary: &str) -> Option<Domain> {
-    let number = |text: &str| {
-        let text = text.trim().trim_end_matches(['.', ',', ';', ')']);
-        text.parse::<f64>().ok().filter(|x| x.is_finite())
-    };
-    let range = |a: &str, b: &str| {
-        let (a, b) = (number(a)?, number(b)?);
-        (a <= b).then_some(Domain::Range(a, b))
-    };
-    let bracketed = summary.match_indices('[').find_map(|(i, _)| {
-        let (inside, _) = summary[i + 1..].split_once(']')?;
-        let (a, b) = inside.split_once(',')?;
-        range(a, b)
-    });
-    bracketed.or_else(|| {
-        let words: Vec<&str> = summary.split_whitespace().collect();
-        words.windows(4).find_map(|w| match w {
-            ["from", a, "to", b] => range(a, b),
-            _ => None,
-        })
-    })
-}
-
-/// The number of a moment field: `b1` is 1, `moments.b4` is 4.
-fn moment(path: &str) -> Option<i32> {
-    let name = path.rsplit('.').next()?;
-    let order: i32 = name.strip_prefix('b')?.parse().ok()?;
-    (1..=16).contains(&order).then_some(order)
-}
+/// Where texels lie unless an attribute says otherwise.
+const TEXELS: Domain = Domain::Range {
+    least: 0.0,
+    most: 1.0,
+};
 
 impl Values {
-    /// `count` elements of `stride` bytes.
+    /// `count` elements of `stride` bytes; `outer` is what the parameter's own attributes say.
+    ///
+    /// # Errors
+    /// An attribute that refers to a parameter that is not there.
     pub fn elements(
         &mut self,
-        name: &str,
         leaves: &[Leaf],
+        outer: &Inputs,
         stride: usize,
         count: usize,
-        is_uniform: bool,
-    ) -> Vec<u8> {
+    ) -> Result<Vec<u8>, InputError> {
+        let leaves: Vec<(&Leaf, Option<Domain>)> = leaves
+            .iter()
+            .map(|leaf| Ok((leaf, self.resolved(leaf.inputs.within(outer).domain)?)))
+            .collect::<Result<_, InputError>>()?;
         let mut bytes = vec![0; stride * count];
         for element in bytes.chunks_exact_mut(stride.max(1)) {
-            self.element(name, leaves, element, is_uniform);
+            self.element(&leaves, element);
         }
-        bytes
+        Ok(bytes)
     }
 
-    fn element(&mut self, name: &str, leaves: &[Leaf], element: &mut [u8], is_uniform: bool) {
-        // Moments of the same element belong to the same depths.
-        let depths = self.depths();
-        let unit = self.unit_vector();
-        let mut axis = 0;
-        for leaf in leaves {
-            let path = crate::flat::join(name, &leaf.path);
-            let is_float = matches!(leaf.scalar, Scalar::F32 | Scalar::F64);
-            let meaningful = is_float && self.class != Class::Hostile;
-            let number = if let Some(order) = moment(&path).filter(|_| meaningful) {
-                depths.iter().map(|(z, w)| w * z.powi(order)).sum()
-            } else if meaningful && is_normal(&path) {
-                axis += 1;
-                unit[(axis - 1) % 3]
-            } else {
-                let domain = documented(&leaf.summary).or_else(|| by_name(&path));
-                match leaf.scalar {
-                    Scalar::F32 => self.float(domain, false),
-                    Scalar::F64 => self.float(domain, true),
-                    Scalar::U32 | Scalar::I32 => {
-                        let value = self.integer(leaf.scalar, domain, is_uniform);
-                        value.write(&mut element[leaf.offset..]);
-                        continue;
+    /// Counts and indices as the numbers that they are here.
+    fn resolved(&self, domain: Option<Domain>) -> Result<Option<Domain>, InputError> {
+        let count = |param: &str| {
+            let count = self.lengths.get(param).copied();
+            count.ok_or_else(|| InputError::NoParameter {
+                param: param.into(),
+            })
+        };
+        Ok(match domain {
+            Some(Domain::CountOf { param }) => Some(Domain::Values {
+                values: vec![count(&param)? as f64],
+            }),
+            Some(Domain::IndexOf { param }) => Some(Domain::Range {
+                least: 0.0,
+                most: count(&param)?.saturating_sub(1) as f64,
+            }),
+            other => other,
+        })
+    }
+
+    fn element(&mut self, leaves: &[(&Leaf, Option<Domain>)], element: &mut [u8]) {
+        let mut unit = [0.0; 4];
+        for (leaf, domain) in leaves {
+            let (component, of) = leaf.component;
+            let number = match (leaf.scalar, domain) {
+                (Scalar::U32 | Scalar::I32, _) => self.integer(leaf.scalar, domain.as_ref()),
+                (_, Some(Domain::UnitVector)) if self.class != Class::Hostile => {
+                    if component == 0 {
+                        unit = self.unit_vector(of);
                     }
+                    float(leaf.scalar, unit[component.min(3)])
+                }
+                (scalar, domain) => {
+                    let domain = domain.as_ref().unwrap_or(&FLOATS);
+                    float(scalar, self.float(domain, scalar == Scalar::F64))
                 }
             };
-            if leaf.scalar == Scalar::F64 {
-                Number::F64(number)
-            } else {
-                Number::F32(number as f32)
-            }
-            .write(&mut element[leaf.offset..]);
+            number.write(&mut element[leaf.offset..]);
         }
     }
 
-    /// One to six depths with weights that sum to one.
-    fn depths(&mut self) -> Vec<(f64, f64)> {
-        let low = if self.rng.bool() { 0.0 } else { -1.0 };
-        let count = match self.class {
-            // One surface, or two in almost the same place: where the moment problem degenerates.
-            Class::Edge => self.rng.usize(1..=2),
-            Class::Ordinary | Class::Hostile => self.rng.usize(1..=6),
-        };
-        let mut depths: Vec<(f64, f64)> = (0..count)
-            .map(|_| (low + (1.0 - low) * self.rng.f64(), 0.01 + self.rng.f64()))
-            .collect();
-        if self.class == Class::Edge {
-            for d in &mut depths {
-                d.0 = match self.rng.u32(..4) {
-                    0 => low,
-                    1 => 1.0,
-                    2 => 0.0,
-                    _ => d.0,
-                };
-            }
-            if count == 2 && self.rng.bool() {
-                // Inwards: what lies at an end stays in the range.
-                depths[1].0 = depths[0].0 - depths[0].0.signum() * 1e-4 * self.rng.f64();
-            }
-        }
-        let sum: f64 = depths.iter().map(|d| d.1).sum();
-        for d in &mut depths {
-            d.1 /= sum;
-        }
-        depths
-    }
-
-    fn unit_vector(&mut self) -> [f64; 3] {
-        if self.class == Class::Edge {
-            let mut v = [0.0; 3];
-            v[self.rng.usize(..3)] = if self.rng.bool() { 1.0 } else { -1.0 };
+    fn unit_vector(&mut self, size: usize) -> [f64; 4] {
+        let mut v = [0.0; 4];
+        let size = size.clamp(1, 4);
+        if self.class == Class::Edge || size == 1 {
+            v[self.rng.usize(..size)] = if self.rng.bool() { 1.0 } else { -1.0 };
             return v;
         }
         loop {
-            let v = [(); 3].map(|()| self.rng.f64() * 2.0 - 1.0);
+            v[..size].fill_with(|| self.rng.f64() * 2.0 - 1.0);
             let square: f64 = v.iter().map(|x| x * x).sum();
             if (1e-3..=1.0).contains(&square) {
                 return v.map(|x| x / square.sqrt());
@@ -181,12 +115,18 @@ impl Values {
         }
     }
 
-    fn float(&mut self, domain: Option<Domain>, double: bool) -> f64 {
-        let domain = domain.unwrap_or(Domain::Range(-1.0, 1.0));
+    fn float(&mut self, domain: &Domain, double: bool) -> f64 {
+        let (a, b) = match *domain {
+            Domain::Values { ref values } if !values.is_empty() => {
+                return values[self.rng.usize(..values.len())];
+            }
+            Domain::Range { least, most } | Domain::Magnitude { least, most } => (least, most),
+            _ => (-1.0, 1.0),
+        };
         match (self.class, domain) {
-            (Class::Ordinary, Domain::Range(a, b)) => a + (b - a) * self.rng.f64(),
-            (Class::Ordinary, Domain::Magnitude(a, b)) => a * (b / a).powf(self.rng.f64()),
-            (Class::Edge, Domain::Range(a, b) | Domain::Magnitude(a, b)) => {
+            (Class::Ordinary, Domain::Magnitude { .. }) => a * (b / a).powf(self.rng.f64()),
+            (Class::Ordinary, _) => a + (b - a) * self.rng.f64(),
+            (Class::Edge, _) => {
                 let t = self.rng.f64();
                 let near = 1e-6 * t;
                 match self.rng.u32(..8) {
@@ -250,61 +190,65 @@ impl Values {
         }
     }
 
-    fn integer(&mut self, scalar: Scalar, domain: Option<Domain>, is_uniform: bool) -> Number {
-        let bounds = match domain {
-            Some(Domain::Range(a, b) | Domain::Magnitude(a, b)) => Some((a as i64, b as i64)),
-            None if is_uniform => Some((0, 8)),
-            None => None,
+    /// Integers keep to their domain in every class: they are counts and indices, and what lies
+    /// beyond is a mistake of the caller. Its ends, 0, 1, -1 and their neighbours come often.
+    fn integer(&mut self, scalar: Scalar, domain: Option<&Domain>) -> Number {
+        let (mut a, mut b) = match scalar {
+            Scalar::I32 => (i64::from(i32::MIN), i64::from(i32::MAX)),
+            _ => (0, i64::from(u32::MAX)),
         };
-        let (a, b) = bounds.unwrap_or(match scalar {
-            Scalar::I32 => (i32::MIN.into(), i32::MAX.into()),
-            _ => (0, u32::MAX.into()),
-        });
-        let b = b.max(a);
-        // The ends, 0, 1, -1 and their neighbours come often: divisors and masks are made of them.
-        let special = match self.class {
-            Class::Ordinary => 4,
-            Class::Edge | Class::Hostile => 2,
+        let value = match domain {
+            Some(Domain::Values { values }) if !values.is_empty() => {
+                (values[self.rng.usize(..values.len())] as i64).clamp(a, b)
+            }
+            _ => {
+                if let Some(Domain::Range { least, most } | Domain::Magnitude { least, most }) =
+                    domain
+                {
+                    a = (least.ceil() as i64).clamp(a, b);
+                    b = (most.floor() as i64).clamp(a, b);
+                }
+                let special = match self.class {
+                    Class::Ordinary => 4,
+                    Class::Edge | Class::Hostile => 2,
+                };
+                if self.rng.u32(..special) == 0 {
+                    let some = [a, b, 0, 1, -1, 2, a.saturating_add(1), b.saturating_sub(1)];
+                    some[self.rng.usize(..some.len())].clamp(a, b)
+                } else {
+                    self.rng.i64(a..=b)
+                }
+            }
         };
-        let value = if self.rng.u32(..special) == 0 {
-            let some = [a, b, 0, 1, -1, 2, a.saturating_add(1), b.saturating_sub(1)];
-            some[self.rng.usize(..some.len())].clamp(a, b)
-        } else {
-            self.rng.i64(a..=b)
-        };
+        // Both fit: `a` and `b` do.
         match scalar {
-            Scalar::I32 => Number::I32(value.clamp(i32::MIN.into(), i32::MAX.into()) as i32),
-            _ => Number::U32(value.clamp(0, u32::MAX.into()) as u32),
+            Scalar::I32 => Number::I32(value as i32),
+            _ => Number::U32(value as u32),
         }
     }
 
-    /// The samples of a texture: moments where its name says so, else numbers in [0, 1].
-    pub fn texels(&mut self, name: &str, shape: &TextureShape) -> Vec<u8> {
+    /// The samples of a texture.
+    ///
+    /// # Errors
+    /// As of [`Values::elements`].
+    pub fn texels(&mut self, inputs: &Inputs, shape: &TextureShape) -> Result<Vec<u8>, InputError> {
+        let domain = self.resolved(inputs.domain.clone())?.unwrap_or(TEXELS);
         let format: TexelFormat = shape.format.texel();
         let mut bytes = vec![0; shape.bytes()];
-        let domain = Some(Domain::Range(0.0, 1.0));
         for texel in bytes.chunks_exact_mut(format.bytes()) {
-            let v = if name.contains("moment") && self.class != Class::Hostile {
-                let depths = self.depths();
-                let b = |n: i32| depths.iter().map(|(z, w)| w * z.powi(n)).sum::<f64>() as f32;
-                Vec4::new(b(1), b(2), b(3), b(4))
-            } else {
-                Vec4::from_array([(); 4].map(|()| self.float(domain, false) as f32))
-            };
+            let v = Vec4::from_array([(); 4].map(|()| self.float(&domain, false) as f32));
             format.store(texel, v);
         }
-        bytes
+        Ok(bytes)
     }
 }
 
-/// Whether a path is a part of a normal or a direction.
-fn is_normal(path: &str) -> bool {
-    let mut parts = path.rsplit('.');
-    let component = matches!(parts.next(), Some("x" | "y" | "z"));
-    component
-        && parts
-            .next()
-            .is_some_and(|p| p.ends_with("normal") || p.ends_with("direction"))
+fn float(scalar: Scalar, x: f64) -> Number {
+    if scalar == Scalar::F64 {
+        Number::F64(x)
+    } else {
+        Number::F32(x as f32)
+    }
 }
 
 #[cfg(test)]
@@ -316,81 +260,62 @@ mod tests {
             rng: Rng::with_seed(7),
             class,
             magnitudes: (0.0, f64::MAX),
+            lengths: [("table".to_owned(), 5)].into(),
         }
     }
 
-    fn leaf(path: &str, scalar: Scalar, offset: usize, summary: &str) -> Leaf {
+    fn leaf(path: &str, scalar: Scalar, offset: usize, domain: Option<Domain>) -> Leaf {
         Leaf {
             path: path.into(),
             scalar,
             offset,
-            summary: summary.into(),
+            summary: "A depth in [0, 1], from 3 to 4; default 7.".into(),
+            inputs: Inputs {
+                domain,
+                ..Inputs::default()
+            },
+            component: (0, 1),
         }
     }
 
     #[test]
-    fn documentation_gives_ranges() {
-        for (text, range) in [
-            ("Depth in [0, 1].", Some((0.0, 1.0))),
-            ("Cosine, [-1, 1], see [MSM].", Some((-1.0, 1.0))),
-            ("As in [MSM, 2]; from 0 to 2.5.", Some((0.0, 2.5))),
-            ("From the light.", None),
-            ("", None),
-            ("A list [a, b].", None),
-            ("Backwards [1, 0].", None),
-        ] {
-            assert_eq!(
-                documented(text),
-                range.map(|(a, b)| Domain::Range(a, b)),
-                "{text}"
-            );
-        }
-    }
-
-    #[test]
-    fn moments_belong_to_depths() {
-        let leaves: Vec<Leaf> = (0..4)
-            .map(|i| leaf(&format!("b{}", i + 1), Scalar::F64, i * 8, ""))
+    fn names_and_documentation_say_nothing() {
+        let leaves: Vec<Leaf> = ["depth", "b1", "normal.x", "bias", "width"]
+            .iter()
+            .enumerate()
+            .map(|(i, name)| leaf(name, Scalar::F32, 4 * i, None))
             .collect();
-        for class in [Class::Ordinary, Class::Edge] {
-            let bytes = values(class).elements("moments", &leaves, 32, 500, false);
-            for m in bytes.chunks(32) {
-                let b: Vec<f64> = bytemuck::pod_collect_to_vec(m);
-                // Hölder: a distribution's even moments grow no faster than this.
-                assert!(b[1] - b[0] * b[0] > -1e-12, "{b:?}");
-                assert!(b[3] - b[1] * b[1] > -1e-12, "{b:?}");
-                assert!(b.iter().all(|x| x.abs() <= 1.0 + 1e-9), "{b:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn integers_meet_zero_one_minus_one_and_the_extremes() {
-        for class in Class::ALL {
-            let leaves = [leaf("i", Scalar::I32, 0, ""), leaf("u", Scalar::U32, 4, "")];
-            let bytes = values(class).elements("p", &leaves, 8, 4099, false);
-            let all: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-            let (i, u): (Vec<_>, Vec<_>) = all.chunks(2).map(|e| (e[0] as i32, e[1])).unzip();
-            for wanted in [0, 1, -1, i32::MIN, i32::MAX] {
-                assert!(i.contains(&wanted), "{class}: {wanted}");
-            }
-            for wanted in [0, 1, u32::MAX] {
-                assert!(u.contains(&wanted), "{class}: {wanted}");
-            }
+        let bytes = values(Class::Ordinary)
+            .elements(&leaves, &Inputs::default(), 20, 4000)
+            .unwrap();
+        for column in 0..5 {
+            let all: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes)
+                .into_iter()
+                .skip(column)
+                .step_by(5)
+                .collect();
+            let least = all.iter().copied().fold(f32::MAX, f32::min);
+            let most = all.iter().copied().fold(f32::MIN, f32::max);
+            assert!(least < -0.99 && most > 0.99, "{column}: {least} to {most}");
         }
     }
 
     #[test]
     fn ranges_are_kept_except_by_hostile_floats() {
-        let leaves = [
-            leaf("z", Scalar::F32, 0, "Depth in [0, 1]."),
-            leaf("n", Scalar::U32, 4, "Taps, [1, 3]."),
-            leaf("normal.x", Scalar::F32, 8, ""),
-            leaf("normal.y", Scalar::F32, 12, ""),
-            leaf("normal.z", Scalar::F32, 16, ""),
+        let range = |least, most| Some(Domain::Range { least, most });
+        let mut leaves = vec![
+            leaf("z", Scalar::F32, 0, range(0.0, 1.0)),
+            leaf("n", Scalar::U32, 4, range(1.0, 3.0)),
         ];
+        for i in 0..3 {
+            let mut part = leaf("d", Scalar::F32, 8 + 4 * i, Some(Domain::UnitVector));
+            part.component = (i, 3);
+            leaves.push(part);
+        }
         for class in Class::ALL {
-            let bytes = values(class).elements("p", &leaves, 20, 2000, false);
+            let bytes = values(class)
+                .elements(&leaves, &Inputs::default(), 20, 2000)
+                .unwrap();
             let mut beyond = 0;
             for e in bytes.chunks(20) {
                 let f: Vec<f32> = bytemuck::pod_collect_to_vec(e);
@@ -407,5 +332,66 @@ mod tests {
             }
             assert_eq!(beyond > 500, class == Class::Hostile);
         }
+    }
+
+    #[test]
+    fn integers_meet_zero_one_minus_one_and_the_extremes() {
+        for class in Class::ALL {
+            let leaves = [
+                leaf("i", Scalar::I32, 0, None),
+                leaf("u", Scalar::U32, 4, None),
+            ];
+            let bytes = values(class)
+                .elements(&leaves, &Inputs::default(), 8, 4099)
+                .unwrap();
+            let all: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+            let (i, u): (Vec<_>, Vec<_>) = all.chunks(2).map(|e| (e[0] as i32, e[1])).unzip();
+            for wanted in [0, 1, -1, i32::MIN, i32::MAX] {
+                assert!(i.contains(&wanted), "{class}: {wanted}");
+            }
+            for wanted in [0, 1, u32::MAX] {
+                assert!(u.contains(&wanted), "{class}: {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn counts_indices_and_lists_are_what_they_say() {
+        let of = |param: &str| Domain::CountOf {
+            param: param.into(),
+        };
+        let index = Domain::IndexOf {
+            param: "table".into(),
+        };
+        let listed = Domain::Values {
+            values: vec![2.0, 7.0],
+        };
+        let leaves = [
+            leaf("n", Scalar::U32, 0, Some(of("table"))),
+            leaf("i", Scalar::U32, 4, Some(index)),
+            leaf("v", Scalar::U32, 8, Some(listed)),
+        ];
+        for class in Class::ALL {
+            let bytes = values(class)
+                .elements(&leaves, &Inputs::default(), 12, 500)
+                .unwrap();
+            let all: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+            let mut indices = [0; 5];
+            for e in all.chunks(3) {
+                assert_eq!(e[0], 5);
+                indices[e[1] as usize] += 1;
+                assert!(matches!(e[2], 2 | 7));
+            }
+            assert!(indices.iter().all(|n| *n > 0), "{indices:?}");
+        }
+        let error = values(Class::Ordinary)
+            .elements(
+                &[leaf("n", Scalar::U32, 0, Some(of("tabel")))],
+                &Inputs::default(),
+                4,
+                1,
+            )
+            .unwrap_err();
+        assert!(error.to_string().contains("`tabel`"), "{error}");
     }
 }

@@ -1,7 +1,7 @@
 //! Runs a case of any stage on a device, and gives back what was written.
 
 use hankel_dsl::native::describe::{
-    Kernel, Output, Param, Role, Scalar, Stage, TexelFormat, Tolerance, Type,
+    Inputs, Kernel, Output, Param, Role, Rounding, Scalar, Stage, TexelFormat, Tolerance, Type,
 };
 
 use super::capture;
@@ -201,10 +201,10 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         tolerance: Tolerance {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: String::new(),
         },
-        exact: false,
-        pinned: false,
+        rounding: Rounding::Free,
     }
 }
 
@@ -291,6 +291,7 @@ fn fragment(
                         location,
                         ty: ty.clone(),
                     },
+                    inputs: Inputs::default(),
                 });
                 outputs.push(Output::Varying {
                     location,
@@ -478,6 +479,7 @@ fn vertex(
                     ty: ty.clone(),
                     flat: true,
                 },
+                inputs: Inputs::default(),
             }],
             vec![Output::Target {
                 location: 0,

@@ -104,14 +104,17 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// How many are not finite.
+    /// How many of the numbers that a case wrote are not finite, and the first of them.
     #[must_use]
-    pub fn non_finite(&self, written: &Written) -> u64 {
-        let mut n = 0;
-        self.each(written, written, false, |_, _, d| {
-            n += u64::from(!d.a.is_finite());
+    pub fn non_finite(&self, case: &Case, written: &Written) -> (u64, Option<Difference>) {
+        let (mut n, mut first) = (0, None);
+        self.each(written, written, false, |i, name, d| {
+            if !d.a.is_finite() {
+                n += 1;
+                first.get_or_insert_with(|| self.difference(case, i, name, &d));
+            }
         });
-        n
+        (n, first)
     }
 
     /// Compares what a case wrote with the reference, and adds what it finds to `found`.

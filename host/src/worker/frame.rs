@@ -3,12 +3,25 @@
 use std::io::{self, Read, Write};
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
+use hankel_dsl::native::inputs;
 use hankel_dsl::native::{Address, Arg, Call, Filter, Mode, Sampler, TextureMut, TextureRef};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 /// Bytes at an address that fits every layout.
 type Words = Vec<u128>;
+
+/// What a worker is asked for.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum Asked {
+    /// A call, whose bytes follow.
+    Call(Request),
+    /// The inputs that an entry point has of its own.
+    Inputs {
+        kernel: usize,
+        request: inputs::Request,
+    },
+}
 
 /// A call.
 #[derive(Debug, Serialize, Deserialize)]
@@ -52,13 +65,15 @@ impl Shape {
     }
 }
 
-/// What the worker says: first [`Answer::Kernels`] or [`Answer::Failed`], then one for each call.
+/// What the worker says: first [`Answer::Kernels`] or [`Answer::Failed`], then one for each question.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum Answer {
     /// The plug-in is loaded.
     Kernels(Vec<Kernel>),
     /// The call is done; the bytes of what it writes follow in turn.
     Done,
+    /// The inputs, or none where the kernel names no function that makes them.
+    Inputs(Option<Vec<inputs::Given>>),
     /// What went wrong, in words.
     Failed(String),
 }
@@ -117,7 +132,7 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         constants: call.constants.clone(),
         shapes: shapes.collect(),
     };
-    write_header(to, &request)?;
+    write_header(to, &Asked::Call(request))?;
     for arg in &call.args {
         match arg {
             Arg::Bytes(b) => to.write_all(b)?,
@@ -261,7 +276,10 @@ mod tests {
         let mut pipe = Vec::new();
         write_call(&mut pipe, 6, &call).unwrap();
         let mut from = &pipe[..];
-        let request: Request = read_header(&mut from).unwrap().unwrap();
+        let asked: Asked = read_header(&mut from).unwrap().unwrap();
+        let Asked::Call(request) = asked else {
+            panic!("a call")
+        };
         assert_eq!(request.kernel, 6);
         let mut arrived = Arrived::read(&mut from, request).unwrap();
         assert!(from.is_empty());
@@ -279,7 +297,7 @@ mod tests {
         read_results(&mut &back[..], &mut call).unwrap();
         drop(call);
         assert_eq!(written, [77, 5, 5, 5, 5, 5, 5, 5]);
-        assert!(read_header::<Request>(&mut &[][..]).unwrap().is_none());
-        assert!(read_header::<Request>(&mut &[255; 8][..]).is_err());
+        assert!(read_header::<Asked>(&mut &[][..]).unwrap().is_none());
+        assert!(read_header::<Asked>(&mut &[255; 8][..]).is_err());
     }
 }

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use hankel_dsl::native::call::{Culprit, Ending};
 use hankel_dsl::native::describe::{Kernel, Output, Range, Role, Stage};
+use hankel_dsl::native::inputs;
 use hankel_dsl::native::{Arg, Call, CallError};
 
 use hankel_system::temporary::Folder;
@@ -96,6 +97,32 @@ impl Workers {
     }
 
     fn once(&self, index: usize, call: &mut Call<'_>, limit: Duration) -> Result<(), CallError> {
+        self.with_process(|process| process.call(index, call, limit))
+    }
+
+    /// The inputs that entry point `index` has of its own; none where it names no function that
+    /// makes them.
+    ///
+    /// # Errors
+    /// What the function reports, or how its process ended, in words.
+    pub fn inputs(
+        &self,
+        index: usize,
+        request: &inputs::Request,
+    ) -> Result<Option<Vec<inputs::Given>>, String> {
+        self.with_process(|process| process.inputs(index, request, self.worker.limit))
+            .map_err(|error| match error {
+                CallError::Ended { how, .. } => {
+                    format!("the process of the function that makes them {how}")
+                }
+                other => other.to_string(),
+            })
+    }
+
+    fn with_process<T>(
+        &self,
+        ask: impl FnOnce(&mut Process) -> Result<T, CallError>,
+    ) -> Result<T, CallError> {
         let idle = self.idle().pop();
         let mut process = match idle {
             Some(process) => process,
@@ -104,7 +131,7 @@ impl Workers {
                 started.map_err(|message| CallError::Plugin { message })?.0
             }
         };
-        let result = process.call(index, call, limit);
+        let result = ask(&mut process);
         if !matches!(result, Err(CallError::Ended { .. })) {
             self.idle().push(process);
         }
@@ -143,7 +170,7 @@ impl Workers {
         // All elements together may have been too slow, and none of them alone.
         (high > low && ends(low, high)).then(|| Culprit {
             element: low,
-            inputs: inputs(kernel, call, &sizes, low),
+            inputs: element_inputs(kernel, call, &sizes, low),
         })
     }
 }
@@ -225,7 +252,12 @@ fn part<T>(
 }
 
 /// The values of one element's inputs: `depth = 0.5, moments.b1 = 0.25`.
-fn inputs(kernel: &Kernel, call: &Call<'_>, sizes: &[Option<usize>], element: usize) -> String {
+fn element_inputs(
+    kernel: &Kernel,
+    call: &Call<'_>,
+    sizes: &[Option<usize>],
+    element: usize,
+) -> String {
     let layouts = kernel.params.iter().filter_map(|param| match &param.role {
         Role::Element { layout, .. } => Some((param.name.as_str(), layout)),
         _ => None,

@@ -1,6 +1,6 @@
 //! One worker, from the side of who asks.
 
-use std::io::{self, BufReader, BufWriter};
+use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 use std::process::{ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,10 +10,11 @@ use std::time::Duration;
 
 use hankel_dsl::native::call::Ending;
 use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::inputs::{Given, Request};
 use hankel_dsl::native::{Call, CallError};
 use hankel_system::process::{Log, Program, kill_group};
 
-use super::frame::{Answer, read_header, read_results, write_call};
+use super::frame::{Answer, Asked, read_header, read_results, write_call, write_header};
 use super::{STACK, Worker, ending};
 
 /// A worker that runs.
@@ -88,6 +89,29 @@ impl Process {
         });
         match answer {
             Ok(Some(Answer::Done)) => Ok(()),
+            Ok(Some(Answer::Failed(message))) => Err(CallError::Plugin { message }),
+            other => Err(CallError::Ended {
+                how: self.ended(other.is_err_and(|late| late), limit),
+                culprit: None,
+            }),
+        }
+    }
+
+    /// The inputs that an entry point has of its own.
+    pub fn inputs(
+        &mut self,
+        kernel: usize,
+        request: &Request,
+        limit: Duration,
+    ) -> Result<Option<Vec<Given>>, CallError> {
+        let request = request.clone();
+        let answer = self.within(limit, |process| {
+            write_header(&mut process.requests, &Asked::Inputs { kernel, request })?;
+            process.requests.flush()?;
+            read_header(&mut process.answers)
+        });
+        match answer {
+            Ok(Some(Answer::Inputs(given))) => Ok(given),
             Ok(Some(Answer::Failed(message))) => Err(CallError::Plugin { message }),
             other => Err(CallError::Ended {
                 how: self.ended(other.is_err_and(|late| late), limit),

@@ -4,9 +4,16 @@ use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 use std::sync::mpsc::channel;
 
+use hankel_dsl::native::inputs::Request;
 use hankel_dsl::native::plugin::Plugin;
 
-use super::frame::{Answer, Arrived, Request, read_header, write_header};
+use super::frame::{Answer, Arrived, Asked, read_header, write_header};
+
+/// What is asked for, with all that came with it.
+enum Work {
+    Call(Arrived),
+    Inputs { kernel: usize, request: Request },
+}
 
 /// Loads the plug-in at `library` and runs what is asked for on the standard input stream, until
 /// that ends: then this process ends, too, in the middle of a call if need be.
@@ -26,29 +33,47 @@ pub fn serve(library: &Path) -> io::Result<()> {
     write_header(&mut answers, &Answer::Kernels(plugin.kernels().to_vec()))?;
     answers.flush()?;
 
-    let (sender, calls) = channel::<Arrived>();
+    let (sender, calls) = channel::<Work>();
     std::thread::Builder::new()
         .name("calls".into())
         .spawn(move || {
             let mut from = BufReader::with_capacity(1 << 16, io::stdin());
-            while let Ok(Some(request)) = read_header::<Request>(&mut from)
-                && let Ok(arrived) = Arrived::read(&mut from, request)
-                && sender.send(arrived).is_ok()
-            {}
+            while let Ok(Some(asked)) = read_header::<Asked>(&mut from) {
+                let work = match asked {
+                    Asked::Call(request) => Arrived::read(&mut from, request).map(Work::Call),
+                    Asked::Inputs { kernel, request } => Ok(Work::Inputs { kernel, request }),
+                };
+                if !work.is_ok_and(|work| sender.send(work).is_ok()) {
+                    break;
+                }
+            }
             std::process::exit(0);
         })?;
     // Calls run on a thread that has the stack that every thread here has.
     let runner = std::thread::Builder::new().name("kernel".into());
     let runner = runner.spawn(move || -> io::Result<()> {
-        for mut arrived in calls {
-            let index = arrived.request.kernel;
-            let result = plugin.run(index, &mut arrived.call());
-            match result {
-                Ok(()) => {
-                    write_header(&mut answers, &Answer::Done)?;
-                    arrived.write_results(&mut answers)?;
+        for work in calls {
+            match work {
+                Work::Call(mut arrived) => {
+                    let index = arrived.request.kernel;
+                    let result = plugin.run(index, &mut arrived.call());
+                    match result {
+                        Ok(()) => {
+                            write_header(&mut answers, &Answer::Done)?;
+                            arrived.write_results(&mut answers)?;
+                        }
+                        Err(error) => {
+                            write_header(&mut answers, &Answer::Failed(error.to_string()))?;
+                        }
+                    }
                 }
-                Err(error) => write_header(&mut answers, &Answer::Failed(error.to_string()))?,
+                Work::Inputs { kernel, request } => {
+                    let answer = match plugin.inputs(kernel, &request) {
+                        Ok(given) => Answer::Inputs(given),
+                        Err(problem) => Answer::Failed(problem),
+                    };
+                    write_header(&mut answers, &answer)?;
+                }
             }
             answers.flush()?;
         }

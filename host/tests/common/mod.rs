@@ -65,10 +65,10 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
         tolerance: Tolerance {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: "no rounding differs".into(),
         },
-        exact: false,
-        pinned: false,
+        rounding: Rounding::Free,
     }
 }
 
@@ -86,6 +86,7 @@ pub fn param(name: &str, role: Role) -> Param {
     Param {
         name: name.into(),
         role,
+        inputs: Inputs::default(),
     }
 }
 
@@ -105,6 +106,7 @@ pub fn plain(name: &str, ty: Scalar) -> Layout {
         ty: scalar(ty),
         offset: 0,
         size,
+        inputs: Inputs::default(),
     };
     Layout {
         name: name.into(),
@@ -126,6 +128,7 @@ pub fn structure(name: &str, fields: &[(&str, Scalar)]) -> Layout {
                 ty: scalar(ty),
                 offset,
                 size: size(ty),
+                inputs: Inputs::default(),
             };
             offset += size(ty);
             field
@@ -649,7 +652,7 @@ impl Sample {
 /// Numbers of every type: `q = a / n`, `s = -m`, `v = 3 a` for a `bias` added to `a`.
 pub fn mixed() -> Sample {
     let mut settings = structure("Settings", &[("bias", Scalar::F64), ("gain", Scalar::F64)]);
-    settings.fields[1].summary = "Factor; default 3.".into();
+    settings.fields[1].inputs.default = Some(3.0);
     let row = structure(
         "Row",
         &[("a", Scalar::F64), ("n", Scalar::U32), ("m", Scalar::I32)],

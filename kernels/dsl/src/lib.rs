@@ -150,12 +150,33 @@ macro_rules! plugin_exports {
             unsafe { plugin::run(ENTRIES.get_or_init($entries), call, sink, context) }
         }
 
+        unsafe extern "C" fn inputs(
+            kernel: u32,
+            request: *const u8,
+            len: usize,
+            sink: plugin::Sink,
+            context: *mut plugin::c_void,
+        ) -> u32 {
+            // SAFETY: the loader's promise is passed on.
+            unsafe {
+                plugin::inputs(
+                    ENTRIES.get_or_init($entries),
+                    kernel,
+                    request,
+                    len,
+                    sink,
+                    context,
+                )
+            }
+        }
+
         #[unsafe(no_mangle)]
         extern "C" fn hankel_plugin() -> plugin::Exports {
             plugin::Exports {
                 abi: plugin::ABI,
                 describe,
                 run,
+                inputs,
             }
         }
     };

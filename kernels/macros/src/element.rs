@@ -5,6 +5,8 @@ use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 use syn::{Data, DeriveInput, Fields, GenericParam};
 
+use crate::inputs::{Holder, Inputs};
+
 pub fn derive(item: &DeriveInput) -> syn::Result<TokenStream> {
     let name = &item.ident;
     let Data::Struct(data) = &item.data else {
@@ -35,12 +37,17 @@ pub fn derive(item: &DeriveInput) -> syn::Result<TokenStream> {
     let fields: Vec<Field<'_>> = fields
         .named
         .iter()
-        .map(|f| Field {
-            name: f.ident.as_ref().expect("named"),
-            ty: &f.ty,
-            summary: summary(&f.attrs),
+        .map(|f| {
+            let inputs = Inputs::parse(&f.attrs)?;
+            inputs.check(Holder::Field, &[])?;
+            Ok(Field {
+                name: f.ident.as_ref().expect("named"),
+                ty: &f.ty,
+                summary: summary(&f.attrs),
+                inputs,
+            })
         })
-        .collect();
+        .collect::<syn::Result<_>>()?;
     let impls = match parameter {
         None => one(name, &quote!(#name), &fields, None),
         Some(p) => ["f32", "f64"]
@@ -53,6 +60,11 @@ pub fn derive(item: &DeriveInput) -> syn::Result<TokenStream> {
     };
     Ok(quote! {
         ::hankel_dsl::on_host! {
+            #[allow(
+                clippy::all,
+                unused_parens,
+                reason = "generated, with expressions as the attributes have them"
+            )]
             const _: () = {
                 use ::hankel_dsl::native::{describe, layout};
                 #impls
@@ -65,6 +77,7 @@ struct Field<'a> {
     name: &'a Ident,
     ty: &'a syn::Type,
     summary: String,
+    inputs: Inputs,
 }
 
 /// The implementations for one concrete type.
@@ -102,6 +115,7 @@ fn one(
     let descriptions = fields.iter().zip(&types).map(|(f, ty)| {
         let (field, summary) = (f.name, &f.summary);
         let field_text = field.to_string();
+        let inputs = f.inputs.describe();
         quote! {
             describe::Field {
                 name: #field_text.into(),
@@ -109,6 +123,7 @@ fn one(
                 ty: <#ty as layout::Element>::ty(),
                 offset: core::mem::offset_of!(#this, #field) as u32,
                 size: size_of::<#ty>() as u32,
+                inputs: #inputs,
             }
         }
     });

@@ -18,13 +18,24 @@ impl Kernel {
             let entry = &v.entry;
             // `hankel` sets these two: what is only described, or does not run, is not compiled.
             let wanted = quote!(any(not(hankel_select), hankel_native = #entry));
+            let inputs = match (&self.inputs, &v.scalar) {
+                (None, _) => quote!(None),
+                (Some(path), None) => quote!(Some(#path as native::inputs::Make)),
+                (Some(path), Some(scalar)) => {
+                    quote!(Some(#path::<#scalar> as native::inputs::Make))
+                }
+            };
             quote! {
                 all.push({
                     #[cfg(#wanted)]
                     #run
+                    #[cfg(#wanted)]
+                    let inputs = #inputs;
                     #[cfg(not(#wanted))]
                     use exec::not_built as run;
-                    native::Entry { kernel: #description, run }
+                    #[cfg(not(#wanted))]
+                    let inputs = None;
+                    native::Entry { kernel: #description, run, inputs }
                 });
             }
         });
@@ -48,6 +59,7 @@ impl Kernel {
                     unused_parens,
                     unused_imports,
                     unused_mut,
+                    unused_parens,
                     unused_variables,
                     reason = "generated"
                 )]
@@ -120,7 +132,8 @@ impl Kernel {
         let outputs = self.describe_outputs(variant);
         let tolerance = self.tolerance.of(variant);
         let (ulp, absolute, why) = (tolerance.ulp, tolerance.absolute, &tolerance.why);
-        let (exact, pinned) = (self.exact, self.pinned);
+        let non_finite = tolerance.non_finite;
+        let rounding = format_ident!("{}", self.rounding.variant());
         quote! {
             describe::Kernel {
                 name: #entry.into(),
@@ -135,10 +148,10 @@ impl Kernel {
                 tolerance: describe::Tolerance {
                     ulp: #ulp,
                     absolute: #absolute,
+                    non_finite: #non_finite,
                     why: #why.into(),
                 },
-                exact: #exact,
-                pinned: #pinned,
+                rounding: describe::Rounding::#rounding,
             }
         }
     }
@@ -221,7 +234,12 @@ impl Kernel {
                         })
                     }
                 };
-                quote!(describe::Param { name: #name.into(), role: describe::Role::#role })
+                let inputs = p.inputs.describe();
+                quote!(describe::Param {
+                    name: #name.into(),
+                    role: describe::Role::#role,
+                    inputs: #inputs,
+                })
             })
             .collect()
     }

@@ -12,6 +12,7 @@ use syn::{
 
 use crate::element::{replace, summary};
 use crate::general::Form;
+use crate::inputs::{Holder, Inputs};
 use crate::range::Range;
 use crate::stage::Passed;
 use crate::twin;
@@ -32,12 +33,30 @@ pub struct Kernel {
     /// Entry points to make.
     pub variants: Vec<Variant>,
     pub tolerance: Tolerance,
-    /// Arithmetic is done as it is written.
-    pub exact: bool,
-    /// In SPIR-V it is.
-    pub pinned: bool,
+    pub rounding: Rounding,
+    /// The function that makes inputs, as it is named from inside the kernel's module.
+    pub inputs: Option<TokenStream>,
     /// Cooperative functions that it calls.
     pub helpers: Vec<Ident>,
+}
+
+/// A variant of `describe::Rounding`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Rounding {
+    Free,
+    Pinned,
+    Exact,
+}
+
+impl Rounding {
+    /// The variant's name.
+    pub fn variant(self) -> &'static str {
+        match self {
+            Self::Free => "Free",
+            Self::Pinned => "Pinned",
+            Self::Exact => "Exact",
+        }
+    }
 }
 
 pub enum Stage {
@@ -111,6 +130,8 @@ const FORMATS: [Format; 7] = [
 pub struct Tolerance {
     pub ulp: u32,
     pub absolute: f64,
+    /// Finite inputs may give results that are not finite.
+    pub non_finite: bool,
     pub why: String,
     /// Texel formats that it does not concern: they hold what was computed.
     pub exact: Vec<Ident>,
@@ -122,6 +143,7 @@ impl Tolerance {
         Self {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: "only correctly rounded operations, comparisons and selections: the same bits everywhere".into(),
             exact: Vec::new(),
         }
@@ -130,7 +152,10 @@ impl Tolerance {
     /// What concerns one entry point.
     pub fn of(&self, variant: &Variant) -> Self {
         match variant.format {
-            Some(format) if self.exact.iter().any(|f| f == format.name) => Self::none(),
+            Some(format) if self.exact.iter().any(|f| f == format.name) => Self {
+                non_finite: self.non_finite,
+                ..Self::none()
+            },
             _ => self.clone(),
         }
     }
@@ -139,6 +164,7 @@ impl Tolerance {
 pub struct Param {
     pub name: Ident,
     pub role: Role,
+    pub inputs: Inputs,
 }
 
 /// What a parameter is bound to; types are the values', without `&`, `Option` or `Buffer`.
@@ -231,6 +257,24 @@ pub enum Texture {
 }
 
 impl Role {
+    /// What its numbers are, for attributes about them.
+    fn holder(&self) -> Holder {
+        match self {
+            Self::Uniform(_) | Self::Attribute(_) | Self::Varying(_) => Holder::Value,
+            Self::Element(_) | Self::ElementMut(_) | Self::Storage(_) | Self::StorageMut { .. } => {
+                Holder::Buffer
+            }
+            Self::Texture(_) => Holder::Texture,
+            Self::Constant { .. } => Holder::Constant,
+            Self::Atomic { .. }
+            | Self::StorageTexture { .. }
+            | Self::Sampler
+            | Self::Index
+            | Self::BuiltIn(_)
+            | Self::Shared { .. } => Holder::Nothing,
+        }
+    }
+
     /// Whether a descriptor is bound for it.
     pub fn is_bound(&self) -> bool {
         matches!(
@@ -282,7 +326,8 @@ impl Kernel {
         };
         let variants = args.variants(&name, real.as_ref())?;
         let output_formats = args.output_formats(&outputs)?;
-        let (exact, pinned) = (args.exact, args.pinned);
+        let rounding = args.rounding.unwrap_or(Rounding::Free);
+        let inputs = args.inputs.as_ref().map(from_inside);
         let helpers = args.cooperative.clone();
         let mut stage = args.into_stage(&params, &outputs, &name)?;
         if let Stage::Compute(c) = &mut stage.0 {
@@ -302,8 +347,8 @@ impl Kernel {
             output_formats,
             variants,
             tolerance,
-            exact,
-            pinned,
+            rounding,
+            inputs,
             helpers,
         };
         kernel.check()?;
@@ -363,6 +408,15 @@ impl Kernel {
     }
 
     fn check(&self) -> syn::Result<()> {
+        let sized: Vec<&Ident> = self
+            .params
+            .iter()
+            .filter(|p| matches!(p.role.holder(), Holder::Buffer | Holder::Texture))
+            .map(|p| &p.name)
+            .collect();
+        for p in &self.params {
+            p.inputs.check(p.role.holder(), &sized)?;
+        }
         let error = |span: Span, text: &str| Err(syn::Error::new(span, text));
         let compute = match &self.stage {
             Stage::Compute(c) => Some(c),
@@ -587,6 +641,7 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
         ));
     };
     let name = pat.ident.clone();
+    let inputs = Inputs::take(&mut arg.attrs)?;
     let is_role = |a: &Attribute| {
         a.path()
             .get_ident()
@@ -708,7 +763,7 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
             None => return Err(syn::Error::new(role.span(), "this role is not known")),
         },
     };
-    Ok(Param { name, role })
+    Ok(Param { name, role, inputs })
 }
 
 /// Whether a role's attribute says `unordered`.
@@ -794,8 +849,8 @@ struct Args {
     range: Option<(Span, Punctuated<Expr, Token![,]>)>,
     outputs: Option<(Span, Vec<Option<Format>>)>,
     tolerance: Option<Tolerance>,
-    exact: bool,
-    pinned: bool,
+    rounding: Option<Rounding>,
+    inputs: Option<syn::Path>,
 }
 
 impl Parse for Args {
@@ -807,8 +862,19 @@ impl Parse for Args {
                 "compute" => args.stage = Some(Word::Compute),
                 "vertex" => args.stage = Some(Word::Vertex),
                 "fragment" => args.stage = Some(Word::Fragment),
-                "exact" => args.exact = true,
-                "pinned" => args.pinned = true,
+                "exact" | "pinned" => {
+                    let asked = if word == "exact" {
+                        Rounding::Exact
+                    } else {
+                        Rounding::Pinned
+                    };
+                    if args.rounding.replace(asked).is_some() {
+                        return Err(syn::Error::new(
+                            word.span(),
+                            "`exact` says more than `pinned`: write one of them, once",
+                        ));
+                    }
+                }
                 "threads" => {
                     let threads = numbers(input)?;
                     let product: u64 = threads.iter().map(|t| u64::from(*t)).product();
@@ -852,11 +918,15 @@ impl Parse for Args {
                     syn::parenthesized!(content in input);
                     args.range = Some((word.span(), Punctuated::parse_terminated(&content)?));
                 }
+                "inputs" => {
+                    input.parse::<Token![=]>()?;
+                    args.inputs = Some(input.parse()?);
+                }
                 "parity" => args.tolerance = Some(parity(input, word.span())?),
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, exact, pinned or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, exact, pinned, inputs or parity",
                     ));
                 }
             }
@@ -878,6 +948,20 @@ fn format(name: &Ident) -> syn::Result<Format> {
             format!("a format is one of {}", names.join(", ")),
         )
     })
+}
+
+/// A path as the kernel's own module, one below, sees it.
+fn from_inside(path: &syn::Path) -> TokenStream {
+    match path.segments.first() {
+        Some(first) if path.leading_colon.is_none() && first.ident == "self" => {
+            let rest = path.segments.iter().skip(1);
+            quote!(super #(:: #rest)*)
+        }
+        Some(first) if path.leading_colon.is_none() && first.ident == "super" => {
+            quote!(super::#path)
+        }
+        _ => quote!(#path),
+    }
 }
 
 fn numbers(input: ParseStream<'_>) -> syn::Result<Vec<u32>> {
@@ -906,8 +990,12 @@ fn parity(input: ParseStream<'_>, span: Span) -> syn::Result<Tolerance> {
     };
     while !content.is_empty() {
         let key: Ident = content.parse()?;
-        if key == "exact" {
-            tolerance.exact = idents(&content)?;
+        if key == "exact" || key == "non_finite" {
+            if key == "exact" {
+                tolerance.exact = idents(&content)?;
+            } else {
+                tolerance.non_finite = true;
+            }
             if content.is_empty() {
                 break;
             }
@@ -922,7 +1010,7 @@ fn parity(input: ParseStream<'_>, span: Span) -> syn::Result<Tolerance> {
             _ => {
                 return Err(syn::Error::new(
                     key.span(),
-                    "expected ulp, absolute, why or exact",
+                    "expected ulp, absolute, non_finite, why or exact",
                 ));
             }
         }

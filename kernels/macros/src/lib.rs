@@ -5,6 +5,7 @@ mod element;
 mod function;
 mod general;
 mod host;
+mod inputs;
 mod kernel;
 mod list;
 mod range;
@@ -27,9 +28,10 @@ use syn::parse_macro_input;
 /// | `texture(FORMAT, …)` | the result is a texel; one entry point for each format |
 /// | `outputs(FORMAT or buffer, …)` | what each of several results is; without it, all are elements of buffers |
 /// | `cooperative(name, …)` | functions marked [`#[cooperative]`](macro@cooperative) that the kernel calls |
+/// | `inputs = path::to::function` | makes inputs for parity, see below |
 /// | `exact` | the result is right only if sums and products are computed as they are written: the error of a rounding, for example. Languages that cannot forbid contraction and reordering do not get the kernel; the manifest says which |
 /// | `pinned` | SPIR-V asks for arithmetic as it is written, so that the bits are the same everywhere even where the result is ill-conditioned; languages that cannot ask for it get the kernel all the same |
-/// | `parity(ulp = N, absolute = X, why = "…")` | how far backends may differ; without it, not at all. `exact(FORMAT, …)` names formats that it does not concern |
+/// | `parity(ulp = N, absolute = X, why = "…")` | how far backends may differ; without it, not at all. `exact(FORMAT, …)` names formats that it does not concern; `non_finite` says that finite inputs may give infinities and NaN, which fails parity otherwise |
 ///
 /// Each parameter says what it is bound to; bindings are numbered in order, the outputs last.
 ///
@@ -60,6 +62,31 @@ use syn::parse_macro_input;
 /// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
 /// fragment kernel one colour or a tuple of them, among which may be a [`Depth`](struct@Depth). It may
 /// [`discard`](fn@discard) the fragment and take derivatives ([`dpdx`](fn@dpdx)).
+///
+/// # Inputs
+/// What the numbers of a parameter, or of a field of a structure, are like is said by attributes
+/// beside the one above. Parity makes its inputs from them, and the command line takes defaults and
+/// units from them. Names and documentation say nothing.
+///
+/// | attribute | meaning |
+/// | --- | --- |
+/// | `#[range(0.0..=1.0)]` | from one to the other. Absurd floats go beyond it, integers never do |
+/// | `#[magnitude(1e-7..=1e-2)]` | of any order of magnitude between two positive numbers |
+/// | `#[values(0, 1, 2)]` | one of these; of a constant, each of them is run |
+/// | `#[unit_vector]` | the vector's length is 1 |
+/// | `#[count_of(PARAM)]`, `#[index_of(PARAM)]` | the number of elements of another parameter; the number of one of its elements |
+/// | `#[default(0.5)]` | a uniform's number unless somebody gives another one; 0 without it |
+/// | `#[unit = "m"]` | the unit |
+/// | `#[length(64)]`, `#[length(1..=64)]`, `#[length(PARAM * 3)]` | elements of a buffer: a number, any number between two, as many as another's |
+/// | `#[size(64, 32)]` | texels of a texture |
+///
+/// Without any, floats lie in \[-1, 1\], texels in \[0, 1\], and integers anywhere, 0, 1, -1 and the
+/// extremes among them.
+///
+/// What this cannot say, a function does: `inputs = path::to::function` among the arguments of
+/// `#[kernel]`, a `fn(&hankel_dsl::native::inputs::Request) -> Vec<hankel_dsl::native::inputs::Given>`
+/// that is compiled for the host only (behind `cfg(not(target_arch = "spirv"))`); for a kernel that
+/// is generic over `R: Real`, one that is generic likewise. What it leaves out is made as above.
 ///
 /// # Kinds of compute kernels
 /// A map reads what it likes and returns its own element: it cannot race.
@@ -145,7 +172,24 @@ pub fn cooperative(args: TokenStream, item: TokenStream) -> TokenStream {
 
 /// Lets a `repr(C)` structure be in a buffer: checks that it lies in memory as a shader sees it
 /// and describes it. A structure may be generic over one number type `R`.
-#[proc_macro_derive(Element)]
+///
+/// What its numbers are like is said by the same attributes as of a kernel's parameters, see
+/// [`macro@kernel`]: `#[range(0.0..=1.0)]`, `#[default(0.5)]`, `#[unit = "m"]` and the others. (A
+/// structure that also derives `Default` cannot have `#[default]`: the standard library's macro
+/// wants the word for itself.)
+#[proc_macro_derive(
+    Element,
+    attributes(
+        range,
+        magnitude,
+        values,
+        unit_vector,
+        count_of,
+        index_of,
+        default,
+        unit
+    )
+)]
 pub fn derive_element(item: TokenStream) -> TokenStream {
     let item = parse_macro_input!(item as syn::DeriveInput);
     element::derive(&item)

@@ -10,6 +10,7 @@ use crate::grid::within;
 #[repr(C)]
 pub struct Direction {
     /// Step from one tap to the next in texels: (1, 0) or (0, 1).
+    #[values(0, 1)]
     pub step: IVec2,
 }
 
@@ -20,17 +21,22 @@ pub struct Direction {
     compute,
     threads(8, 8),
     texture(rgba16unorm, rgba32float),
+    inputs = crate::inputs::maps::blurred,
     parity(
         ulp = 0,
         absolute = 1.6e-5,
         exact(rgba32float),
+        non_finite,
         why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
     )
 )]
 pub fn blur(
     #[index] at: UVec2,
     #[uniform] direction: &Direction,
-    #[storage] weights: Buffer<'_, f32>,
+    #[storage]
+    #[length(1..=7)]
+    #[range(0.0..=0.15)]
+    weights: Buffer<'_, f32>,
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
     let size = source.size();

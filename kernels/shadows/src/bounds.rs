@@ -9,14 +9,23 @@ use hankel_moments::{Moments4, cut_leak, hamburger_4, hausdorff_4, variance_2};
 #[repr(C)]
 pub struct Settings<R> {
     /// The moment vector that the bias mixes in.
+    #[default(0)]
     pub bias_target: Moments4<R>,
     /// How much of it, from 0 to 1.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub moment_bias: R,
     /// What is taken off the receiver's depth.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub depth_bias: R,
     /// A shadow of 1 minus this is full: from 0 to 0.5, 0.02 in the lecture.
+    #[range(0.0..=0.5)]
+    #[default(0)]
     pub light_leak: R,
     /// The least variance of variance shadow mapping.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub least_variance: R,
 }
 
@@ -67,7 +76,12 @@ fn cut<R: Real>(shadow: R, settings: &Settings<R>) -> Shadow<R> {
 
 /// Hamburger four moment shadow mapping: the least shadow that the moments allow, for depths in
 /// [-1, 1] or [0, 1]. Other depths: `moment_bound_n2`.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::receivers_4
+)]
 pub fn hamburger_4msm<R: Real>(
     #[uniform] settings: &Settings<R>,
     #[element] receiver: Receiver4<R>,
@@ -78,7 +92,12 @@ pub fn hamburger_4msm<R: Real>(
 
 /// Hausdorff four moment shadow mapping: the least shadow that the moments allow, for depths in
 /// [0, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::unit_receivers_4
+)]
 pub fn hausdorff_4msm<R: Real>(
     #[uniform] settings: &Settings<R>,
     #[element] receiver: Receiver4<R>,
@@ -88,7 +107,12 @@ pub fn hausdorff_4msm<R: Real>(
 }
 
 /// Variance shadow mapping: the least shadow that two moments allow.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::receivers_2
+)]
 pub fn vsm<R: Real>(
     #[uniform] settings: &Settings<R>,
     #[element] receiver: Receiver2<R>,

@@ -38,7 +38,10 @@ impl Transform {
 }
 
 /// A vertex as the light sees it, for the depth-only pass of the shadow map.
-#[kernel(vertex)]
+#[kernel(
+    vertex,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+)]
 pub fn light_depth(#[attribute] position: Vec3, #[uniform] light: &Transform) -> Vec4 {
     light.apply(position)
 }

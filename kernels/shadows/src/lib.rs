@@ -10,10 +10,15 @@
 //! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf) |
 #![no_std]
 
+#[cfg(not(target_arch = "spirv"))]
+extern crate std;
+
 pub mod blur;
 pub mod bounds;
 pub mod depth;
 mod grid;
+#[cfg(not(target_arch = "spirv"))]
+pub mod inputs;
 pub mod library;
 pub mod moment_bounds;
 pub mod points;

@@ -10,10 +10,13 @@ use hankel_moments::{
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
 pub struct BoundSettings<R> {
-    /// Where between the lower bound, 0, and the upper bound, 1; default 0.
+    /// Where between the lower bound, 0, and the upper bound, 1.
+    #[range(0.0..=1.0)]
+    #[default(0)]
     pub overestimation: R,
-    /// Share of the moments, from 0 to 1, that is replaced by a fixed distribution's on [-1, 1];
-    /// default 0.
+    /// Share of the moments, from 0 to 1, that is replaced by a fixed distribution's on [-1, 1].
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub bias: R,
 }
 
@@ -37,7 +40,7 @@ fn biased<R: Real, const N: usize>(
 macro_rules! order {
     (
         $n:literal; $($m:ident $d_m:ident $k:literal),*;
-        $Row:ident, $AdjointRow:ident, $Derivative:ident;
+        $Row:ident, $AdjointRow:ident, $Derivative:ident; $rows:ident, $adjoint_rows:ident;
         $(#[$bound_doc:meta])* $bound:ident,
         $(#[$adjoint_doc:meta])* $adjoint:ident,
         $(#[$compensated_doc:meta])* $compensated:ident
@@ -90,7 +93,13 @@ macro_rules! order {
         }
 
         $(#[$bound_doc])*
-        #[kernel(compute, threads(64), precision(f32, f64), pinned)]
+        #[kernel(
+            compute,
+            threads(64),
+            precision(f32, f64),
+            pinned,
+            inputs = crate::inputs::$rows
+        )]
         pub fn $bound<R: Real>(
             #[uniform] settings: &BoundSettings<R>,
             #[element] row: $Row<R>,
@@ -102,7 +111,7 @@ macro_rules! order {
         }
 
         $(#[$compensated_doc])*
-        #[kernel(compute, threads(64), precision(f32, f64), pinned)]
+        #[kernel(compute, threads(64), precision(f32, f64), pinned, inputs = crate::inputs::$rows)]
         pub fn $compensated<R: Real>(
             #[uniform] settings: &BoundSettings<R>,
             #[element] row: $Row<R>,
@@ -119,6 +128,7 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
+            inputs = crate::inputs::$adjoint_rows,
             parity(
                 absolute = 1e-12,
                 why = "factors of derivatives that are as good as 0 may underflow"
@@ -149,7 +159,7 @@ macro_rules! order {
 
 order! {
     1; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2;
-    Row1, AdjointRow1, Derivative1;
+    Row1, AdjointRow1, Derivative1; rows_1, adjoint_rows_1;
     /// Bound on the amount below a query point, from two power moments and their total.
     moment_bound_n1,
     /// Derivatives of the bound from two power moments and their total, times `d_bound`.
@@ -161,7 +171,7 @@ order! {
 
 order! {
     2; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4;
-    Row2, AdjointRow2, Derivative2;
+    Row2, AdjointRow2, Derivative2; rows_2, adjoint_rows_2;
     /// Bound on the amount below a query point, from four power moments and their total.
     moment_bound_n2,
     /// Derivatives of the bound from four power moments and their total, times `d_bound`.
@@ -173,7 +183,7 @@ order! {
 
 order! {
     3; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6;
-    Row3, AdjointRow3, Derivative3;
+    Row3, AdjointRow3, Derivative3; rows_3, adjoint_rows_3;
     /// Bound on the amount below a query point, from six power moments and their total.
     moment_bound_n3,
     /// Derivatives of the bound from six power moments and their total, times `d_bound`.
@@ -185,7 +195,7 @@ order! {
 
 order! {
     4; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6, m7 d_m7 7, m8 d_m8 8;
-    Row4, AdjointRow4, Derivative4;
+    Row4, AdjointRow4, Derivative4; rows_4, adjoint_rows_4;
     /// Bound on the amount below a query point, from eight power moments and their total.
     moment_bound_n4,
     /// Derivatives of the bound from eight power moments and their total, times `d_bound`.
@@ -197,7 +207,7 @@ order! {
 
 order! {
     5; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6, m7 d_m7 7, m8 d_m8 8, m9 d_m9 9, m10 d_m10 10;
-    Row5, AdjointRow5, Derivative5;
+    Row5, AdjointRow5, Derivative5; rows_5, adjoint_rows_5;
     /// Bound on the amount below a query point, from ten power moments and their total.
     moment_bound_n5,
     /// Derivatives of the bound from ten power moments and their total, times `d_bound`.

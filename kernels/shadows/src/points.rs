@@ -18,19 +18,34 @@ pub struct Moments3<R> {
 }
 
 /// The two depths with three given moments, for resampling them.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::moments_3
+)]
 pub fn sparse_2point<R: Real>(#[element] moments: Moments3<R>) -> TwoPoints<R> {
     sparse_2(moments.b1, moments.b2, moments.b3)
 }
 
 /// The two depths that explain four moments, if any two do, and how far they are from it.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::moments_4
+)]
 pub fn degenerate_2point<R: Real>(#[element] moments: Moments4<R>) -> Degenerate4<R> {
     degenerate_4(moments)
 }
 
 /// The three depths that explain six moments, if any three do, and how far they are from it.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::moments_6
+)]
 pub fn degenerate_3point<R: Real>(#[element] moments: Moments6<R>) -> Degenerate6<R> {
     degenerate_6(moments)
 }

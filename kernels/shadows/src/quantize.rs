@@ -10,56 +10,116 @@ use hankel_moments::{
 };
 
 /// Four moments of depths in [0, 1] to the basis optimised for 16 bits.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::unit_moments_4
+)]
 pub fn quantize_4_unit<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
     quantize_unit_4(moments.clamped())
 }
 
 /// The basis optimised for 16 bits to four moments of depths in [0, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn dequantize_4_unit<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::unit_quantized_4
+)]
+pub fn dequantize_4_unit<R: Real>(
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized4<R>,
+) -> Moments4<R> {
     dequantize_unit_4(quantized.saturated())
 }
 
 /// Four moments of depths in [-1, 1] to the basis optimised for 16 bits.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::symmetric_moments_4
+)]
 pub fn quantize_4_symmetric<R: Real>(#[element] moments: Moments4<R>) -> Quantized4<R> {
     quantize_symmetric_4(moments.clamped())
 }
 
 /// The basis optimised for 16 bits to four moments of depths in [-1, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn dequantize_4_symmetric<R: Real>(#[element] quantized: Quantized4<R>) -> Moments4<R> {
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::symmetric_quantized_4
+)]
+pub fn dequantize_4_symmetric<R: Real>(
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized4<R>,
+) -> Moments4<R> {
     dequantize_symmetric_4(quantized.saturated())
 }
 
 /// Six moments of depths in [0, 1] to the basis optimised for 10 bits.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::unit_moments_6
+)]
 pub fn quantize_6_unit<R: Real>(#[element] moments: Moments6<R>) -> Quantized6<R> {
     quantize_unit_6(moments.clamped())
 }
 
 /// The basis optimised for 10 bits to six moments of depths in [0, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn dequantize_6_unit<R: Real>(#[element] quantized: Quantized6<R>) -> Moments6<R> {
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::unit_quantized_6
+)]
+pub fn dequantize_6_unit<R: Real>(
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized6<R>,
+) -> Moments6<R> {
     dequantize_unit_6(quantized.saturated())
 }
 
 /// Six moments of depths in [-1, 1] to the basis optimised for 10 bits.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::symmetric_moments_6
+)]
 pub fn quantize_6_symmetric<R: Real>(#[element] moments: Moments6<R>) -> Quantized6<R> {
     quantize_symmetric_6(moments.clamped())
 }
 
 /// The basis optimised for 10 bits to six moments of depths in [-1, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
-pub fn dequantize_6_symmetric<R: Real>(#[element] quantized: Quantized6<R>) -> Moments6<R> {
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::symmetric_quantized_6
+)]
+pub fn dequantize_6_symmetric<R: Real>(
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized6<R>,
+) -> Moments6<R> {
     dequantize_symmetric_6(quantized.saturated())
 }
 
 /// Six quantised moments to two words of 10 bits for each channel (R10G10B10A2).
 #[kernel(compute, threads(64))]
-pub fn pack_6(#[element] quantized: Quantized6<f32>) -> Packed6 {
+pub fn pack_6(
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized6<f32>,
+) -> Packed6 {
     Packed6::pack(quantized)
 }
 
@@ -73,7 +133,9 @@ pub fn unpack_6(#[element] packed: Packed6) -> Quantized6<f32> {
 #[kernel(compute, threads(64))]
 pub fn to_summed_area_4(
     #[uniform] fixed_point: &FixedPoint,
-    #[element] quantized: Quantized4<f32>,
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized4<f32>,
 ) -> Fixed4 {
     Fixed4::of(quantized, *fixed_point)
 }
@@ -92,7 +154,9 @@ pub fn from_summed_area_4(
 #[kernel(compute, threads(64))]
 pub fn to_summed_area_6(
     #[uniform] fixed_point: &FixedPoint,
-    #[element] quantized: Quantized6<f32>,
+    #[element]
+    #[range(0.0..=1.0)]
+    quantized: Quantized6<f32>,
 ) -> Fixed6 {
     Fixed6::of(quantized, *fixed_point)
 }

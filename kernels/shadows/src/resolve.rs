@@ -39,6 +39,7 @@ fn symmetric(z: f32) -> Moments4<f32> {
     compute,
     threads(8, 8),
     texture(rgba16unorm),
+    inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,
         absolute = 1.6e-5,
@@ -47,7 +48,9 @@ fn symmetric(z: f32) -> Moments4<f32> {
 )]
 pub fn resolve_unit(
     #[index] at: UVec2,
-    #[constant(id = 0, default = 4)] samples: u32,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     mean(depth, at, samples, |z| {
@@ -60,6 +63,7 @@ pub fn resolve_unit(
     compute,
     threads(8, 8),
     texture(rgba16unorm),
+    inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,
         absolute = 1.6e-5,
@@ -68,7 +72,9 @@ pub fn resolve_unit(
 )]
 pub fn resolve_symmetric(
     #[index] at: UVec2,
-    #[constant(id = 0, default = 4)] samples: u32,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     mean(depth, at, samples, |z| {
@@ -77,10 +83,17 @@ pub fn resolve_symmetric(
 }
 
 /// Mean of a texel's moments, depths moved to [-1, 1], as they are, for a 32-bit map.
-#[kernel(compute, threads(8, 8), texture(rgba32float))]
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    inputs = crate::inputs::maps::depths
+)]
 pub fn resolve_plain(
     #[index] at: UVec2,
-    #[constant(id = 0, default = 4)] samples: u32,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     mean(depth, at, samples, |z| {

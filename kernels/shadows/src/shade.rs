@@ -38,21 +38,32 @@ pub struct Light {
     /// The moment vector that the bias mixes in.
     pub bias_target: Vec4,
     /// How much of it, from 0 to 1; for variance shadow mapping the least variance.
+    #[magnitude(1e-7..=1e-2)]
     pub moment_bias: f32,
     /// What is taken off a receiver's depth, in the map's range of 0 to 1.
+    #[magnitude(1e-7..=1e-2)]
     pub depth_bias: f32,
     /// A shadow of 1 minus this is full: from 0 to 0.5, 0.02 in the lecture.
+    #[range(0.0..=0.5)]
     pub light_leak: f32,
     /// Texels of the percentage-closer filter to each side of the receiver's own.
+    #[range(0..=4)]
     pub filter_radius: u32,
 }
 
 /// A vertex as the camera sees it: position, world-space position, normal and colour.
-#[kernel(vertex)]
+#[kernel(
+    vertex,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+)]
 pub fn surface(
     #[attribute] position: Vec3,
-    #[attribute] normal: Vec3,
-    #[attribute] colour: Vec3,
+    #[attribute]
+    #[unit_vector]
+    normal: Vec3,
+    #[attribute]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
     #[uniform] camera: &Transform,
 ) -> (Vec4, Vec3, Vec3, Vec3) {
     (camera.apply(position), position, normal, colour)
@@ -158,6 +169,7 @@ fn biased(light: &Light, m: Moments4<f32>) -> Moments4<f32> {
 /// Shading with Hamburger four moment shadow mapping.
 #[kernel(
     fragment,
+    inputs = crate::inputs::maps::shaded,
     parity(
         ulp = 0,
         absolute = 4e-3,
@@ -166,12 +178,18 @@ fn biased(light: &Light, m: Moments4<f32>) -> Moments4<f32> {
 )]
 pub fn shade_hamburger(
     #[varying] world: Vec3,
-    #[varying] normal: Vec3,
-    #[varying] colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
     #[uniform] light: &Light,
     #[texture] map: Texture2d<'_>,
     #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)] encoding: u32,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+    encoding: u32,
 ) -> Vec4 {
     let (m, z) = look_up(light, map, sampler, encoding, world);
     let m = biased(light, m);
@@ -186,6 +204,7 @@ pub fn shade_hamburger(
 /// Shading with Hausdorff four moment shadow mapping.
 #[kernel(
     fragment,
+    inputs = crate::inputs::maps::shaded,
     parity(
         ulp = 0,
         absolute = 4e-3,
@@ -194,12 +213,18 @@ pub fn shade_hamburger(
 )]
 pub fn shade_hausdorff(
     #[varying] world: Vec3,
-    #[varying] normal: Vec3,
-    #[varying] colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
     #[uniform] light: &Light,
     #[texture] map: Texture2d<'_>,
     #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)] encoding: u32,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+    encoding: u32,
 ) -> Vec4 {
     let (m, z) = look_up(light, map, sampler, encoding, world);
     let m = biased(light, m);
@@ -215,6 +240,7 @@ pub fn shade_hausdorff(
 /// are: against rounding, `moment_bias` is the least variance.
 #[kernel(
     fragment,
+    inputs = crate::inputs::maps::shaded,
     parity(
         ulp = 0,
         absolute = 4e-3,
@@ -223,12 +249,18 @@ pub fn shade_hausdorff(
 )]
 pub fn shade_variance(
     #[varying] world: Vec3,
-    #[varying] normal: Vec3,
-    #[varying] colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
     #[uniform] light: &Light,
     #[texture] map: Texture2d<'_>,
     #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)] encoding: u32,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+    encoding: u32,
 ) -> Vec4 {
     let (m, z) = look_up(light, map, sampler, encoding, world);
     lit(
@@ -244,11 +276,15 @@ pub fn shade_variance(
 
 /// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
 /// the receiver, the first sample of each texel. The reference for the others.
-#[kernel(fragment)]
+#[kernel(fragment, inputs = crate::inputs::maps::shaded_depths)]
 pub fn shade_pcf(
     #[varying] world: Vec3,
-    #[varying] normal: Vec3,
-    #[varying] colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
     #[uniform] light: &Light,
     #[texture] depth: hankel_dsl::Texture2dMultisampled<'_>,
 ) -> Vec4 {

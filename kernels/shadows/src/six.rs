@@ -9,15 +9,24 @@ use crate::bounds::Shadow;
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
 pub struct Settings6<R> {
-    /// How much of `bias_target` is mixed in, from 0 to 1; default 0.
+    /// How much of `bias_target` is mixed in, from 0 to 1.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub moment_bias: R,
-    /// What is taken off the receiver's depth; default 0.
+    /// What is taken off the receiver's depth.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub depth_bias: R,
-    /// Where between the least shadow, 0, and the greatest, 1; default 0.
+    /// Where between the least shadow, 0, and the greatest, 1.
+    #[range(0.0..=1.0)]
+    #[default(0)]
     pub overestimation: R,
-    /// A shadow of 1 minus this is full: from 0 to 0.5; default 0.
+    /// A shadow of 1 minus this is full: from 0 to 0.5.
+    #[range(0.0..=0.5)]
+    #[default(0)]
     pub light_leak: R,
     /// The moment vector that the bias mixes in.
+    #[default(0)]
     pub bias_target: Moments6<R>,
 }
 
@@ -33,7 +42,12 @@ pub struct Receiver6<R> {
 
 /// Hamburger six moment shadow mapping: the shadow that the moments allow, for depths anywhere in
 /// [-1, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::receivers_6
+)]
 pub fn hamburger_6msm<R: Real>(
     #[uniform] settings: &Settings6<R>,
     #[element] receiver: Receiver6<R>,

@@ -9,13 +9,21 @@ use crate::bounds::Shadow;
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
 pub struct TrigonometricSettings<R> {
-    /// How much of the uniform distribution is mixed in, from 0 to 1; default 0.
+    /// How much of the uniform distribution is mixed in, from 0 to 1.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub moment_bias: R,
-    /// What is taken off the receiver's depth; default 0.
+    /// What is taken off the receiver's depth.
+    #[magnitude(1e-7..=1e-2)]
+    #[default(0)]
     pub depth_bias: R,
-    /// Where between the least shadow, 0, and the greatest, 1; default 0.
+    /// Where between the least shadow, 0, and the greatest, 1.
+    #[range(0.0..=1.0)]
+    #[default(0)]
     pub overestimation: R,
-    /// A shadow of 1 minus this is full: from 0 to 0.5; default 0.
+    /// A shadow of 1 minus this is full: from 0 to 0.5.
+    #[range(0.0..=0.5)]
+    #[default(0)]
     pub light_leak: R,
 }
 
@@ -26,6 +34,7 @@ pub struct TrigonometricReceiver<R> {
     /// The filtered moments.
     pub moments: TrigonometricMoments<R>,
     /// The receiver's depth, from 0 to 1.
+    #[range(0.0..=1.0)]
     pub depth: R,
 }
 
@@ -34,12 +43,18 @@ pub struct TrigonometricReceiver<R> {
 #[repr(C)]
 pub struct UnitDepth<R> {
     /// Depth, from 0 to 1.
+    #[range(0.0..=1.0)]
     pub depth: R,
 }
 
 /// Trigonometric moment shadow mapping: the shadow that two complex trigonometric moments allow,
 /// for depths in [0, 1].
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    inputs = crate::inputs::trigonometric_receivers
+)]
 pub fn trigonometric_4msm<R: Real>(
     #[uniform] settings: &TrigonometricSettings<R>,
     #[element] receiver: TrigonometricReceiver<R>,

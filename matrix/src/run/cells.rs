@@ -75,7 +75,10 @@ impl<'a> Shared<'a> {
                 &it.simd
             };
             let results = results.clone().map_err(Failure::refused);
-            let cell = judge(it, column, None, results, Duration::ZERO);
+            let mut cell = judge(it, column, None, results, Duration::ZERO);
+            if column == Column::Native {
+                finite(it, &mut cell);
+            }
             return Settled::Cell(Box::new(cell));
         };
         if let Some(status) = column.statuses(self.tools).find(|s| !s.is_there()) {
@@ -164,13 +167,36 @@ impl<'a> Shared<'a> {
             };
             (self.progress)(&format!(
                 "{left} cells left; {column}: {}",
-                unit.it.kernel().name
+                unit.it.subject.name
             ));
         }
         Ran {
             column,
             device: engine.device,
             cells: found,
+        }
+    }
+}
+
+/// Finite inputs give finite results, unless the kernel says otherwise.
+fn finite(it: &Ready<'_>, cell: &mut Cell) {
+    let Ok(reference) = &it.reference else {
+        return;
+    };
+    if it.kernel().tolerance.non_finite {
+        return;
+    }
+    let numbers = Numbers::of(it.kernel());
+    let (mut count, mut first) = (0, None);
+    for (case, written) in it.prepared.cases.iter().zip(reference) {
+        let (n, found) = numbers.non_finite(case, written);
+        count += n;
+        first = first.or(found);
+    }
+    if count > 0 {
+        cell.outcome = Outcome::NotFinite { count };
+        if let Some(found) = &mut cell.found {
+            found.first = first;
         }
     }
 }

@@ -54,7 +54,7 @@ impl<'a> Engine<'a> {
         let io = |what: &str, e: io::Error| Failure::refused(format!("{what}: {e}"));
         let kernel = unit.it.kernel();
         let extension = self.column.language().map_or("", |l| l.name());
-        let folder = self.folder.join(&kernel.name);
+        let folder = self.folder.join(&unit.it.subject.name);
         fs::create_dir_all(&folder).map_err(|e| io("making a folder for the work", e))?;
         let code = folder.join(format!("{}.{extension}", kernel.name));
         fs::write(&code, &unit.code.bytes).map_err(|e| io("writing the code", e))?;

@@ -233,7 +233,7 @@ fn row(it: &Ready<'_>, cells: BTreeMap<Column, Cell>) -> Row {
     let kernel = it.kernel();
     let numbers = Numbers::of(kernel);
     Row {
-        kernel: kernel.name.clone(),
+        kernel: it.subject.name.clone(),
         stage: match kernel.stage {
             Stage::Compute { .. } => "compute",
             Stage::Vertex => "vertex",
@@ -245,7 +245,8 @@ fn row(it: &Ready<'_>, cells: BTreeMap<Column, Cell>) -> Row {
             .reference
             .iter()
             .flatten()
-            .map(|w| numbers.non_finite(w))
+            .zip(&it.prepared.cases)
+            .map(|(written, case)| numbers.non_finite(case, written).0)
             .sum(),
         cells,
     }

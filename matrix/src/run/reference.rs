@@ -8,7 +8,7 @@ use hankel_codegen::files::sha256;
 use hankel_dsl::native::Mode;
 use hankel_dsl::native::describe::Kernel;
 use hankel_host::device::{DeviceError, NativeDevice};
-use hankel_host::inputs::Case;
+use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
 use hankel_host::parity::panics;
 use rayon::prelude::*;
@@ -60,17 +60,24 @@ pub(super) fn references<'a>(
 
 fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Result<Ready<'a>> {
     let kernel = &subject.entry.kernel;
-    let inputs = work.join(format!("{}.inputs", kernel.name));
-    let prepared = Prepared::new(kernel, request.seed, &inputs)?;
+    let inputs = work.join(format!("{}.inputs", subject.name));
+    let (cases, problem) = match inputs::of_entry(&subject.entry, request.seed) {
+        Ok(cases) => (cases, None),
+        Err(e) => (Vec::new(), Some(format!("there are no inputs: {e}"))),
+    };
+    let prepared = Prepared::new(kernel, cases, &inputs)?;
     let program = subject.entry.program(None, &[]);
     let run = |mode: Mode, case: &Case| {
         execute::dispatch(&mut NativeDevice::with_mode(mode), &program, case)
     };
     let natively = |mode: Mode| -> Result<Vec<Written>, String> {
+        if let Some(problem) = &problem {
+            return Err(problem.clone());
+        }
         let explained = |case: &Case, error: DeviceError| {
             let at = panics::culprit(kernel, case, |shorter| run(mode, shorter).is_err());
             let at = at.map_or_else(String::new, |at| format!("; {at}"));
-            format!("{} inputs: {error}{at}", case.class)
+            format!("{}: {error}{at}", case.called())
         };
         prepared
             .cases

@@ -15,7 +15,11 @@ pub fn scatter(#[index] i: u32, #[element] x: u32, #[storage] out: StorageMut<'_
 }
 
 /// A point moves by its weight, in place; what it was is returned, and by how much it moved.
-#[kernel(compute, threads(64))]
+#[kernel(
+    compute,
+    threads(64),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn step(#[element] pair: &mut Pair<f32>, #[uniform] time: &f32) -> (Pair<f32>, f32) {
     let before = *pair;
     let move_by = pair.w * *time;
@@ -91,7 +95,7 @@ pub fn float_sum(#[element] x: u32, #[atomic] sums: Atomics<'_>) {
 }
 
 /// A buffer as a grid: the mean of a cell and its right and lower neighbours.
-#[kernel(compute, threads(8, 8), range(grid.size))]
+#[kernel(compute, threads(8, 8), range(grid.size), parity(non_finite, why = "sums and products of absurd numbers overflow"))]
 pub fn blur_grid(
     #[index] at: UVec2,
     #[uniform] grid: &Grid,

@@ -91,13 +91,19 @@ pub struct Pair<R> {
 #[repr(C)]
 pub struct Affine<R> {
     /// Factor.
+    #[range(0.5..=2.0)]
     pub scale: R,
     /// Summand.
     pub offset: R,
 }
 
 /// The affine map of the point, its square root and its weight's smaller half.
-#[kernel(compute, threads(64), precision(f32, f64))]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn affine<R: Real>(#[uniform] map: &Affine<R>, #[element] pair: Pair<R>) -> Pair<R> {
     let x = (pair.x * map.scale + map.offset).abs();
     Pair {
@@ -109,7 +115,13 @@ pub fn affine<R: Real>(#[uniform] map: &Affine<R>, #[element] pair: Pair<R>) -> 
 /// The sum of the point and its weight as it is rounded, and what the rounding took off (TwoSum:
 /// Knuth, The Art of Computer Programming 2, section 4.2.2, theorem B). A compiler that reorders
 /// sums finds that nothing was.
-#[kernel(compute, threads(64), precision(f32, f64), exact)]
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    exact,
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn rounding<R: Real>(#[element] pair: Pair<R>) -> Pair<R> {
     let sum = pair.x + pair.w;
     let weight = sum - pair.x;
@@ -141,12 +153,18 @@ pub struct Step {
 }
 
 /// The sum of two elements of a table, of which one is found by the invocation's own step.
-#[kernel(compute, threads(64))]
+#[kernel(
+    compute,
+    threads(64),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn gather(
     #[index] i: u32,
     #[storage] table: Buffer<'_, f32>,
     #[element] step: Step,
-    #[constant(id = 3, default = 2)] stride: u32,
+    #[constant(id = 3, default = 2)]
+    #[values(0, 1, 7)]
+    stride: u32,
 ) -> f32 {
     let sum = step
         .delta
@@ -171,6 +189,7 @@ pub struct Checker {
     /// Values of the fields.
     pub colours: [Vec4; 2],
     /// Width and height of a field in texels, at least 1.
+    #[range(1..=8)]
     pub field: UVec2,
     /// Fills the structure up.
     pub padding: UVec2,
@@ -204,7 +223,12 @@ pub fn gradient(#[index] at: UVec3) -> Vec4 {
 }
 
 /// The mean of four texels.
-#[kernel(compute, threads(8, 8), texture(r32float))]
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(r32float),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn downsample(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> f32 {
     let last = source.size() - UVec2::ONE;
     let tap = |dx: u32, dy: u32| {
@@ -242,7 +266,9 @@ pub fn last_sample(#[index] at: UVec2, #[texture] source: Texture2dMultisampled<
     )
 )]
 pub fn filtered(
-    #[element] uv: Vec2,
+    #[element]
+    #[range(-0.5..=1.5)]
+    uv: Vec2,
     #[texture] source: Texture2d<'_>,
     #[sampler] sampler: Sampler,
 ) -> f32 {
@@ -261,7 +287,10 @@ pub fn slice(#[index] at: UVec2, #[texture] volume: Texture3d<'_>) -> Vec4 {
 }
 
 /// A vertex moved by a uniform, with a varying.
-#[kernel(vertex)]
+#[kernel(
+    vertex,
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn corner(
     #[attribute] position: Vec3,
     #[attribute] colour: Vec4,
@@ -275,7 +304,10 @@ pub fn corner(
 }
 
 /// A colour times a uniform's, and the sum of its channels to a second target.
-#[kernel(fragment)]
+#[kernel(
+    fragment,
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn tint(#[varying] colour: Vec4, #[uniform] map: &Affine<f32>) -> (Vec4, Vec4) {
     let tinted = colour * map.scale;
     // Of the colour itself: drivers may take a common factor out of a sum.

@@ -55,7 +55,12 @@ const TILE: usize = 8;
 
 /// A product of two square matrices whose size is a multiple of the tile's, row by row, from tiles
 /// in workgroup memory.
-#[kernel(compute, threads(8, 8), range(24, 24))]
+#[kernel(
+    compute,
+    threads(8, 8),
+    range(24, 24),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
 pub fn product(
     #[index] at: UVec2,
     #[local_id] local: UVec2,

@@ -326,15 +326,16 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         params: vec![Param {
             name: "values".into(),
             role: describe::Role::Storage { binding: 0, layout },
+            inputs: describe::Inputs::default(),
         }],
         outputs: vec![output],
         tolerance: Tolerance {
             ulp: 0,
             absolute: 0.0,
+            non_finite: false,
             why: "the driver is wrong or it is not".into(),
         },
-        exact: false,
-        pinned: false,
+        rounding: describe::Rounding::Free,
     }
 }
 

@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hankel_dsl::native::Filter;
 use hankel_dsl::native::describe::{
-    Kernel, Output, Param, Precision, Role, Scalar, Stage, TextureKind, Type,
+    Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage, TextureKind, Type,
 };
 
 use super::super::error::{DeviceError, Result};
@@ -119,7 +119,7 @@ impl VulkanDevice {
         if kernel.precision == Some(Precision::F64) && !self.has_f64() {
             return Err(self.missing("64-bit floats", kernel));
         }
-        if kernel.exact && !matches!(shader, Shader::SpirvPassthrough(_)) {
+        if kernel.rounding == Rounding::Exact && !matches!(shader, Shader::SpirvPassthrough(_)) {
             return Err(refused(
                 "its arithmetic must be done as it is written, which only untouched SPIR-V can \
                  ask of a driver"
@@ -845,7 +845,7 @@ impl VulkanDevice {
         if fragment.stage != Stage::Fragment {
             return Err(wrong_stage(fragment, "fragment"));
         }
-        for Param { name, role } in &fragment.params {
+        for Param { name, role, .. } in &fragment.params {
             let Role::Varying { location, ty, .. } = role else {
                 continue;
             };

@@ -33,14 +33,24 @@ pub struct Kernel {
     pub outputs: Vec<Output>,
     /// How closely every backend must agree with the native scalar run.
     pub tolerance: Tolerance,
-    /// The result is right only if floating-point arithmetic is done as it is written: no compiler
-    /// may contract a product and a sum into one operation, or reorder sums.
-    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
-    pub exact: bool,
-    /// SPIR-V asks for arithmetic as it is written. Without it the result is as good, but other
+    /// What compilers and drivers may do with its floating-point arithmetic.
+    #[serde(default)]
+    pub rounding: Rounding,
+}
+
+/// What compilers and drivers may do with a kernel's floating-point arithmetic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rounding {
+    /// Contract a product and a sum into one operation, and reorder sums.
+    #[default]
+    Free,
+    /// Neither, wherever a language can ask for that. Without it the result is as good, but other
     /// bits: languages that cannot ask for it get the kernel all the same.
-    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
-    pub pinned: bool,
+    Pinned,
+    /// Neither: otherwise the result is wrong. Languages that cannot ask for it do not get the
+    /// kernel.
+    Exact,
 }
 
 /// A pipeline stage.
@@ -111,6 +121,110 @@ pub struct Param {
     pub name: String,
     /// What it is bound to.
     pub role: Role,
+    /// What its numbers are like.
+    #[serde(default, skip_serializing_if = "Inputs::is_empty")]
+    pub inputs: Inputs,
+}
+
+/// What the numbers of a parameter or a field are like, as its attributes say: parity makes inputs
+/// from it, the command line takes defaults and units from it. Of nested structures the innermost
+/// attribute counts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Inputs {
+    /// Where they lie; without it floats lie in \[-1, 1\] and integers anywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub domain: Option<Domain>,
+    /// What a uniform's number is unless somebody says otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub default: Option<f64>,
+    /// Their unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// How many elements a buffer has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<Length>,
+    /// How many texels a texture has along each axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 3]>,
+}
+
+impl Inputs {
+    /// Whether nothing is said.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// These, and where they say nothing, what `outer` says of all numbers inside.
+    #[must_use]
+    pub fn within(&self, outer: &Self) -> Self {
+        Self {
+            domain: self.domain.clone().or_else(|| outer.domain.clone()),
+            default: self.default.or(outer.default),
+            unit: self.unit.clone().or_else(|| outer.unit.clone()),
+            length: None,
+            size: None,
+        }
+    }
+}
+
+/// Where numbers lie.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Domain {
+    /// From one to the other, both included.
+    Range {
+        /// The least.
+        least: f64,
+        /// The greatest.
+        most: f64,
+    },
+    /// Of any order of magnitude between two positive numbers.
+    Magnitude {
+        /// The least.
+        least: f64,
+        /// The greatest.
+        most: f64,
+    },
+    /// One of these.
+    Values {
+        /// All there are.
+        values: Vec<f64>,
+    },
+    /// The vector's length is 1.
+    UnitVector,
+    /// How many elements a buffer, or texels a texture, has.
+    CountOf {
+        /// The parameter.
+        param: String,
+    },
+    /// The number of an element of a buffer, from 0.
+    IndexOf {
+        /// The parameter.
+        param: String,
+    },
+}
+
+/// How many elements a buffer has.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Length {
+    /// From one to the other, both included.
+    Between {
+        /// The fewest.
+        least: u32,
+        /// The most.
+        most: u32,
+    },
+    /// As many as another parameter has elements or texels, times a number, plus a number.
+    Of {
+        /// The other parameter.
+        param: String,
+        /// The factor.
+        times: u32,
+        /// The summand.
+        plus: i32,
+    },
 }
 
 /// What a parameter is bound to. `binding` is the number in descriptor set 0, counted over the
@@ -310,7 +424,7 @@ pub enum Output {
 }
 
 /// The type of a value in memory or at a stage's interface.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Type {
     /// A scalar.
@@ -356,7 +470,7 @@ pub enum Scalar {
 }
 
 /// Where the parts of a value lie, in bytes (std430).
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layout {
     /// The structure's name, without type parameters; for a buffer of plain numbers the number's
     /// own name (`f32`).
@@ -370,11 +484,11 @@ pub struct Layout {
 }
 
 /// A field of a structure.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Field {
     /// Its name.
     pub name: String,
-    /// The first paragraph of its documentation: meaning, unit, range.
+    /// The first paragraph of its documentation.
     pub summary: String,
     /// Its type.
     pub ty: Type,
@@ -382,6 +496,9 @@ pub struct Field {
     pub offset: u32,
     /// Size in bytes.
     pub size: u32,
+    /// What its numbers are like.
+    #[serde(default, skip_serializing_if = "Inputs::is_empty")]
+    pub inputs: Inputs,
 }
 
 /// Formats that a kernel can write, or that a texture it reads can have.
@@ -413,6 +530,9 @@ pub struct Tolerance {
     pub ulp: u32,
     /// Absolute difference.
     pub absolute: f64,
+    /// Finite inputs may give results that are not finite.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub non_finite: bool,
     /// Why it is that.
     pub why: String,
 }

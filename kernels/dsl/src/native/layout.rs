@@ -8,7 +8,7 @@ use std::{format, vec};
 use bytemuck::Pod;
 use glam::{IVec2, IVec3, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
-use super::describe::{Field, Layout, Precision, Scalar, Type};
+use super::describe::{Field, Inputs, Layout, Precision, Scalar, Type};
 use crate::Real;
 
 /// A value that a buffer can hold: the same bytes on the host and in a shader.
@@ -40,6 +40,7 @@ pub trait Element: Pod + Send + Sync {
                     offset: 0,
                     size: size_of::<Self>() as u32,
                     ty,
+                    inputs: Inputs::default(),
                 }],
             },
         }

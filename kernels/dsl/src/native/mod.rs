@@ -8,6 +8,7 @@ pub mod exec;
 #[doc(hidden)]
 pub mod fragment;
 pub mod function;
+pub mod inputs;
 #[doc(hidden)]
 pub mod lanes;
 pub mod layout;
@@ -26,6 +27,8 @@ pub struct Entry {
     pub kernel: describe::Kernel,
     /// Its native code.
     pub run: Run,
+    /// The author's own inputs for parity.
+    pub inputs: Option<inputs::Make>,
 }
 
 #[doc(hidden)]

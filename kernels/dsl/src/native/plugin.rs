@@ -17,10 +17,11 @@ use std::{format, slice};
 use super::Entry;
 use super::call::{Address, Arg, Call, CallError, Filter, Mode, Sampler, TextureMut, TextureRef};
 use super::describe::Kernel;
+use super::inputs::{Given, Make, Request};
 use super::texel::FORMATS;
 
 /// Version of what crosses the border.
-pub const ABI: u32 = 2;
+pub const ABI: u32 = 3;
 
 /// The exported function's name.
 pub const SYMBOL: &str = "hankel_plugin";
@@ -37,6 +38,15 @@ pub struct Exports {
     pub describe: unsafe extern "C" fn(sink: Sink, context: *mut c_void),
     /// Runs an entry point; 0 on success, else the error's text is sent to the sink.
     pub run: unsafe extern "C" fn(call: *const RawCall, sink: Sink, context: *mut c_void) -> u32,
+    /// Makes an entry point's own inputs for a request in JSON, and sends them to the sink as JSON;
+    /// `null` if it has none. 0 on success, else the error's text is sent.
+    pub inputs: unsafe extern "C" fn(
+        kernel: u32,
+        request: *const u8,
+        len: usize,
+        sink: Sink,
+        context: *mut c_void,
+    ) -> u32,
 }
 
 /// A call as it crosses the border.
@@ -201,6 +211,49 @@ pub unsafe fn run(
     }
 }
 
+/// The plug-in's side of [`Exports::inputs`].
+///
+/// # Safety
+/// `request` points to `len` bytes, and `sink` accepts `context` and any bytes.
+pub unsafe fn inputs(
+    entries: &[Entry],
+    kernel: u32,
+    request: *const u8,
+    len: usize,
+    sink: Sink,
+    context: *mut c_void,
+) -> u32 {
+    // SAFETY: the caller's.
+    let request = unsafe { slice::from_raw_parts(request, len) };
+    let make = entries.get(kernel as usize).and_then(|e| e.inputs);
+    let made = serde_json::from_slice(request)
+        .map_err(|e| e.to_string())
+        .and_then(|request| make.map(|make| made(make, &request)).transpose())
+        .and_then(|made| serde_json::to_vec(&made).map_err(|e| e.to_string()));
+    let (status, bytes) = match made {
+        Ok(json) => (0, json),
+        Err(text) => (1, text.into_bytes()),
+    };
+    // SAFETY: the caller's.
+    unsafe { sink(context, bytes.as_ptr(), bytes.len()) }
+    status
+}
+
+/// What a function makes; a panic in it becomes an error.
+///
+/// # Errors
+/// The panic's message.
+pub fn made(make: Make, request: &Request) -> Result<Vec<Given>, String> {
+    std::panic::catch_unwind(|| make(request)).map_err(|payload| {
+        let words = payload
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| payload.downcast_ref::<&str>().copied())
+            .unwrap_or("no message");
+        format!("the function that makes its inputs panicked: {words}")
+    })
+}
+
 unsafe extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
     // SAFETY: `context` is the vector that this module passed; the bytes are the plug-in's.
     unsafe { (*context.cast::<Vec<u8>>()).extend_from_slice(slice::from_raw_parts(bytes, len)) }
@@ -275,6 +328,30 @@ impl Plugin {
     #[must_use]
     pub fn kernels(&self) -> &[Kernel] {
         &self.kernels
+    }
+
+    /// The inputs that entry point `index` has of its own; none without `inputs = …`.
+    ///
+    /// # Errors
+    /// What the plug-in reports, as text.
+    pub fn inputs(&self, index: usize, request: &Request) -> Result<Option<Vec<Given>>, String> {
+        let request = serde_json::to_vec(request).map_err(|e| e.to_string())?;
+        let mut bytes = Vec::<u8>::new();
+        // SAFETY: the request outlives the call; `collect` takes a vector.
+        let status = unsafe {
+            (self.exports.inputs)(
+                u32::try_from(index).unwrap_or(u32::MAX),
+                request.as_ptr(),
+                request.len(),
+                collect,
+                (&raw mut bytes).cast(),
+            )
+        };
+        if status == 0 {
+            serde_json::from_slice(&bytes).map_err(|e| e.to_string())
+        } else {
+            Err(String::from_utf8_lossy(&bytes).into_owned())
+        }
     }
 
     /// Runs entry point `index`.

@@ -13,8 +13,10 @@ use crate::moments::within;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
 #[repr(C)]
 pub struct FixedPoint {
-    /// The integer that stands for 1, from 1 to 16777216: see `FixedPoint::for_kernel`; default
-    /// 5891580, for kernels of at most 27 x 27 texels.
+    /// The integer that stands for 1: see `FixedPoint::for_kernel`. The default is for kernels of at
+    /// most 27 x 27 texels.
+    #[range(1..=16_777_216)]
+    #[default(5_891_580)]
     pub one: u32,
 }
 
@@ -79,7 +81,8 @@ pub struct Rectangle4 {
     pub before_column: Fixed4,
     /// The entry at the rectangle's last texel.
     pub last: Fixed4,
-    /// Texels of the rectangle, from 1 to 16777216; no more than the fixed point is for.
+    /// Texels of the rectangle; no more than the fixed point is for.
+    #[range(1..=16_777_216)]
     pub texels: u32,
 }
 
@@ -113,7 +116,8 @@ pub struct Rectangle6 {
     pub before_column: Fixed6,
     /// The entry at the rectangle's last texel.
     pub last: Fixed6,
-    /// Texels of the rectangle, from 1 to 16777216; no more than the fixed point is for.
+    /// Texels of the rectangle; no more than the fixed point is for.
+    #[range(1..=16_777_216)]
     pub texels: u32,
 }
 

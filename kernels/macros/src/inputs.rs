@@ -1,0 +1,431 @@
+//! What the numbers of a parameter or a field are like: attributes of their own, from which parity
+//! makes inputs and the command line takes defaults and units.
+//!
+//! Nothing else says it: neither a name nor a documentation comment.
+
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::quote;
+use syn::punctuated::Punctuated;
+use syn::spanned::Spanned;
+use syn::{Attribute, BinOp, Expr, ExprLit, Lit, LitInt, LitStr, Meta, RangeLimits, Token};
+
+/// The attributes' names.
+const WORDS: [&str; 10] = [
+    "range",
+    "magnitude",
+    "values",
+    "unit_vector",
+    "count_of",
+    "index_of",
+    "default",
+    "unit",
+    "length",
+    "size",
+];
+
+/// What attributes say of a parameter or a field.
+#[derive(Default)]
+pub struct Inputs {
+    /// Where its numbers lie, and the attribute that says so.
+    domain: Option<(Domain, Span)>,
+    default: Option<Expr>,
+    unit: Option<LitStr>,
+    /// Elements of a buffer.
+    length: Option<(Length, Span)>,
+    /// Texels of a texture.
+    size: Option<(Vec<u32>, Span)>,
+}
+
+enum Domain {
+    Range(Expr, Expr),
+    Magnitude(Expr, Expr),
+    Values(Vec<Expr>),
+    UnitVector,
+    CountOf(Ident),
+    IndexOf(Ident),
+}
+
+enum Length {
+    Between(u32, u32),
+    Of { param: Ident, times: u32, plus: i32 },
+}
+
+/// What numbers are asked of, for the checks.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Holder {
+    /// A field of a structure.
+    Field,
+    /// A parameter that is a buffer of elements.
+    Buffer,
+    /// A parameter that is a texture.
+    Texture,
+    /// Any other parameter with numbers.
+    Value,
+    /// A specialisation constant.
+    Constant,
+    /// A parameter without numbers of the caller's: a sampler, an index, counters, shared memory.
+    Nothing,
+}
+
+fn is_ours(attribute: &Attribute) -> bool {
+    attribute
+        .path()
+        .get_ident()
+        .is_some_and(|i| WORDS.iter().any(|w| i == w))
+}
+
+impl Inputs {
+    /// Takes the attributes that are this module's out of `attributes`.
+    pub fn take(attributes: &mut Vec<Attribute>) -> syn::Result<Self> {
+        let inputs = Self::parse(attributes)?;
+        attributes.retain(|a| !is_ours(a));
+        Ok(inputs)
+    }
+
+    /// Reads the attributes that are this module's.
+    pub fn parse(attributes: &[Attribute]) -> syn::Result<Self> {
+        let mut inputs = Self::default();
+        for attribute in attributes.iter().filter(|a| is_ours(a)) {
+            inputs.add(attribute)?;
+        }
+        Ok(inputs)
+    }
+
+    fn add(&mut self, attribute: &Attribute) -> syn::Result<()> {
+        let word = attribute.path().require_ident()?.to_string();
+        let span = attribute.span();
+        let twice = || {
+            Err(syn::Error::new(
+                span,
+                format!("`{word}` is said twice: keep one of them"),
+            ))
+        };
+        let domain = match word.as_str() {
+            "range" => {
+                let (least, most) = range(attribute)?;
+                Domain::Range(least, most)
+            }
+            "magnitude" => {
+                let (least, most) = range(attribute)?;
+                Domain::Magnitude(least, most)
+            }
+            "values" => {
+                let parse = Punctuated::<Expr, Token![,]>::parse_terminated;
+                let values: Vec<Expr> = attribute.parse_args_with(parse)?.into_iter().collect();
+                if values.is_empty() {
+                    return Err(syn::Error::new(
+                        span,
+                        "write the values: #[values(0, 1, 2)]",
+                    ));
+                }
+                Domain::Values(values)
+            }
+            "unit_vector" => {
+                attribute.meta.require_path_only()?;
+                Domain::UnitVector
+            }
+            "count_of" => Domain::CountOf(attribute.parse_args()?),
+            "index_of" => Domain::IndexOf(attribute.parse_args()?),
+            "default" => {
+                let value = attribute.parse_args()?;
+                return match self.default.replace(value) {
+                    None => Ok(()),
+                    Some(_) => twice(),
+                };
+            }
+            "unit" => {
+                let text = match &attribute.meta {
+                    Meta::NameValue(it) => match &it.value {
+                        Expr::Lit(ExprLit {
+                            lit: Lit::Str(text),
+                            ..
+                        }) => Some(text.clone()),
+                        _ => None,
+                    },
+                    _ => None,
+                };
+                let text = text
+                    .filter(|t| !t.value().trim().is_empty())
+                    .ok_or_else(|| syn::Error::new(span, "write the unit as #[unit = \"m\"]"))?;
+                return match self.unit.replace(text) {
+                    None => Ok(()),
+                    Some(_) => twice(),
+                };
+            }
+            "length" => {
+                let length = length(&attribute.parse_args()?)?;
+                return match self.length.replace((length, span)) {
+                    None => Ok(()),
+                    Some(_) => twice(),
+                };
+            }
+            _ => {
+                let parse = Punctuated::<LitInt, Token![,]>::parse_terminated;
+                let size = attribute
+                    .parse_args_with(parse)?
+                    .iter()
+                    .map(LitInt::base10_parse)
+                    .collect::<syn::Result<Vec<u32>>>()?;
+                if !(2..=3).contains(&size.len()) || size.iter().any(|n| !(1..=4096).contains(n)) {
+                    return Err(syn::Error::new(
+                        span,
+                        "a texture's size is 2 or 3 numbers of texels, 1 to 4096 each: #[size(64, 32)]",
+                    ));
+                }
+                return match self.size.replace((size, span)) {
+                    None => Ok(()),
+                    Some(_) => twice(),
+                };
+            }
+        };
+        match self.domain.replace((domain, span)) {
+            None => Ok(()),
+            Some(_) => Err(syn::Error::new(
+                span,
+                "range, magnitude, values, unit_vector, count_of and index_of exclude each other: keep one of them",
+            )),
+        }
+    }
+
+    /// Refuses what would mean nothing where it stands. `params` are the names that lengths may
+    /// refer to: of the kernel's buffers and textures.
+    pub fn check(&self, holder: Holder, params: &[&Ident]) -> syn::Result<()> {
+        let error = |span: Span, text: &str| Err(syn::Error::new(span, text));
+        let named = |param: &Ident| {
+            if holder == Holder::Field || params.contains(&param) {
+                return Ok(());
+            }
+            let known: Vec<String> = params.iter().map(|p| format!("`{p}`")).collect();
+            Err(syn::Error::new(
+                param.span(),
+                format!(
+                    "the kernel has no buffer or texture `{param}`; it has {}",
+                    if known.is_empty() {
+                        "none".into()
+                    } else {
+                        known.join(", ")
+                    }
+                ),
+            ))
+        };
+        if let Some((domain, span)) = &self.domain {
+            match domain {
+                _ if holder == Holder::Nothing => {
+                    return error(
+                        *span,
+                        "this parameter has no numbers that inputs are made for",
+                    );
+                }
+                Domain::UnitVector if matches!(holder, Holder::Texture | Holder::Constant) => {
+                    return error(*span, "only vectors have a length");
+                }
+                Domain::CountOf(_) | Domain::IndexOf(_) if holder == Holder::Texture => {
+                    return error(*span, "a texture's channels are no counts");
+                }
+                Domain::CountOf(param) | Domain::IndexOf(param) => named(param)?,
+                _ => {}
+            }
+        }
+        if let (Some(default), Holder::Buffer | Holder::Texture | Holder::Nothing) =
+            (&self.default, holder)
+        {
+            return error(default.span(), "only a uniform's numbers have a default");
+        }
+        if let Some((length, span)) = &self.length {
+            if holder != Holder::Buffer {
+                return error(*span, "only a buffer has a length");
+            }
+            if let Length::Of { param, .. } = length {
+                named(param)?;
+            }
+        }
+        match &self.size {
+            Some((_, span)) if holder != Holder::Texture => {
+                error(*span, "only a texture has a size in texels")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The record of it, a `describe::Inputs`.
+    pub fn describe(&self) -> TokenStream {
+        let domain = match &self.domain {
+            None => quote!(None),
+            Some((domain, span)) => {
+                let made = match domain {
+                    Domain::Range(least, most) => {
+                        let (a, b) = (number(least), number(most));
+                        let ends = ordered(*span, &a, &b, "range", &quote!(true));
+                        quote!(Range { least: #ends[0], most: #ends[1] })
+                    }
+                    Domain::Magnitude(least, most) => {
+                        let (a, b) = (number(least), number(most));
+                        let ends = ordered(*span, &a, &b, "magnitude", &quote!(ENDS[0] > 0.0));
+                        quote!(Magnitude { least: #ends[0], most: #ends[1] })
+                    }
+                    Domain::Values(values) => {
+                        let values = values.iter().map(number);
+                        quote!(Values { values: [#(#values),*].into() })
+                    }
+                    Domain::UnitVector => quote!(UnitVector),
+                    Domain::CountOf(param) => {
+                        let param = param.to_string();
+                        quote!(CountOf { param: #param.into() })
+                    }
+                    Domain::IndexOf(param) => {
+                        let param = param.to_string();
+                        quote!(IndexOf { param: #param.into() })
+                    }
+                };
+                quote!(Some(describe::Domain::#made))
+            }
+        };
+        let default = match &self.default {
+            None => quote!(None),
+            Some(value) => {
+                let value = number(value);
+                quote!(Some(#value))
+            }
+        };
+        let unit = match &self.unit {
+            None => quote!(None),
+            Some(unit) => quote!(Some(#unit.into())),
+        };
+        let length = match &self.length {
+            None => quote!(None),
+            Some((Length::Between(least, most), _)) => {
+                quote!(Some(describe::Length::Between { least: #least, most: #most }))
+            }
+            Some((Length::Of { param, times, plus }, _)) => {
+                let param = param.to_string();
+                quote!(Some(describe::Length::Of { param: #param.into(), times: #times, plus: #plus }))
+            }
+        };
+        let size = match &self.size {
+            None => quote!(None),
+            Some((size, _)) => {
+                let mut size = size.clone();
+                size.resize(3, 1);
+                quote!(Some([#(#size),*]))
+            }
+        };
+        quote! {
+            describe::Inputs {
+                domain: #domain,
+                default: #default,
+                unit: #unit,
+                length: #length,
+                size: #size,
+            }
+        }
+    }
+}
+
+/// An expression as `f64`. A literal without a type would become an `i32` first, which may be too
+/// small for it.
+fn number(expression: &Expr) -> TokenStream {
+    match expression {
+        Expr::Lit(ExprLit {
+            lit: Lit::Int(n), ..
+        }) if n.suffix().is_empty() => {
+            let n = syn::LitFloat::new(&format!("{}.0", n.base10_digits()), n.span());
+            quote!(#n)
+        }
+        Expr::Unary(unary) if matches!(unary.op, syn::UnOp::Neg(_)) => {
+            let inner = number(&unary.expr);
+            quote!(-#inner)
+        }
+        other => quote!((#other) as f64),
+    }
+}
+
+/// Two ends that are checked at compile time.
+fn ordered(
+    span: Span,
+    least: &TokenStream,
+    most: &TokenStream,
+    word: &str,
+    also: &TokenStream,
+) -> TokenStream {
+    let message = if word == "range" {
+        "a range's first number is not above its second, and both are finite"
+    } else {
+        "a magnitude lies between two finite positive numbers, the smaller one first"
+    };
+    quote::quote_spanned! {span=>
+        {
+            const ENDS: [f64; 2] = [#least, #most];
+            const _: () = assert!(
+                ENDS[0] <= ENDS[1] && ENDS[0].is_finite() && ENDS[1].is_finite() && #also,
+                #message
+            );
+            ENDS
+        }
+    }
+}
+
+/// `A..=B`.
+fn range(attribute: &Attribute) -> syn::Result<(Expr, Expr)> {
+    let expected = "write both ends and what lies between: `0.0..=1.0`";
+    match attribute.parse_args::<Expr>()? {
+        Expr::Range(range) => match (range.start, range.limits, range.end) {
+            (Some(least), RangeLimits::Closed(_), Some(most)) => Ok((*least, *most)),
+            _ => Err(syn::Error::new(attribute.span(), expected)),
+        },
+        other => Err(syn::Error::new(other.span(), expected)),
+    }
+}
+
+/// `7`, `1..=64`, `other`, `other * 3`, `other + 1`, `other - 1`.
+fn length(expression: &Expr) -> syn::Result<Length> {
+    let number = |e: &Expr| match e {
+        Expr::Lit(ExprLit {
+            lit: Lit::Int(n), ..
+        }) => n.base10_parse::<u32>().ok().filter(|n| *n <= 1 << 20),
+        _ => None,
+    };
+    let name = |e: &Expr| match e {
+        Expr::Path(path) => path.path.get_ident().cloned(),
+        _ => None,
+    };
+    let made = match expression {
+        Expr::Lit(_) => number(expression).map(|n| Length::Between(n, n)),
+        Expr::Path(_) => name(expression).map(|param| Length::Of {
+            param,
+            times: 1,
+            plus: 0,
+        }),
+        Expr::Range(range) => match (&range.start, range.limits, &range.end) {
+            (Some(a), RangeLimits::Closed(_), Some(b)) => match (number(a), number(b)) {
+                (Some(a), Some(b)) if a <= b => Some(Length::Between(a, b)),
+                _ => None,
+            },
+            _ => None,
+        },
+        Expr::Binary(binary) => match (name(&binary.left), number(&binary.right), binary.op) {
+            (Some(param), Some(times), BinOp::Mul(_)) => Some(Length::Of {
+                param,
+                times,
+                plus: 0,
+            }),
+            (Some(param), Some(n), BinOp::Add(_)) => Some(Length::Of {
+                param,
+                times: 1,
+                plus: n as i32,
+            }),
+            (Some(param), Some(n), BinOp::Sub(_)) => Some(Length::Of {
+                param,
+                times: 1,
+                plus: -(n as i32),
+            }),
+            _ => None,
+        },
+        _ => None,
+    };
+    made.ok_or_else(|| {
+        syn::Error::new(
+            expression.span(),
+            "a length is a number up to 1048576, a range `1..=64`, or another buffer's: `other`, `other * 3`, `other + 1`",
+        )
+    })
+}

@@ -1,0 +1,276 @@
+//! Shadow maps of a small scene, as the frame's passes make them: depths of a plane with boxes and
+//! a slanted wall, four samples in each texel; their moments, filtered and stored; and fragments on
+//! what casts and receives the shadows.
+
+use std::vec::Vec;
+
+use hankel_dsl::glam::{IVec2, Vec3, Vec4};
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_dsl::native::inputs::{Given, Request, Source};
+use hankel_dsl::native::{Address, Filter, Sampler};
+use hankel_moments::bias::{Bias, CLAMPED_4_16, SYMMETRIC_4_16, SYMMETRIC_4_32};
+use hankel_moments::{Moments4, from_unorm, quantize_symmetric_4, quantize_unit_4, to_unorm};
+
+use crate::blur::Direction;
+use crate::shade::{Light, encoding};
+
+/// Texels of a map.
+const SIZE: [u32; 2] = [61, 37];
+/// Samples of a texel.
+const SAMPLES: usize = 4;
+/// Fragments of a run.
+const FRAGMENTS: usize = 1009;
+
+/// The boxes' ends along u and v, and their depths.
+const BOXES: [[f64; 5]; 4] = [
+    [0.1, 0.35, 0.2, 0.6, 0.3],
+    [0.3, 0.5, 0.4, 0.9, 0.5],
+    [0.6, 0.62, 0.1, 0.95, 0.2],
+    [0.7, 0.95, 0.15, 0.4, 0.62],
+];
+
+/// The depth that the light sees at a place of the map, from 0 to 1.
+fn depth(u: f64, v: f64) -> f64 {
+    let ground = 0.75 + 0.2 * v;
+    let wall = if u > 0.8 { 0.45 + 0.5 * (1.0 - u) } else { 1.0 };
+    let mut nearest = f64::min(ground, wall);
+    for [left, right, top, bottom, depth] in BOXES {
+        if (left..right).contains(&u) && (top..bottom).contains(&v) {
+            nearest = nearest.min(depth);
+        }
+    }
+    nearest
+}
+
+/// Depths of the samples of each texel, together.
+fn samples() -> Vec<f64> {
+    // Where 4x multisampling looks, in sixteenths of a texel.
+    const AT: [[f64; 2]; SAMPLES] = [[6.0, 2.0], [14.0, 6.0], [2.0, 10.0], [10.0, 14.0]];
+    let [width, height] = SIZE;
+    let mut all = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            all.extend(AT.map(|[dx, dy]| {
+                depth(
+                    (f64::from(x) + dx / 16.0) / f64::from(width),
+                    (f64::from(y) + dy / 16.0) / f64::from(height),
+                )
+            }));
+        }
+    }
+    all
+}
+
+/// How a map holds moments, and the bias that is published for it.
+fn published(how: u32) -> Bias {
+    match how {
+        encoding::UNIT => CLAMPED_4_16,
+        encoding::SYMMETRIC => SYMMETRIC_4_16,
+        _ => SYMMETRIC_4_32,
+    }
+}
+
+/// A sum of moments, weighted.
+fn plus(a: Moments4<f64>, w: f64, b: Moments4<f64>) -> Moments4<f64> {
+    Moments4 {
+        b1: a.b1 + w * b.b1,
+        b2: a.b2 + w * b.b2,
+        b3: a.b3 + w * b.b3,
+        b4: a.b4 + w * b.b4,
+    }
+}
+
+/// The texels of a map, filtered over 3 x 3 texels and stored as `how` says.
+fn texels(how: u32) -> Vec<Vec4> {
+    let all = samples();
+    let [width, height] = SIZE.map(|n| n as i32);
+    let zero = Moments4::of_depth(0.0);
+    let texel = |x: i32, y: i32| {
+        let i = (y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize * SAMPLES;
+        all[i..i + SAMPLES].iter().fold(zero, |sum, &z| {
+            let z = if how == encoding::UNIT {
+                z
+            } else {
+                2.0 * z - 1.0
+            };
+            plus(sum, 1.0 / SAMPLES as f64, Moments4::of_depth(z))
+        })
+    };
+    let mut map = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = zero;
+            for dy in -1..=1 {
+                for dx in -1..=1_i32 {
+                    let weight = |d: i32| if d == 0 { 0.5 } else { 0.25 };
+                    sum = plus(sum, weight(dx) * weight(dy), texel(x + dx, y + dy));
+                }
+            }
+            map.push(stored(how, sum));
+        }
+    }
+    map
+}
+
+/// Moments as a map stores them: 16 bits in the optimised basis, or floats.
+fn stored(how: u32, m: Moments4<f64>) -> Vec4 {
+    let q = match how {
+        encoding::UNIT => quantize_unit_4(m),
+        encoding::SYMMETRIC => quantize_symmetric_4(m),
+        _ => return Vec4::new(m.b1 as f32, m.b2 as f32, m.b3 as f32, m.b4 as f32),
+    };
+    let channel = |x: f64| from_unorm::<f64, 16>(to_unorm::<f64, 16>(x)) as f32;
+    Vec4::new(channel(q.r), channel(q.g), channel(q.b), channel(q.a))
+}
+
+/// A light whose map's coordinates are the world's x and z, each from 0 to 1, and whose depth is y.
+fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32) -> Light {
+    let target = bias.four();
+    Light {
+        row_u: Vec4::new(1.0, 0.0, 0.0, 0.0),
+        row_v: Vec4::new(0.0, 0.0, 1.0, 0.0),
+        row_depth: Vec4::new(0.0, 1.0, 0.0, 0.0),
+        toward: Vec4::new(0.36, -0.8, 0.48, 2.5),
+        ambient: Vec4::new(0.1, 0.12, 0.15, 0.0),
+        bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
+        moment_bias,
+        depth_bias,
+        light_leak: 0.02,
+        filter_radius: radius,
+    }
+}
+
+/// Fragments on the surfaces of the scene, just before and behind them, in the shadows of the boxes,
+/// and beyond the map.
+fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
+    let (mut world, mut normals, mut colours) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..FRAGMENTS {
+        let (u, v) = match s.count(0, 7) {
+            0 => (s.between(-0.3, 1.3), s.between(-0.3, 1.3)),
+            // Along an edge of a box.
+            1 => {
+                let [left, right, top, bottom, _] = s.pick(&BOXES);
+                (
+                    s.pick(&[left, right]) + s.between(-0.03, 0.03),
+                    s.between(top, bottom),
+                )
+            }
+            _ => (s.between(0.0, 1.0), s.between(0.0, 1.0)),
+        };
+        let ground = 0.75 + 0.2 * v;
+        let z = match s.count(0, 4) {
+            0 => depth(u, v),
+            1 => depth(u, v) + s.sign() * s.magnitude(-5.0, -2.0),
+            2 => s.between(0.0, 1.0),
+            _ => ground,
+        };
+        world.push(Vec3::new(u as f32, z as f32, v as f32));
+        let n = Vec3::new(s.normal() as f32, s.normal() as f32, s.normal() as f32);
+        let up = Vec3::new(0.0, -1.0, 0.0);
+        normals.push(if n.length() > 1e-3 { n.normalize() } else { up });
+        let mut channel = || s.between(0.0, 1.0) as f32;
+        colours.push(Vec3::new(channel(), channel(), channel()));
+    }
+    [world, normals, colours]
+}
+
+/// What shading with a map of moments reads, for the map's `encoding`.
+#[must_use]
+pub fn shaded(request: &Request) -> Vec<Given> {
+    let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
+    let bias = published(how);
+    let map = texels(how);
+    let mut s = Source::new(request.seed);
+    [
+        ("a map's bias as published", bias.strength as f32, 1e-3),
+        (
+            "ten times the published bias",
+            10.0 * bias.strength as f32,
+            0.0,
+        ),
+    ]
+    .into_iter()
+    .map(|(what, moment_bias, depth_bias)| {
+        let [world, normals, colours] = fragments(&mut s);
+        Given::new(what)
+            .buffer("world", &world)
+            .buffer("normal", &normals)
+            .buffer("colour", &colours)
+            .uniform("light", &light(&bias, moment_bias, depth_bias, 1))
+            .texture(
+                "map",
+                SIZE,
+                1,
+                TexelFormat::Rgba32Float,
+                map.iter().copied(),
+            )
+            .sampler(
+                "sampler",
+                Sampler {
+                    filter: Filter::Linear,
+                    address: Address::ClampToEdge,
+                },
+            )
+    })
+    .collect()
+}
+
+/// What shading with a map of depths reads.
+#[must_use]
+pub fn shaded_depths(request: &Request) -> Vec<Given> {
+    let mut s = Source::new(request.seed);
+    let map = samples();
+    [0, 1, 3]
+        .into_iter()
+        .map(|radius| {
+            let [world, normals, colours] = fragments(&mut s);
+            Given::new("a map of depths")
+                .buffer("world", &world)
+                .buffer("normal", &normals)
+                .buffer("colour", &colours)
+                .uniform("light", &light(&SYMMETRIC_4_32, 0.0, 1e-3, radius))
+                .texture(
+                    "depth",
+                    SIZE,
+                    SAMPLES as u32,
+                    TexelFormat::R32Float,
+                    map.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
+                )
+        })
+        .collect()
+}
+
+/// Depths of several samples.
+#[must_use]
+pub fn depths(_: &Request) -> Vec<Given> {
+    let texels = samples();
+    let texels = texels.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0));
+    let given = Given::new("a map of depths");
+    [given.texture("depth", SIZE, SAMPLES as u32, TexelFormat::R32Float, texels)].into()
+}
+
+/// A map and the weights of a filter.
+#[must_use]
+pub fn blurred(_: &Request) -> Vec<Given> {
+    let map = texels(encoding::SYMMETRIC);
+    [(IVec2::X, 0.75_f64), (IVec2::Y, 1.5)]
+        .into_iter()
+        .map(|(step, sigma)| {
+            let raw: Vec<f64> = (0..5)
+                .map(|i| (-0.5 * (f64::from(i) / sigma).powi(2)).exp())
+                .collect();
+            let total = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
+            let weights: Vec<f32> = raw.iter().map(|w| (w / total) as f32).collect();
+            Given::new("a map of moments")
+                .uniform("direction", &Direction { step })
+                .buffer("weights", &weights)
+                .texture(
+                    "source",
+                    SIZE,
+                    1,
+                    TexelFormat::Rgba32Float,
+                    map.iter().copied(),
+                )
+        })
+        .collect()
+}
