@@ -55,10 +55,11 @@ fn least_pivot(m: &[f64], n: usize) -> f64 {
         if a[k][k] < 1e-11 {
             return least;
         }
-        for i in k + 1..=n {
-            let factor = a[i][k] / a[k][k];
-            for j in k..=n {
-                a[i][j] -= factor * a[k][j];
+        let (pivots, below) = a.split_at_mut(k + 1);
+        for row in below {
+            let factor = row[k] / pivots[k][k];
+            for (x, pivot) in row[k..].iter_mut().zip(&pivots[k][k..]) {
+                *x -= factor * pivot;
             }
         }
     }

@@ -82,8 +82,8 @@ fn the_table_of_kernels_is_current() {
             name += ", `_f64`";
         }
         let stage = match &kernel.stage {
-            Stage::Vertex { .. } => "vertex".to_owned(),
-            Stage::Fragment { .. } => "fragment".to_owned(),
+            Stage::Vertex => "vertex".to_owned(),
+            Stage::Fragment => "fragment".to_owned(),
             Stage::Compute { dimensions, .. } => format!("compute {dimensions}-D"),
         };
         let numbers = |of: &dyn Fn(&hankel_codegen::cost::Cost) -> u32| {

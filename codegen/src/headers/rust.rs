@@ -56,7 +56,7 @@ pub fn module(layouts: &Layouts, kernels: &BTreeMap<String, KernelEntry>) -> Str
                 field.name, field.offset
             );
         }
-        bytes(&mut text, layouts, name, layout);
+        bytes(&mut text, name, layout);
     }
     for (name, kernel) in kernels {
         of_kernel(&mut text, name, kernel);
@@ -65,7 +65,7 @@ pub fn module(layouts: &Layouts, kernels: &BTreeMap<String, KernelEntry>) -> Str
 }
 
 /// `to_bytes`, by the offsets that the shaders read at.
-fn bytes(text: &mut String, layouts: &Layouts, name: &str, layout: &Layout) {
+fn bytes(text: &mut String, name: &str, layout: &Layout) {
     let _ = write!(
         text,
         "impl {name} {{\n    /// The bytes that a shader reads; padding is 0.\n    #[must_use]\n    \
@@ -74,13 +74,13 @@ fn bytes(text: &mut String, layouts: &Layouts, name: &str, layout: &Layout) {
     );
     for field in &layout.fields {
         let (value, at) = (format!("self.{}", field.name), field.offset.to_string());
-        put(text, layouts, &field.ty, &value, &at, 2);
+        put(text, &field.ty, &value, &at, 2);
     }
     text.push_str("        bytes\n    }\n}\n");
 }
 
 /// Writes `value`, of type `ty`, at `at` of `bytes`.
-fn put(text: &mut String, layouts: &Layouts, ty: &Type, value: &str, at: &str, depth: usize) {
+fn put(text: &mut String, ty: &Type, value: &str, at: &str, depth: usize) {
     let indent = "    ".repeat(depth);
     let each = |text: &mut String, stride: u32, inner: &dyn Fn(&mut String, &str, &str)| {
         let (item, start) = (format!("item{depth}"), format!("at{depth}"));
@@ -96,7 +96,7 @@ fn put(text: &mut String, layouts: &Layouts, ty: &Type, value: &str, at: &str, d
         Type::Vector { scalar, .. } => {
             each(text, scalar_size(*scalar), &|text, item, start| {
                 let ty = Type::Scalar { scalar: *scalar };
-                put(text, layouts, &ty, item, start, depth + 1);
+                put(text, &ty, item, start, depth + 1);
             });
         }
         Type::Array {
@@ -109,9 +109,9 @@ fn put(text: &mut String, layouts: &Layouts, ty: &Type, value: &str, at: &str, d
                         scalar,
                         size: count,
                     };
-                    put(text, layouts, &ty, item, start, depth + 1);
+                    put(text, &ty, item, start, depth + 1);
                 }
-                None => put(text, layouts, element, item, start, depth + 1),
+                None => put(text, element, item, start, depth + 1),
             }
         }),
         Type::Scalar { .. } | Type::Struct { .. } => {

@@ -680,7 +680,8 @@ fn cost() {
         });
         best.fold(f64::INFINITY, f64::min) * 1e9 / xs.len() as f64
     };
-    let library: [(&str, fn(f32) -> f32); 16] = [
+    type Named = (&'static str, fn(f32) -> f32);
+    let library: [Named; 16] = [
         ("sin", f32::sin),
         ("cos", f32::cos),
         ("tan", f32::tan),

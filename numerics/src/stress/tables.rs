@@ -100,8 +100,8 @@ impl Stress {
             .collect();
         let headings = orders.iter().map(|n| Column::number(format!("n = {n}")));
         let mut table = Table::new(
-            &format!("over-{}", solver.name()),
-            &format!(
+            format!("over-{}", solver.name()),
+            format!(
                 "Error over sensitivity of the {} solver: the greatest of all valid rows. The \
                  sensitivity is what rounding each number of the row and the result once does to the \
                  answer (nothing: no valid rows, or another number of moments)",

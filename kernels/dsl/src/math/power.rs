@@ -147,7 +147,7 @@ fn precise_log2<R: Elementary>(x: R) -> (R, R) {
     let low = error + ((s_low + s_low) + (second_low + tail));
     let (base, base_low): (R, R) = if R::IS_WIDE {
         (
-            lit!(1.442_695_040_888_963_4),
+            lit!(core::f64::consts::LOG2_E),
             lit!(2.035_527_374_093_103_3e-17),
         )
     } else {

@@ -236,8 +236,8 @@ pub fn double(x: f64) -> (f64, f64, f64) {
     let word = |i: usize| (((product[i] << 2) | (product[i - 1] >> 30)) ^ flip) as f64;
     let a = word(6) * 2.328_306_436_538_696_3e-10;
     let b = word(5) * 5.421_010_862_427_522e-20;
-    let c = word(4) * 1.262_177_448_353_618_9e-29;
-    let d = word(3) * 2.938_735_877_055_718_8e-39;
+    let c = word(4) * 1.262_177_448_353_619e-29;
+    let d = word(3) * 2.938_735_877_055_719e-39;
     let (sum, error) = a.two_sum(b);
     let (sum, rest) = sum.two_sum(error + c);
     let (high, low) = times_quarter(sum, rest + d);

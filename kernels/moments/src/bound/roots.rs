@@ -122,7 +122,11 @@ fn from_outside<R: Real, const DEGREE: usize>(e: &Monic<R>) -> R {
     let less = whole::<R>(DEGREE - 1);
     let square = less * (less * (e[1] * e[1]) - whole::<R>(2 * DEGREE) * e[2]);
     let v = -(e[1] + square.max(zero).sqrt()) * (one / whole::<R>(DEGREE));
-    let sign = if const { DEGREE % 2 == 0 } { one } else { -one };
+    let sign = if const { DEGREE.is_multiple_of(2) } {
+        one
+    } else {
+        -one
+    };
     approach::<R, DEGREE>(e, v, one, sign, v, one)
 }
 
@@ -160,7 +164,11 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
     });
     let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
     // Between both, the polynomial has the sign that it does not have on the left.
-    let sign = if const { DEGREE % 2 == 0 } { -one } else { one };
+    let sign = if const { DEGREE.is_multiple_of(2) } {
+        -one
+    } else {
+        one
+    };
     (
         approach::<R, DEGREE>(e, between, -one, sign, -one, zero),
         approach::<R, DEGREE>(e, between, one, sign, -one, zero),
@@ -204,7 +212,7 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
                         (high, -one)
                     };
                     // Above root i for all but the last, below that.
-                    let sign = if const { i + 1 == d || (d + i) % 2 == 0 } {
+                    let sign = if const { i + 1 == d || (d + i).is_multiple_of(2) } {
                         -one
                     } else {
                         one

@@ -407,10 +407,11 @@ mod tests {
             if a[k][k] < 1e-12 {
                 return true;
             }
-            for i in k + 1..=n {
-                let factor = a[i][k] / a[k][k];
-                for j in k..=n {
-                    a[i][j] -= factor * a[k][j];
+            let (pivots, below) = a.split_at_mut(k + 1);
+            for row in below {
+                let factor = row[k] / pivots[k][k];
+                for (x, pivot) in row[k..].iter_mut().zip(&pivots[k][k..]) {
+                    *x -= factor * pivot;
                 }
             }
         }
