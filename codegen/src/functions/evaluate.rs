@@ -2382,6 +2382,9 @@ impl<'a> Evaluator<'a> {
             let b = rest.first().and_then(Value::as_int);
             match (name, b) {
                 ("saturating_sub", Some(b)) => return Ok(Value::Int((a - b).max(0))),
+                ("is_multiple_of", Some(b)) => {
+                    return Ok(Value::bool(a.checked_rem(b).unwrap_or(*a) == 0));
+                }
                 ("min", Some(b)) => return Ok(Value::Int(*a.min(&b))),
                 ("max", Some(b)) => return Ok(Value::Int(*a.max(&b))),
                 ("pow", Some(b)) => {

@@ -14,10 +14,19 @@ use crate::error::{Failure, Step};
 /// WebGPU's feature for storage textures of more formats.
 const MORE_FORMATS: &str = "texture-formats-tier1";
 
+/// The largest f32, as naga writes it.
+const LARGEST_AS_WRITTEN: &str = "340282350000000000000000000000000000000";
+
+/// Its digits.
+const LARGEST: &str = "340282346638528859811704183484516925440";
+
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let ir = job.ir;
     let source = wgsl::write_string(&ir.module, &ir.info, wgsl::WriterFlags::empty())
         .map_err(|error| job.failure(&error))?;
+    // naga writes the shortest digits that round to the largest f32. They are above it, which Tint
+    // refuses; these are all of its digits.
+    let source = source.replace(LARGEST_AS_WRITTEN, LARGEST);
     let read = read_back(&source, &job.kernel.name)?;
     if !can_be_set(&read) {
         return Ok(Written::Unsettable);
@@ -122,4 +131,24 @@ fn read_back(source: &str, name: &str) -> Result<(Module, ModuleInfo), Failure> 
     })?;
     let info = validate(&module, name).map_err(|failure| Failure { step, ..failure })?;
     Ok((module, info))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LARGEST, LARGEST_AS_WRITTEN};
+
+    #[test]
+    fn the_largest_number_is_written_whole() {
+        assert_eq!(f32::MAX.to_string(), LARGEST_AS_WRITTEN);
+        assert_eq!(
+            f64::from(f32::MAX).to_string(),
+            "340282346638528860000000000000000000000"
+        );
+        // Both round to it; only one of them is not above it.
+        assert_eq!(LARGEST.parse(), Ok(f32::MAX));
+        assert_eq!(
+            LARGEST.parse(),
+            Ok((2.0_f64 - 2.0_f64.powi(-23)) * 2.0_f64.powi(127))
+        );
+    }
 }

@@ -550,9 +550,9 @@ vertex Out corner(In in [[stage_in]], uint i [[vertex_id]], constant Map& map [[
                 "x [ 2 ]",
             ),
             (
-                "struct S { float x [[depth(any)]]; }; fragment S f() {}",
+                "struct S { float x [[stencil]]; }; fragment S f() {}",
                 "f",
-                "depth",
+                "stencil",
             ),
             ("fragment metal::float4 f() {}", "f", "metal :: float4"),
             ("kernel void f() {} kernel void f() {}", "f", "two"),

@@ -203,7 +203,8 @@ pub struct Checker {
     parity(
         ulp = 0,
         absolute = 4e-3,
-        why = "one step of the format: rounding of a tie is the driver's choice"
+        non_finite,
+        why = "one step of the format: rounding of a tie is the driver's choice; 16 bits overflow"
     )
 )]
 pub fn checker(#[index] at: UVec2, #[uniform] checker: &Checker) -> Vec4 {
