@@ -187,7 +187,8 @@ fn entry(function: &Function) -> KernelEntry {
         tolerance: Tolerance {
             ulp: 0,
             absolute: 0.0,
-            non_finite: false,
+            // Sums and products of hostile rows overflow.
+            non_finite: true,
             why: String::new(),
         },
         rounding: Rounding::Pinned,
@@ -645,7 +646,12 @@ fn on_the_processor(name: &str, program: &str, compile: impl FnOnce(&Path, &Path
             let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
             let (x, y) = (number(a), number(b));
             assert!(
-                a == b || x == y || (x.is_nan() && y.is_nan()),
+                a == b
+                    || x == y
+                    || (x.is_nan() && y.is_nan())
+                    // The error of a product is a sum of partial products in the texts, which
+                    // underflow where the native ones, taken in 64 bits, do not.
+                    || (x - y).abs() < f32::MIN_POSITIVE,
                 "{name}: {function}, word {i}: {x:e} for {y:e}"
             );
         }
