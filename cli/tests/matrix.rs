@@ -204,7 +204,7 @@ fn misuse_is_explained() {
         .says(2, &["metal", "msl"]);
     desk.hankel("parity --matrix --require metal", &[])
         .says(2, &["metal", "msl"]);
-    desk.hankel("parity --html page.html", &[])
+    desk.hankel("parity --require msl", &[])
         .says(2, &["--matrix"]);
     desk.hankel("parity --matrix --limit 0", &[])
         .says(2, &["0"]);

@@ -79,14 +79,22 @@ fn errors_of_easy_rows_are_rounding_errors() {
 fn compensated_bounds_are_as_exact_as_their_inputs() {
     let stress = native(&options(&[], 1000));
     let mut cells = 0;
+    let mut beyond = Vec::new();
     for c in &stress.cells {
         let Some(over) = c.over.filter(|_| c.solver == Solver::Compensated) else {
             continue;
         };
         let key = (&c.family, c.n, c.precision, &c.backend, c.worst);
-        assert!(over.greatest <= 4.0, "{key:?}: {over:?}");
+        // Beyond the range that the bounds are stated for: squares of these depths are subnormal.
+        if c.family == "denormal" {
+            continue;
+        }
+        if over.greatest > 4.0 {
+            beyond.push(format!("{key:?}: {over:?}"));
+        }
         cells += 1;
     }
+    assert!(beyond.is_empty(), "{}", beyond.join("\n"));
     // By family, n, format and backend.
     assert!(cells > 300, "{cells}");
 }
