@@ -103,7 +103,7 @@ fn limits(speed: &Speed) {
 
 /// Errors are those of a working kernel.
 fn errors(speed: &Speed) {
-    assert_eq!(speed.errors.len(), 2 * 2 * (1 + 2));
+    assert_eq!(speed.errors.len(), 2 * 2 * (2 + 2));
     for e in &speed.errors {
         assert_eq!(e.not_finite, 0, "{e:?}");
         assert!(e.rows > 250, "{e:?}");
