@@ -44,7 +44,7 @@ use syn::parse_macro_input;
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
 /// | `#[texture] x: Texture2d<'_>` | also `Texture2dMultisampled`, `Texture3d` |
-/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of [`format`](mod@format) |
+/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of `format` |
 /// | `#[sampler] x: Sampler` | a sampler |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
@@ -52,7 +52,7 @@ use syn::parse_macro_input;
 /// | `#[local_index] x: u32` | the invocation's number in its workgroup |
 /// | `#[shared] x: Shared<'_, T, N>` | memory of the workgroup; `SharedAtomics<'_, u32, N>` (or `i32`) for atomic operations |
 /// | `#[attribute] x: Vec3` | a vertex attribute |
-/// | `#[varying] x: Vec3` | an interpolated value; integers and [`Flat<f32>`](struct@Flat) are that of one vertex |
+/// | `#[varying] x: Vec3` | an interpolated value; integers and `Flat<f32>` are that of one vertex |
 /// | `#[vertex_index]`, `#[instance_index] x: u32` | the vertex's number, its instance's |
 /// | `#[frag_coord] x: Vec3` | the centre of the fragment's pixel in the target, and its depth |
 /// | `#[front_facing] x: bool` | whether the fragment's primitive faces the viewer |
@@ -60,8 +60,8 @@ use syn::parse_macro_input;
 ///
 /// A compute kernel returns what it computes, or a tuple of it; or nothing, if it writes to its
 /// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
-/// fragment kernel one colour or a tuple of them, among which may be a [`Depth`](struct@Depth). It may
-/// [`discard`](fn@discard) the fragment and take derivatives ([`dpdx`](fn@dpdx)).
+/// fragment kernel one colour or a tuple of them, among which may be a `Depth`. It may
+/// `discard` the fragment and take derivatives (`dpdx`).
 ///
 /// # Inputs
 /// What the numbers of a parameter, or of a field of a structure, are like is said by attributes

@@ -25,7 +25,7 @@
 //! ```
 //!
 //! Lengths, dot and cross products, `normalize`, `distance`, `reflect` and `refract` are methods of
-//! [`glam`](crate::glam)'s vectors; they use `+ - * /` and `sqrt` alone.
+//! [`glam`]'s vectors; they use `+ - * /` and `sqrt` alone.
 
 mod exponential;
 mod inverse;
