@@ -42,12 +42,34 @@ pub trait Elementary: Real {
     /// The sum rounded to the neighbour whose last bit is 1, where it is not exact.
     #[doc(hidden)]
     fn odd_sum(self, other: Self) -> Self;
-    /// No number.
+    /// NaN.
     #[doc(hidden)]
     fn not_a_number(self) -> Self;
     /// Infinity with the sign of this number, which is zero.
     #[doc(hidden)]
     fn unbounded(self) -> Self;
+}
+
+/// [`Elementary::odd_sum`] of a type with bits.
+macro_rules! odd_sum {
+    () => {
+        #[inline(always)]
+        fn odd_sum(self, other: Self) -> Self {
+            let (sum, error) = self.two_sum(other);
+            let bits = sum.to_bits();
+            // To the neighbour on the error's side.
+            let odd = if (error < 0.0) == (sum < 0.0) {
+                bits | 1
+            } else {
+                bits.wrapping_sub(1) | 1
+            };
+            if error == 0.0 {
+                sum
+            } else {
+                Self::from_bits(odd)
+            }
+        }
+    };
 }
 
 impl Elementary for f32 {
@@ -98,22 +120,7 @@ impl Elementary for f32 {
     fn reduce_large(self) -> (Self, Self, Self) {
         reduce::single(self)
     }
-    #[inline(always)]
-    fn odd_sum(self, other: Self) -> Self {
-        let (sum, error) = self.two_sum(other);
-        let bits = sum.to_bits();
-        // To the neighbour on the error's side.
-        let odd = if (error < 0.0) == (sum < 0.0) {
-            bits | 1
-        } else {
-            bits.wrapping_sub(1) | 1
-        };
-        if error == 0.0 {
-            sum
-        } else {
-            Self::from_bits(odd)
-        }
-    }
+    odd_sum!();
     #[inline(always)]
     fn not_a_number(self) -> Self {
         Self::from_bits(self.to_bits() | 0x7fc0_0000)
@@ -291,22 +298,7 @@ impl Elementary for f64 {
     fn reduce_large(self) -> (Self, Self, Self) {
         reduce::double(self)
     }
-    #[inline(always)]
-    fn odd_sum(self, other: Self) -> Self {
-        let (sum, error) = self.two_sum(other);
-        let bits = sum.to_bits();
-        // To the neighbour on the error's side.
-        let odd = if (error < 0.0) == (sum < 0.0) {
-            bits | 1
-        } else {
-            bits.wrapping_sub(1) | 1
-        };
-        if error == 0.0 {
-            sum
-        } else {
-            Self::from_bits(odd)
-        }
-    }
+    odd_sum!();
     #[inline(always)]
     fn not_a_number(self) -> Self {
         #[cfg(target_arch = "spirv")]
