@@ -85,7 +85,7 @@ fn compensated_bounds_are_as_exact_as_their_inputs() {
             continue;
         };
         let key = (&c.family, c.n, c.precision, &c.backend, c.worst);
-        // Beyond the range that the bounds are stated for: squares of these depths are subnormal.
+        // Not promised: totals of this family are subnormal.
         if c.family == "denormal" {
             continue;
         }
