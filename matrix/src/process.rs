@@ -230,7 +230,7 @@ impl Runner {
         Failure::Crashed {
             program: self.program.name().to_owned(),
             how: status.map_or_else(|| "it closed its output".into(), |s| s.to_string()),
-            log: self.log.text(),
+            log: self.log.last_words(),
         }
     }
 }

@@ -4,6 +4,7 @@
 use std::io::{self, Read};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -153,19 +154,33 @@ const KEPT: usize = 64 * 1024;
 
 /// Text that grows in another thread; only its end is kept, 64 KiB.
 #[derive(Clone, Debug, Default)]
-pub struct Log(Arc<Mutex<String>>);
+pub struct Log {
+    words: Arc<Mutex<String>>,
+    /// Pipes that are not at their end.
+    open: Arc<AtomicUsize>,
+}
 
 impl Log {
     /// What there is so far, without empty lines at the end.
     #[must_use]
     pub fn text(&self) -> String {
-        let text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = self.words.lock().unwrap_or_else(PoisonError::into_inner);
         text.trim_end().to_owned()
+    }
+
+    /// The same of a program that has ended: waits up to a second for what is still in its pipes.
+    #[must_use]
+    pub fn last_words(&self) -> String {
+        let until = Instant::now() + Duration::from_secs(1);
+        while self.open.load(Ordering::Acquire) > 0 && Instant::now() < until {
+            thread::sleep(Duration::from_millis(1));
+        }
+        self.text()
     }
 
     /// Appends.
     pub fn push(&self, more: &str) {
-        let mut text = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut text = self.words.lock().unwrap_or_else(PoisonError::into_inner);
         text.push_str(more);
         if text.len() > KEPT {
             let mut cut = text.len() - KEPT;
@@ -185,12 +200,18 @@ impl Log {
         mut from: impl Read + Send + 'static,
     ) -> io::Result<thread::JoinHandle<()>> {
         let log = self.clone();
-        thread::Builder::new().spawn(move || {
+        self.open.fetch_add(1, Ordering::AcqRel);
+        let reader = thread::Builder::new().spawn(move || {
             let mut bytes = [0; 4096];
             while let Ok(n @ 1..) = from.read(&mut bytes) {
                 log.push(&String::from_utf8_lossy(&bytes[..n]));
             }
-        })
+            log.open.fetch_sub(1, Ordering::AcqRel);
+        });
+        if reader.is_err() {
+            self.open.fetch_sub(1, Ordering::AcqRel);
+        }
+        reader
     }
 }
 

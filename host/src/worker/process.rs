@@ -157,8 +157,6 @@ impl Process {
             };
         }
         let status = self.program.wait_for(Duration::from_secs(2));
-        // What it said last may still be on its way.
-        thread::sleep(Duration::from_millis(20));
-        ending(status.ok().flatten(), &self.log.text())
+        ending(status.ok().flatten(), &self.log.last_words())
     }
 }
