@@ -75,6 +75,17 @@ fn the_manifest_follows_its_schema() {
     );
 }
 
+/// Runs a program that must not complain.
+fn succeeds(command: &mut Command) {
+    let output = command.output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&said)
+    );
+}
+
 #[test]
 fn headers_compile_and_check_themselves() {
     let folder = tempfile::tempdir().unwrap();
@@ -97,48 +108,29 @@ fn headers_compile_and_check_themselves() {
             ],
         ),
     ] {
-        let output = Command::new(compiler)
-            .args(arguments)
-            .arg(&header)
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        succeeds(Command::new(compiler).args(arguments).arg(&header));
     }
     let library = folder.path().join("header.rlib");
-    let output = Command::new("rustc")
-        .args([
-            "--edition=2021",
-            "--crate-type=lib",
-            "--crate-name=header",
-            "-o",
-        ])
-        .arg(&library)
-        .arg(folder.path().join("include/hankel.rs"))
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
+    succeeds(
+        Command::new("rustc")
+            .args([
+                "--edition=2021",
+                "--crate-type=lib",
+                "--crate-name=header",
+                "-o",
+            ])
+            .arg(&library)
+            .arg(folder.path().join("include/hankel.rs")),
     );
     // For bytemuck, whose traits stand here as they are declared there.
     let both = "pub mod bytemuck {\n    pub unsafe trait Zeroable {}\n    pub unsafe trait Pod: Zeroable + Copy {}\n}\n\
                 include!(\"include/hankel.rs\");\ninclude!(\"include/hankel_bytemuck.rs\");\n";
     fs::write(folder.path().join("both.rs"), both).unwrap();
-    let output = Command::new("rustc")
-        .args(["--edition=2021", "--crate-type=lib", "-Dwarnings", "-o"])
-        .arg(folder.path().join("both.rlib"))
-        .arg(folder.path().join("both.rs"))
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
+    succeeds(
+        Command::new("rustc")
+            .args(["--edition=2021", "--crate-type=lib", "-Dwarnings", "-o"])
+            .arg(folder.path().join("both.rlib"))
+            .arg(folder.path().join("both.rs")),
     );
     // The checks are checks.
     let text = fs::read_to_string(&header).unwrap();
@@ -181,27 +173,22 @@ fn typescript_accepts_what_is_there_and_nothing_else() {
         "typescript is not in {}: `./check` installs it",
         modules.display()
     );
-    let output = Command::new("node")
-        .arg(modules.join("typescript/bin/tsc"))
-        .args([
-            "--noEmit", "--strict", "--target", "es2022", "--module", "es2022",
-        ])
-        .args([
-            "--moduleResolution",
-            "bundler",
-            "--types",
-            "@webgpu/types",
-            "--typeRoots",
-        ])
-        .arg(&modules)
-        .arg("use.ts")
-        .current_dir(&include)
-        .output()
-        .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stdout)
+    succeeds(
+        Command::new("node")
+            .arg(modules.join("typescript/bin/tsc"))
+            .args([
+                "--noEmit", "--strict", "--target", "es2022", "--module", "es2022",
+            ])
+            .args([
+                "--moduleResolution",
+                "bundler",
+                "--types",
+                "@webgpu/types",
+                "--typeRoots",
+            ])
+            .arg(&modules)
+            .arg("use.ts")
+            .current_dir(&include),
     );
 }
 

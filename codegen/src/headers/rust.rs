@@ -152,37 +152,32 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry) {
             entry.file, entry.entry_point
         );
     }
-    if !kernel.bindings.is_empty() {
-        text.push_str(
-            "    /// Bindings in SPIR-V and WGSL, all of group 0.\n    pub mod bindings {\n",
-        );
-        for binding in &kernel.bindings {
-            let _ = writeln!(
-                text,
-                "        /// {}\n        pub const {}: u32 = {};",
-                described(binding),
-                binding.name.to_uppercase(),
-                binding.binding
-            );
-        }
-        text.push_str("    }\n");
-    }
-    if !kernel.constants.is_empty() {
-        text.push_str(
-            "    /// Specialisation constants: their ids in SPIR-V and WGSL.\n    pub mod constants {\n",
-        );
-        for constant in &kernel.constants {
-            let _ = writeln!(
-                text,
-                "        /// By default {}.\n        pub const {}: u32 = {};",
-                constant.default,
-                constant.name.to_uppercase(),
-                constant.id
-            );
-        }
-        text.push_str("    }\n");
-    }
+    let bindings = kernel.bindings.iter();
+    let bindings = bindings.map(|b| (described(b), b.name.as_str(), b.binding));
+    let title = "Bindings in SPIR-V and WGSL, all of group 0.";
+    numbers(text, "bindings", title, bindings.collect());
+    let constants = kernel.constants.iter();
+    let constants =
+        constants.map(|c| (format!("By default {}.", c.default), c.name.as_str(), c.id));
+    let title = "Specialisation constants: their ids in SPIR-V and WGSL.";
+    numbers(text, "constants", title, constants.collect());
     text.push_str("}\n");
+}
+
+/// A module of numbers with their documentation, if there are any.
+fn numbers(text: &mut String, module: &str, title: &str, all: Vec<(String, &str, u32)>) {
+    if all.is_empty() {
+        return;
+    }
+    let _ = write!(text, "    /// {title}\n    pub mod {module} {{\n");
+    for (summary, name, number) in all {
+        let name = name.to_uppercase();
+        let _ = write!(
+            text,
+            "        /// {summary}\n        pub const {name}: u32 = {number};\n"
+        );
+    }
+    text.push_str("    }\n");
 }
 
 /// A binding in words.

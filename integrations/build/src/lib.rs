@@ -25,7 +25,7 @@ use std::ffi::OsString;
 use std::fmt;
 use std::io;
 use std::path::{Component, Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 use sha2::{Digest, Sha256};
 
@@ -169,13 +169,6 @@ impl Build {
             }
             std::process::exit(1);
         }
-    }
-
-    /// As [`Self::run_or_exit`], for a `main` that gives an exit code.
-    #[must_use]
-    pub fn run_as_main(&self) -> ExitCode {
-        self.run_or_exit();
-        ExitCode::SUCCESS
     }
 
     /// The folder of the shaders, and what cargo is told.
