@@ -86,6 +86,14 @@ both! {
         x
     }
 
+    fn signed<const NEGATIVE: bool>(x: f32) -> f32 {
+        if NEGATIVE { -x } else { x }
+    }
+
+    fn passed_on<const NEGATIVE: bool>(x: f32) -> f32 {
+        signed::<NEGATIVE>(x) * 3.0
+    }
+
     macro_rules! series {
         ($y:expr; $first:expr, $($next:expr),*) => {{
             let mut sum = $y * lit!($first);
@@ -114,6 +122,7 @@ both! {
         let mut first = t;
         let [a, b, ..] = swapped([pair.near, pair.far, v.z], &mut first);
         let (a, b) = (b, a);
+        let a = passed_on::<true>(a) + passed_on::<false>(b) + signed::<true>(b);
         let scale = |x: f32| x * first + a;
         let m = Vec2::new(scale(a), scale(b)) * t - Vec2::splat(b);
         m + Vec2::new(1.0, 2.0)

@@ -1087,6 +1087,7 @@ impl<'a> Evaluator<'a> {
             }
             match frame.generics.get(name) {
                 Some(Generic::Const(value)) => return Ok(Value::Int(*value)),
+                Some(Generic::Bool(value)) => return Ok(Value::bool(*value)),
                 Some(_) => return Ok(Value::Path(frame.module, Rc::new(p.clone()))),
                 None => {}
             }
@@ -2010,11 +2011,13 @@ impl<'a> Evaluator<'a> {
                 syn::GenericArgument::Type(syn::Type::Path(p)) => self.generic_of(frame, p)?,
                 syn::GenericArgument::Const(e) => {
                     let value = self.value(frame, e)?;
-                    let known = value
-                        .as_int()
-                        .or(value.as_bool().map(i128::from))
-                        .ok_or_else(|| self.refuse(frame, e.span(), "this is not known"))?;
-                    Generic::Const(known)
+                    if let Some(known) = value.as_bool() {
+                        Generic::Bool(known)
+                    } else if let Some(known) = value.as_int() {
+                        Generic::Const(known)
+                    } else {
+                        return Err(self.refuse(frame, e.span(), "this is not known"));
+                    }
                 }
                 other => {
                     return Err(self.refuse(frame, other.span(), "this argument has no form here"));

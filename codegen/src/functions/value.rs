@@ -65,8 +65,10 @@ pub enum Generic {
     Real,
     /// A structure, by its identity.
     Struct(Rc<str>),
-    /// A constant.
+    /// A constant number.
     Const(i128),
+    /// A constant that is true or false.
+    Bool(bool),
 }
 
 /// A variable, or a part of one.
