@@ -67,8 +67,10 @@ pub enum Error {
     /// A file's SHA-256 is not the one it must have.
     #[error(
         "wrong checksum of {}\n  expected {expected}\n  actual   {actual}\n\
-         help: the file is damaged or another one: fetch it again",
-        path.display()
+         help: the file is damaged or another one: fetch it again; of an archive that you \
+         packed yourself, give the checksum with --sha256 ({})",
+        path.display(),
+        crate::options::ENV_SHA256,
     )]
     Checksum {
         /// The file.

@@ -7,7 +7,7 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
 use common::*;
-use hankel_toolchain::{Method, Options, Silent, ensure, find, install, pack, pinned};
+use hankel_toolchain::{Error, Method, Options, Silent, ensure, find, install, pack, pinned};
 
 #[test]
 fn a_packed_toolchain_can_be_installed_elsewhere() {
@@ -28,7 +28,15 @@ fn a_packed_toolchain_can_be_installed_elsewhere() {
 
     let there = Scratch::new();
     let method = Some(Method::Archive(packed.path.clone()));
-    let installed = install(&there.options(), method, &mut Silent).unwrap();
+    // It bears the name of the archive whose checksum is built in: the file beside it does not beat
+    // that, its own checksum has to be given.
+    let refused = install(&there.options(), method.clone(), &mut Silent).unwrap_err();
+    assert!(matches!(refused, Error::Checksum { .. }), "{refused}");
+    let told = Options {
+        sha256: Some(packed.sha256.clone()),
+        ..there.options()
+    };
+    let installed = install(&told, method, &mut Silent).unwrap();
     assert_usable(&installed);
     let mode = |file| {
         fs::metadata(installed.root.join(file))
