@@ -33,7 +33,14 @@ fn built_in_kernels_run_natively_on_their_own_inputs() {
                     .unwrap_or_else(|e| panic!("{name}, {}: {e}", case.called()))
             };
             let reference = run(Mode::REFERENCE);
-            numbers.compare(case, &rules, &reference, &run(Mode::default()), &mut found);
+            numbers.compare(
+                case,
+                &rules,
+                None,
+                &reference,
+                &run(Mode::default()),
+                &mut found,
+            );
             let (count, first) = numbers.non_finite(case, &reference);
             if count > 0 && !kernel.tolerance.non_finite {
                 problems.push(format!("{name}, {}: {count}, {first:?}", case.called()));

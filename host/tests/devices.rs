@@ -4,17 +4,14 @@
 mod common;
 
 use common::*;
+use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::*;
-use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::{
     Bind, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, NativeDevice, Pass, Program,
     Shader, TextureShape, Topology, VulkanDevice,
 };
 
-const NEAREST: Sampler = Sampler {
-    filter: Filter::Nearest,
-    address: Address::ClampToEdge,
-};
+const NEAREST: Sampler = Sampler::new(false, false);
 
 fn bytes<T: bytemuck::NoUninit>(values: &[T]) -> Vec<u8> {
     bytemuck::cast_slice(values).to_vec()

@@ -53,7 +53,7 @@ fn found(sample: &Sample, path: Path, seed: u64) -> Result<Found, String> {
         } else {
             execute::on_vulkan(&mut gpu, &program, &case).map_err(|e| e.to_string())?
         };
-        numbers.compare(&case, &rules, &reference, &written, &mut found);
+        numbers.compare(&case, &rules, None, &reference, &written, &mut found);
     }
     Ok(found)
 }

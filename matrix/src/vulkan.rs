@@ -3,8 +3,8 @@
 
 use std::fs;
 
+use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
-use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::{DeviceError, Format, Program, Shader, TextureShape, VulkanDevice};
 use hankel_host::inputs::{Case, Class, Input};
 use hankel_host::parity::execute::{self, ExecuteError};
@@ -130,18 +130,7 @@ fn cases(job: &Job, inputs: &[u8]) -> Result<Vec<Case>, String> {
                     bytes: bytes(*offset, *length)?,
                 }
             }
-            Arg::Sampler { linear, repeat } => Input::Sampler(Sampler {
-                filter: if *linear {
-                    Filter::Linear
-                } else {
-                    Filter::Nearest
-                },
-                address: if *repeat {
-                    Address::Repeat
-                } else {
-                    Address::ClampToEdge
-                },
-            }),
+            Arg::Sampler { linear, repeat } => Input::Sampler(Sampler::new(*linear, *repeat)),
         })
     };
     job.cases

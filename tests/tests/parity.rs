@@ -123,7 +123,7 @@ fn without_own_inputs(subject: &Subject) -> Subject {
 fn a_fault_in_a_bound_for_nearly_degenerate_moments_is_found() {
     let subject = subject_of_shadows("hamburger_4msm");
     let square = "let product = (difference_1 * difference_1);";
-    let fault = "let product = (difference_1 * difference_1) * select(1f, 1.01f, 1.5e-14f < most_1 && most_1 < 1e-7f && 1e-3f < most);";
+    let fault = "let product = (difference_1 * difference_1) * select(1f, 1.01f, 1.5e-14f < most_1 && most_1 < 1e-8f && 1e-3f < most);";
     assert!(!found_in_wgsl(without_own_inputs(&subject), square, fault));
     assert!(found_in_wgsl(subject, square, fault));
 }

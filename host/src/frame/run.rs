@@ -5,7 +5,7 @@ use std::time::Instant;
 use bytemuck::{bytes_of, cast_slice};
 use hankel_dsl::glam::{Mat4, Vec3, Vec4};
 use hankel_dsl::native::describe::{Kernel, Output, Role, TexelFormat};
-use hankel_dsl::native::{Address, Entry, Filter, Sampler};
+use hankel_dsl::native::{Entry, Sampler};
 use hankel_shadows::blur::Direction;
 use hankel_shadows::depth::Transform;
 use hankel_shadows::shade::{Light, encoding};
@@ -418,10 +418,7 @@ impl<'a> Frame<'a> {
             (MapFormat::Rgba16unorm, DepthRange::Symmetric) => encoding::SYMMETRIC,
         };
         let constants: &[u32] = if pcf { &[] } else { &[encoding] };
-        let sampler = Sampler {
-            filter: Filter::Linear,
-            address: Address::ClampToEdge,
-        };
+        let sampler = Sampler::new(true, false);
         let mut args = vec![light, Bind::Texture(map)];
         if !pcf {
             args.push(Bind::Sampler(sampler));

@@ -14,12 +14,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use fastrand::Rng;
+use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{
     Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Stage, TexelFormat,
     TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
-use hankel_dsl::native::{Address, Filter, Sampler};
 use serde::{Deserialize, Serialize};
 
 use crate::crates::KernelEntry;
@@ -502,18 +502,9 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
                 ))
             }
         }
-        (Value::Sampler { linear, repeat }, Use::Sampler) => Ok(Input::Sampler(Sampler {
-            filter: if *linear {
-                Filter::Linear
-            } else {
-                Filter::Nearest
-            },
-            address: if *repeat {
-                Address::Repeat
-            } else {
-                Address::ClampToEdge
-            },
-        })),
+        (Value::Sampler { linear, repeat }, Use::Sampler) => {
+            Ok(Input::Sampler(Sampler::new(*linear, *repeat)))
+        }
         _ => Err("it is of another kind".into()),
     }
 }
@@ -737,13 +728,7 @@ fn input(
             let bytes = values.texels(said, &shape)?;
             Input::Texture { shape, bytes }
         }
-        Use::Sampler => Input::Sampler(Sampler {
-            filter: Filter::Linear,
-            address: match values.class {
-                Class::Edge => Address::Repeat,
-                Class::Ordinary | Class::Hostile => Address::ClampToEdge,
-            },
-        }),
+        Use::Sampler => Input::Sampler(Sampler::new(true, values.class == Class::Edge)),
     })
 }
 

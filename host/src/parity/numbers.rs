@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 use std::cmp::Ordering;
 
-use hankel_dsl::native::describe::{Kernel, Tolerance, Type};
+use hankel_dsl::native::describe::{Kernel, Role, Tolerance, Type};
 use serde::{Deserialize, Serialize};
 
 use super::compare::{Distance, Kind};
 use super::execute::Written;
+use super::intervals::Intervals;
 use crate::device::slots::{self, Use};
 use crate::flat;
 use crate::inputs::{self, Case, Class};
@@ -76,11 +77,16 @@ pub struct Rules {
 
 impl Rules {
     /// A kernel's own tolerance, which is for inputs as in use: with one, absurd inputs, for which
-    /// no condition is bounded, need only give finite results.
+    /// no condition is bounded, need only give finite results. So do those of a sampler: of a
+    /// coordinate far away no fraction of a texel is left.
     #[must_use]
     pub fn of(kernel: &Kernel, tolerance: Tolerance) -> Self {
+        let samples = kernel
+            .params
+            .iter()
+            .any(|p| matches!(p.role, Role::Sampler { .. }));
         Self {
-            hostile: tolerance.ulp == 0 && tolerance.absolute == 0.0,
+            hostile: tolerance.ulp == 0 && tolerance.absolute == 0.0 && !samples,
             tolerance,
             flushes: inputs::flushes(kernel),
         }
@@ -104,6 +110,14 @@ impl<'a> Numbers<'a> {
         }
     }
 
+    /// All of them, in order.
+    #[must_use]
+    pub fn values(&self, written: &Written) -> Vec<f64> {
+        let mut all = Vec::new();
+        self.each(written, written, false, |_, _, d| all.push(d.a));
+        all
+    }
+
     /// How many of the numbers that a case wrote are not finite, and the first of them.
     #[must_use]
     pub fn non_finite(&self, case: &Case, written: &Written) -> (u64, Option<Difference>) {
@@ -117,11 +131,14 @@ impl<'a> Numbers<'a> {
         (n, first)
     }
 
-    /// Compares what a case wrote with the reference, and adds what it finds to `found`.
+    /// Compares what a case wrote with the reference, and adds what it finds to `found`. A number
+    /// within its interval is right; one outside of it may be as far away from it as the tolerance
+    /// says.
     pub fn compare(
         &self,
         case: &Case,
         rules: &Rules,
+        intervals: Option<&Intervals>,
         reference: &Written,
         written: &Written,
         found: &mut Found,
@@ -146,14 +163,18 @@ impl<'a> Numbers<'a> {
             return;
         }
         let tolerance = &rules.tolerance;
-        let fits = |d: &Distance| d.ulp <= tolerance.ulp.into() || d.absolute <= tolerance.absolute;
+        let mut index = 0;
         self.each(reference, written, rules.flushes, |i, name, d| {
+            let interval = intervals.and_then(|all| all.of(index));
+            index += 1;
             found.values += 1;
             if d.ulp == 0 {
                 return;
             }
-            let first_beyond = !fits(&d) && found.beyond == 0;
-            found.beyond += u64::from(!fits(&d));
+            let outside = interval.map_or(d.absolute, |interval| interval.distance(d.b));
+            let fits = d.ulp <= tolerance.ulp.into() || outside <= tolerance.absolute;
+            let first_beyond = !fits && found.beyond == 0;
+            found.beyond += u64::from(!fits);
             found.largest_ulp = found.largest_ulp.max(d.ulp);
             found.largest_absolute = found
                 .largest_absolute

@@ -4,7 +4,9 @@ use std::io::{self, Read, Write};
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::inputs;
-use hankel_dsl::native::{Address, Arg, Call, Filter, Mode, Sampler, TextureMut, TextureRef};
+use hankel_dsl::native::{
+    Address, Arg, Call, Deviation, Filter, Mode, Sampler, TextureMut, TextureRef,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +54,9 @@ enum Shape {
     Sampler {
         linear: bool,
         repeat: bool,
+        /// Of its [`Deviation`].
+        offset: [i16; 3],
+        channels: [i8; 4],
     },
 }
 
@@ -123,6 +128,8 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         Arg::Sampler(s) => Shape::Sampler {
             linear: s.filter == Filter::Linear,
             repeat: s.address == Address::Repeat,
+            offset: s.deviation.offset,
+            channels: s.deviation.channels,
         },
     });
     let request = Request {
@@ -202,17 +209,14 @@ impl Arrived {
                     format,
                     bytes,
                 }),
-                Shape::Sampler { linear, repeat } => Arg::Sampler(Sampler {
-                    filter: if linear {
-                        Filter::Linear
-                    } else {
-                        Filter::Nearest
-                    },
-                    address: if repeat {
-                        Address::Repeat
-                    } else {
-                        Address::ClampToEdge
-                    },
+                Shape::Sampler {
+                    linear,
+                    repeat,
+                    offset,
+                    channels,
+                } => Arg::Sampler(Sampler {
+                    deviation: Deviation { offset, channels },
+                    ..Sampler::new(linear, repeat)
                 }),
             }
         });
@@ -260,8 +264,11 @@ mod tests {
                     bytes: &texels,
                 }),
                 Arg::Sampler(Sampler {
-                    filter: Filter::Linear,
-                    address: Address::Repeat,
+                    deviation: Deviation {
+                        offset: [-4, 3, 0],
+                        channels: [1, -2, 3, -4],
+                    },
+                    ..Sampler::new(true, true)
                 }),
                 Arg::BytesMut(&mut written),
                 Arg::TextureMut(TextureMut {

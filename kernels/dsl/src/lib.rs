@@ -36,6 +36,68 @@
 //! # }
 //! ```
 //!
+//! # Kinds of compute kernels
+//! A map reads what it likes and returns its own element: it cannot race.
+//! ```
+//! use hankel_dsl::kernel;
+//!
+//! /// Squares.
+//! #[kernel(compute, threads(64))]
+//! fn square(#[element] x: f32) -> f32 {
+//!     x * x
+//! }
+//! # fn main() {}
+//! ```
+//! A kernel with a `StorageMut` or `Atomics` writes where it
+//! likes; that its invocations do not race is the author's to see to.
+//! ```
+//! use hankel_dsl::{Atomics, StorageMut, kernel};
+//!
+//! /// Keeps the numbers that are not zero; the counter says how many.
+//! #[kernel(compute, threads(64))]
+//! fn compact(
+//!     #[element] x: u32,
+//!     #[atomic] count: Atomics<'_>,
+//!     #[storage(unordered)] kept: StorageMut<'_, u32>,
+//! ) {
+//!     if x != 0 {
+//!         kept.set(count.add(0, 1), x);
+//!     }
+//! }
+//! # fn main() {}
+//! ```
+//! A kernel with `Shared` memory or a `barrier` runs workgroup by
+//! workgroup, those invocations too that are beyond the range, so that all of them come to every
+//! barrier. Natively each invocation is resumable, and barriers in control flow that is not uniform
+//! are reported.
+//! ```
+//! use hankel_dsl::{Shared, StorageMut, barrier, kernel};
+//!
+//! /// The sum of each 64 numbers.
+//! #[kernel(compute, threads(64), range(x))]
+//! fn sums(
+//!     #[local_index] me: u32,
+//!     #[group_id] group: u32,
+//!     #[shared] part: Shared<'_, u32, 64>,
+//!     #[element] x: Option<u32>,
+//!     #[storage] out: StorageMut<'_, u32>,
+//! ) {
+//!     part.set(me, x.unwrap_or(0));
+//!     let mut half = 32;
+//!     while half > 0 {
+//!         barrier();
+//!         if me < half {
+//!             part.set(me, part.get(me) + part.get(me + half));
+//!         }
+//!         half /= 2;
+//!     }
+//!     if me == 0 {
+//!         out.set(group, part.get(0));
+//!     }
+//! }
+//! # fn main() {}
+//! ```
+//!
 //! # What is refused
 //! - `unsafe`, `cfg(target_arch)` and a second version for the processor: the DSL owns them.
 //! - In a map, writing anywhere but to one's own element: it *returns* what it computes. Who

@@ -298,6 +298,10 @@ mod host {
             } else {
                 x
             };
+            let x = match sampler.deviation.offset[d] {
+                0 => x,
+                n => x + f32::from(n) / 1024.0,
+            };
             let floor = x.floor();
             base[d] = floor as i64;
             weight[d] = if sampler.filter == Filter::Linear {
@@ -320,17 +324,30 @@ mod host {
         if sampler.filter == Filter::Nearest {
             return tap(0, 0, 0);
         }
+        let rounded = |value: Vec4| {
+            let channels = sampler.deviation.channels;
+            if channels == [0; 4] {
+                return value;
+            }
+            let mut largest = Vec4::ZERO;
+            for corner in 0..8 {
+                let tap = tap(corner & 1, corner >> 1 & 1, corner >> 2);
+                largest = largest.max(tap.abs());
+            }
+            let steps = channels.map(|n| f32::from(n) / 16_777_216.0);
+            value + largest * Vec4::from_array(steps)
+        };
         let slice = |dz: i64| {
             let near = tap(0, 0, dz) * (1.0 - weight[0]) + tap(1, 0, dz) * weight[0];
             let far = tap(0, 1, dz) * (1.0 - weight[0]) + tap(1, 1, dz) * weight[0];
             near * (1.0 - weight[1]) + far * weight[1]
         };
         let front = slice(0);
-        if weight[2] == 0.0 {
+        rounded(if weight[2] == 0.0 {
             front
         } else {
             front * (1.0 - weight[2]) + slice(1) * weight[2]
-        }
+        })
     }
 }
 

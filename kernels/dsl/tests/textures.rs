@@ -4,9 +4,7 @@
 use hankel_dsl::format::R32Uint;
 use hankel_dsl::glam::{UVec2, Vec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::{
-    Address, Arg, Call, CallError, Entry, Filter, Mode, TextureMut, TextureRef,
-};
+use hankel_dsl::native::{Address, Arg, Call, CallError, Entry, Mode, TextureMut, TextureRef};
 use hankel_dsl::{Sampler, StorageTexture2d, Texture2d, kernel};
 
 /// Writes one texel, to where the uniform says.
@@ -83,10 +81,7 @@ fn four_texels_are_gathered_counterclockwise_from_the_lower_left() {
             format: TexelFormat::R32Float,
             bytes: bytemuck::cast_slice(&texels),
         };
-        let sampler = hankel_dsl::native::Sampler {
-            filter: Filter::Linear,
-            address,
-        };
+        let sampler = hankel_dsl::native::Sampler::new(true, address == Address::Repeat);
         run(
             "around",
             vec![

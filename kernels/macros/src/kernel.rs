@@ -1164,17 +1164,7 @@ impl Args {
                 }
             }
         };
-        let samples = params.iter().any(|p| matches!(p.role, Role::Sampler));
-        let tolerance = match self.tolerance {
-            Some(t) => t,
-            None if samples => {
-                return Err(syn::Error::new(
-                    name.span(),
-                    "hardware may round a sampler's weights: state `parity(ulp = …, absolute = …, why = \"…\")`",
-                ));
-            }
-            None => Tolerance::none(),
-        };
+        let tolerance = self.tolerance.unwrap_or_else(Tolerance::none);
         Ok((stage, tolerance))
     }
 }

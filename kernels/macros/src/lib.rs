@@ -87,68 +87,6 @@ use syn::parse_macro_input;
 /// `#[kernel]`, a `fn(&hankel_dsl::native::inputs::Request) -> Vec<hankel_dsl::native::inputs::Given>`
 /// that is compiled for the host only (behind `cfg(not(target_arch = "spirv"))`); for a kernel that
 /// is generic over `R: Real`, one that is generic likewise. What it leaves out is made as above.
-///
-/// # Kinds of compute kernels
-/// A map reads what it likes and returns its own element: it cannot race.
-/// ```
-/// use hankel_dsl::kernel;
-///
-/// /// Squares.
-/// #[kernel(compute, threads(64))]
-/// fn square(#[element] x: f32) -> f32 {
-///     x * x
-/// }
-/// # fn main() {}
-/// ```
-/// A kernel with a `StorageMut` or `Atomics` writes where it
-/// likes; that its invocations do not race is the author's to see to.
-/// ```
-/// use hankel_dsl::{Atomics, StorageMut, kernel};
-///
-/// /// Keeps the numbers that are not zero; the counter says how many.
-/// #[kernel(compute, threads(64))]
-/// fn compact(
-///     #[element] x: u32,
-///     #[atomic] count: Atomics<'_>,
-///     #[storage(unordered)] kept: StorageMut<'_, u32>,
-/// ) {
-///     if x != 0 {
-///         kept.set(count.add(0, 1), x);
-///     }
-/// }
-/// # fn main() {}
-/// ```
-/// A kernel with `Shared` memory or a `barrier` runs workgroup by
-/// workgroup, those invocations too that are beyond the range, so that all of them come to every
-/// barrier. Natively each invocation is resumable, and barriers in control flow that is not uniform
-/// are reported.
-/// ```
-/// use hankel_dsl::{Shared, StorageMut, barrier, kernel};
-///
-/// /// The sum of each 64 numbers.
-/// #[kernel(compute, threads(64), range(x))]
-/// fn sums(
-///     #[local_index] me: u32,
-///     #[group_id] group: u32,
-///     #[shared] part: Shared<'_, u32, 64>,
-///     #[element] x: Option<u32>,
-///     #[storage] out: StorageMut<'_, u32>,
-/// ) {
-///     part.set(me, x.unwrap_or(0));
-///     let mut half = 32;
-///     while half > 0 {
-///         barrier();
-///         if me < half {
-///             part.set(me, part.get(me) + part.get(me + half));
-///         }
-///         half /= 2;
-///     }
-///     if me == 0 {
-///         out.set(group, part.get(0));
-///     }
-/// }
-/// # fn main() {}
-/// ```
 #[proc_macro_attribute]
 pub fn kernel(args: TokenStream, item: TokenStream) -> TokenStream {
     let item = parse_macro_input!(item as syn::ItemFn);

@@ -265,7 +265,7 @@ pub const MEASURED: [Measured; 17] = [
     measured(SYMMETRIC_6_32, 32, 8e-6, 3.2e-6),
     measured(SYMMETRIC_6_16, 16, 5.1e-5, 5.1e-5),
     measured(SYMMETRIC_6_16, 10, 3.2e-3, 3.2e-3),
-    measured(SYMMETRIC_8_32, 32, 2.3e-5, 4e-4),
+    measured(SYMMETRIC_8_32, 32, 2.3e-5, 1.3e-5),
     measured(SYMMETRIC_8_16, 16, 2.3e-1, 2e-1),
     measured(TRIGONOMETRIC_2_16, 32, 1.2e-7, 1e-7),
     measured(TRIGONOMETRIC_2_16, 16, 4e-5, 4e-5),

@@ -1,4 +1,4 @@
-//! The Hausdorff problem with four moments: depths known to be in [0, 1].
+//! The Hausdorff problem with four moments: depths known to be in [0, 1], or in [-1, 1].
 
 use hankel_dsl::{Real, lit};
 
@@ -18,72 +18,96 @@ use crate::hamburger::Query;
 /// give a number in [0, 1].
 #[inline(always)]
 pub fn hausdorff_4<R: Real>(m: Moments4<R>, z: R) -> R {
+    bound::<R, false>(m, z)
+}
+
+/// [`hausdorff_4`] for depths in [-1, 1]; `z` and the moments are clamped there.
+///
+/// It computes in [-1, 1]. Moments that are moved to [0, 1] first
+/// ([`Moments4::symmetric_to_unit`]) lose in `f32` what a small bias protects.
+#[inline(always)]
+pub fn hausdorff_4_symmetric<R: Real>(m: Moments4<R>, z: R) -> R {
+    bound::<R, true>(m, z)
+}
+
+/// The bound on [0, 1], or on [-1, 1] if it is symmetric.
+#[inline(always)]
+fn bound<R: Real, const SYMMETRIC: bool>(m: Moments4<R>, z: R) -> R {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let (m, z) = clamped(m, z);
+    let (m, z) = clamped::<R, SYMMETRIC>(m, z);
     let query = Query::new(m, z);
     let outside = R::select(query.k1.gt(zero), one - query.own, zero);
     let three = R::select(query.k2.lt(zero), query.between(), outside);
-    let four = FourPoints::new(m, z);
+    let four = FourPoints::new::<SYMMETRIC>(m, z);
     query.within_two_moments(R::select(four.is_possible, four.bound, three))
 }
 
 #[inline(always)]
-fn clamped<R: Real>(m: Moments4<R>, z: R) -> (Moments4<R>, R) {
+fn clamped<R: Real, const SYMMETRIC: bool>(m: Moments4<R>, z: R) -> (Moments4<R>, R) {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let unit = |b: R| b.clamp(zero, one);
+    let low = if SYMMETRIC { -one } else { zero };
     let m = Moments4 {
-        b1: unit(m.b1),
-        b2: unit(m.b2),
-        b3: unit(m.b3),
-        b4: unit(m.b4),
+        b1: m.b1.clamp(low, one),
+        b2: m.b2.clamp(zero, one),
+        b3: m.b3.clamp(low, one),
+        b4: m.b4.clamp(zero, one),
     };
-    (m, z.clamp(R::epsilon(), one - R::epsilon()))
+    (m, z.clamp(low + R::epsilon(), one - R::epsilon()))
 }
 
-/// The points 0, 1, `z` and one more with the given moments.
+/// Both ends of the interval, `z` and one more point with the given moments.
 struct FourPoints<R: Real> {
     /// Their share below `z`.
     bound: R,
-    /// Whether no weight is negative: either these four points are all in [0, 1], with weights that
-    /// are not negative, or the three of the Hamburger problem are. Where the weight of 0 or 1 is 0
-    /// both distributions are the same, so that what rounding does to a weight's sign changes the
+    /// Whether no weight is negative: either these four points are all in the interval, with weights
+    /// that are not negative, or the three of the Hamburger problem are. Where the weight of an end is
+    /// 0 both distributions are the same, so that what rounding does to a weight's sign changes the
     /// bound by no more than that weight.
     is_possible: R::Mask,
 }
 
 impl<R: Real> FourPoints<R> {
     #[inline(always)]
-    fn new(m: Moments4<R>, z: R) -> Self {
+    fn new<const SYMMETRIC: bool>(m: Moments4<R>, z: R) -> Self {
         let zero: R = lit!(0.0);
         let one: R = lit!(1.0);
+        let half: R = lit!(0.5);
         let least = R::epsilon();
         let floor = least * least;
-        // Moments of x (1 - x) times the distribution.
-        let total = (m.b1 - m.b2).max(floor);
-        let n1 = m.b2 - m.b3;
-        let n2 = m.b3 - m.b4;
+        // Moments of x (1 - x) times the distribution; on [-1, 1] of (1 + x) (1 - x).
+        let (n0, n1, n2) = if SYMMETRIC {
+            (one - m.b2, m.b1 - m.b3, m.b2 - m.b4)
+        } else {
+            (m.b1 - m.b2, m.b2 - m.b3, m.b3 - m.b4)
+        };
+        let total = n0.max(floor);
         let spread = (total * n2 - n1 * n1).max(zero);
         let offset = total * z - n1;
         let shift = n1 * z - n2;
-        let rest = offset - shift;
         // Its weights, at z and at the free point.
         let squares = (offset * offset + spread).max(floor * floor);
         let own = total * (spread / squares);
         let other = total * (offset * offset / squares);
-        // The free point is at shift / offset. Its weight over the distances to 0 and to 1.
+        // The free point is at shift / offset. Its weight over the distances to both ends.
         let is_below = offset.gt(zero);
         let length = offset.abs().max(floor);
         let toward = |x: R| R::select(is_below, x, -x) / length;
-        let (from_start, from_end) = (toward(shift), toward(rest));
+        let from_start = toward(if SYMMETRIC { shift + offset } else { shift });
+        let from_end = toward(offset - shift);
         let by_start = other / from_start.max(least);
         let by_end = other / from_end.max(least);
-        let at_start = one - m.b1 - own / z;
-        let at_end = m.b1 - own / (one - z);
+        let (at_start, at_end) = if SYMMETRIC {
+            (one - m.b1 - own / (one + z), one + m.b1 - own / (one - z))
+        } else {
+            (one - m.b1 - own / z, m.b1 - own / (one - z))
+        };
         let is_inside = from_start.ge(-least) & from_end.ge(-least);
+        let share = at_start + R::select(is_below, by_end, -by_start);
         Self {
-            bound: at_start + R::select(is_below, by_end, -by_start),
+            // On [-1, 1] all of these are twice the weights.
+            bound: if SYMMETRIC { half * share } else { share },
             is_possible: is_inside & at_start.ge(by_start) & at_end.ge(by_end),
         }
     }

@@ -42,7 +42,7 @@ pub use bound::{
 };
 pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
 pub use hamburger::hamburger_4;
-pub use hausdorff::hausdorff_4;
+pub use hausdorff::{hausdorff_4, hausdorff_4_symmetric};
 pub use leak::cut_leak;
 pub use moments::{Moments4, Moments6};
 pub use quantization::{

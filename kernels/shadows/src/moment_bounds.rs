@@ -111,7 +111,17 @@ macro_rules! order {
         }
 
         $(#[$compensated_doc])*
-        #[kernel(compute, threads(64), precision(f32, f64), pinned, inputs = crate::inputs::$rows)]
+        #[kernel(
+            compute,
+            threads(64),
+            precision(f32, f64),
+            pinned,
+            inputs = crate::inputs::$rows,
+            parity(
+                absolute = 2e-45,
+                why = "shaders take a product's error from partial products, which may overflow or underflow beyond the range that the bounds are stated for: one subnormal step"
+            )
+        )]
         pub fn $compensated<R: Real>(
             #[uniform] settings: &BoundSettings<R>,
             #[element] row: $Row<R>,

@@ -2,7 +2,7 @@
 
 use hankel_dsl::glam::{Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::{Address, Filter, Sampler, TextureRef};
+use hankel_dsl::native::{Sampler, TextureRef};
 use hankel_dsl::{Sampler as Sampled, Texture2d};
 use hankel_moments::variance_2;
 use hankel_shadows::shade::{Light, encoding, shade_variance};
@@ -20,10 +20,7 @@ fn the_bias_counts_once() {
         format: TexelFormat::Rgba32Float,
         bytes: &bytes,
     });
-    let sampler = Sampled::new(Sampler {
-        filter: Filter::Linear,
-        address: Address::ClampToEdge,
-    });
+    let sampler = Sampled::new(Sampler::new(true, false));
     let light = Light {
         row_u: Vec4::W * 0.5,
         row_v: Vec4::W * 0.5,

@@ -10,6 +10,7 @@ use hankel_dsl::native::describe::Kernel;
 use hankel_host::device::{DeviceError, NativeDevice};
 use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
+use hankel_host::parity::intervals::Intervals;
 use hankel_host::parity::panics;
 use rayon::prelude::*;
 
@@ -30,6 +31,8 @@ pub(super) struct Ready<'a> {
     /// The same as on a device that flushes subnormal numbers; none where that cannot be had.
     pub(super) flushed: Option<Result<Vec<Written>, String>>,
     pub(super) simd: Result<Vec<Written>, String>,
+    /// For each case what samplers may do to its numbers; none for kernels without samplers.
+    pub(super) intervals: Vec<Option<Intervals>>,
 }
 
 impl Ready<'_> {
@@ -93,10 +96,30 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         .then(|| flushed(|| natively(Mode::REFERENCE)))
         .flatten();
     let simd = natively(Mode::default());
+    let intervals = reference.and_then(|reference| {
+        let intervals = prepared
+            .cases
+            .iter()
+            .zip(&reference)
+            .map(|(case, written)| {
+                Intervals::find(kernel, case, written, |moved| run(Mode::REFERENCE, moved))
+            });
+        match intervals.collect::<Result<Vec<_>, _>>() {
+            Ok(intervals) => Ok((reference, intervals)),
+            Err(e) => Err(e.to_string()),
+        }
+    });
+    let (reference, intervals) = match intervals {
+        Ok((reference, intervals)) => (Ok(reference), intervals),
+        Err(problem) => (Err(problem), Vec::new()),
+    };
     let mut all = fs::read(&inputs)?;
     let references = reference.iter().chain(flushed.iter().flatten());
     for written in references.flatten().flatten() {
         all.extend_from_slice(written);
+    }
+    for ends in intervals.iter().flatten() {
+        all.extend(ends.bytes());
     }
     Ok(Ready {
         subject,
@@ -106,5 +129,6 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         reference,
         flushed,
         simd,
+        intervals,
     })
 }

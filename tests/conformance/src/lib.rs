@@ -257,15 +257,7 @@ pub fn last_sample(#[index] at: UVec2, #[texture] source: Texture2dMultisampled<
 }
 
 /// A texture through a sampler, at points that the rows give.
-#[kernel(
-    compute,
-    threads(64),
-    parity(
-        ulp = 0,
-        absolute = 4e-3,
-        why = "interpolation weights may be rounded to 8 bits"
-    )
-)]
+#[kernel(compute, threads(64))]
 pub fn filtered(
     #[element]
     #[range(-0.5..=1.5)]

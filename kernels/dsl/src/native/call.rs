@@ -56,6 +56,47 @@ pub struct Sampler {
     pub filter: Filter,
     /// Beyond the edge.
     pub address: Address,
+    /// Natively: how it departs from what the specification computes. Other devices ignore it.
+    pub deviation: Deviation,
+}
+
+impl Sampler {
+    /// One that is linear between texels or takes the nearest, and repeats the texture beyond its edge
+    /// or the edge.
+    #[must_use]
+    pub const fn new(linear: bool, repeat: bool) -> Self {
+        Self {
+            filter: if linear {
+                Filter::Linear
+            } else {
+                Filter::Nearest
+            },
+            address: if repeat {
+                Address::Repeat
+            } else {
+                Address::ClampToEdge
+            },
+            deviation: Deviation::NONE,
+        }
+    }
+}
+
+/// What a device may do with the numbers of a sampler, to find out natively what follows from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Deviation {
+    /// How far a coordinate is moved along each axis, in 1/1024 of a texel: rounding of the weights.
+    pub offset: [i16; 3],
+    /// What is added to each channel, in 2^-24 of the largest magnitude that is read: rounding of
+    /// the filter's sums.
+    pub channels: [i8; 4],
+}
+
+impl Deviation {
+    /// As the specification computes.
+    pub const NONE: Self = Self {
+        offset: [0; 3],
+        channels: [0; 4],
+    };
 }
 
 /// What a sampler does between texels.

@@ -18,7 +18,9 @@ mod transpose;
 #[doc(hidden)]
 pub mod workgroup;
 
-pub use call::{Address, Arg, Call, CallError, Filter, Mode, Run, Sampler, TextureMut, TextureRef};
+pub use call::{
+    Address, Arg, Call, CallError, Deviation, Filter, Mode, Run, Sampler, TextureMut, TextureRef,
+};
 
 /// An entry point: what it is, and its native code.
 #[derive(Clone, Debug)]

@@ -15,7 +15,9 @@ use std::vec::Vec;
 use std::{format, slice};
 
 use super::Entry;
-use super::call::{Address, Arg, Call, CallError, Filter, Mode, Sampler, TextureMut, TextureRef};
+use super::call::{
+    Address, Arg, Call, CallError, Deviation, Filter, Mode, Sampler, TextureMut, TextureRef,
+};
 use super::describe::Kernel;
 use super::inputs::{Given, Make, Request};
 use super::texel::FORMATS;
@@ -67,7 +69,8 @@ struct RawArg {
     kind: u32,
     format: u32,
     size: [u32; 3],
-    /// Samples of a texture; of a sampler, its filter.
+    /// Samples of a texture; of a sampler, its filter. A sampler's deviation is in `size` and
+    /// `format`.
     samples: u32,
     /// Of a sampler, what it does beyond the edge.
     address: u32,
@@ -111,6 +114,8 @@ impl RawArg {
             Arg::Sampler(s) => {
                 raw.kind = SAMPLER;
                 (raw.samples, raw.address) = (s.filter as u32, s.address as u32);
+                raw.size = s.deviation.offset.map(|n| i32::from(n) as u32);
+                raw.format = u32::from_le_bytes(s.deviation.channels.map(|n| n as u8));
                 (core::ptr::null_mut(), 0)
             }
         };
@@ -149,6 +154,10 @@ impl RawArg {
                     Address::ClampToEdge
                 } else {
                     Address::Repeat
+                },
+                deviation: Deviation {
+                    offset: self.size.map(|n| n as i32 as i16),
+                    channels: self.format.to_le_bytes().map(|n| n as i8),
                 },
             }),
             _ => return None,

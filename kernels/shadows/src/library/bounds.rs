@@ -4,7 +4,7 @@ use hankel_dsl::glam::{Vec2, Vec3, Vec4};
 use hankel_dsl::{Real, function};
 use hankel_moments::{
     Bounds, HalfAngle, Moments4, Moments6, TrigonometricMoments, hamburger_4, hamburger_6,
-    hausdorff_4, trigonometric_4, variance_2,
+    hausdorff_4, hausdorff_4_symmetric, trigonometric_4, variance_2,
 };
 
 /// Moments from a vector.
@@ -45,10 +45,17 @@ pub fn hamburger_bound(moments: Vec4, depth: f32) -> f32 {
 /// `depth`, for depths in [0, 1]; in [0, 1], and never less than `hamburger_bound`. Published as
 /// \[MSM\], Algorithm 4.
 ///
-/// `moments` are those of depths in [0, 1] (`symmetric_to_unit`); they and `depth` are clamped there.
+/// `moments` are those of depths in [0, 1]; they and `depth` are clamped there.
 #[function]
 pub fn hausdorff_bound(moments: Vec4, depth: f32) -> f32 {
     hausdorff_4(four(moments), depth)
+}
+
+/// `hausdorff_bound` for depths in [-1, 1]; `moments` and `depth` are clamped there. It is more
+/// accurate than to move the moments to [0, 1] first.
+#[function]
+pub fn hausdorff_symmetric_bound(moments: Vec4, depth: f32) -> f32 {
+    hausdorff_4_symmetric(four(moments), depth)
 }
 
 /// Variance shadow mapping: the least share of the filter region that is nearer than `depth`, from mean

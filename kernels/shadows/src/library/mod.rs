@@ -23,6 +23,7 @@ hankel_dsl::library! {
         functions: [
             bounds::hamburger_bound,
             bounds::hausdorff_bound,
+            bounds::hausdorff_symmetric_bound,
             bounds::variance_bound,
             bounds::hamburger_six_bounds,
             bounds::trigonometric_bounds,
