@@ -46,6 +46,7 @@ pub enum Command {
     /// Run a kernel on the rows of a table.
     Eval(Eval),
     /// Render a scene with shadows.
+    #[cfg(feature = "frames")]
     Render(Render),
     #[cfg(feature = "measure")]
     #[command(flatten)]
@@ -346,6 +347,7 @@ pub struct Eval {
     pub limit: u64,
 }
 
+#[cfg(feature = "frames")]
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -373,7 +375,7 @@ pub struct Render {
           value_parser = percentage)]
     pub limit: Option<f64>,
     /// How much the difference picture is amplified.
-    #[arg(long, value_name = "FACTOR", default_value_t = hankel_host::frame::AMPLIFICATION)]
+    #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION)]
     pub amplify: u32,
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
@@ -484,6 +486,7 @@ pub enum Method {
 }
 
 /// A number from 0 to 100.
+#[cfg(feature = "frames")]
 fn percentage(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if (0.0..=100.0).contains(&x) => Ok(x),

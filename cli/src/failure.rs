@@ -4,11 +4,11 @@ use std::fmt;
 use std::io::ErrorKind;
 
 use hankel_codegen as codegen;
+#[cfg(feature = "frames")]
+use hankel_frames::{FrameError, scene::SceneError};
 use hankel_host::crates::CrateError;
 use hankel_host::device::DeviceError;
 use hankel_host::eval::EvalError;
-use hankel_host::frame::FrameError;
-use hankel_host::scene::SceneError;
 use hankel_system::input::InputError;
 use hankel_system::output::OutputError;
 use hankel_system::text::visible;
@@ -206,6 +206,7 @@ impl From<EvalError> for Failure {
     }
 }
 
+#[cfg(feature = "frames")]
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         let blame = match &error {
@@ -216,12 +217,15 @@ impl From<SceneError> for Failure {
     }
 }
 
+#[cfg(feature = "frames")]
 impl From<FrameError> for Failure {
     fn from(error: FrameError) -> Self {
         let blame = match &error {
-            FrameError::Scene(_) | FrameError::Sizes { .. } => Blame::Input,
+            FrameError::Scene(_) | FrameError::Sizes { .. } | FrameError::Value { .. } => {
+                Blame::Input
+            }
             FrameError::Device { source, .. } => blame_of(source),
-            FrameError::Kernel { .. } => Blame::Kernel,
+            FrameError::Graph(_) | FrameError::NoShader { .. } => Blame::Kernel,
             FrameError::Write(error) => blame_of_output(error),
         };
         Self::new(blame, &error, None)

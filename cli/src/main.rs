@@ -18,7 +18,6 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
-#[cfg(not(feature = "measure"))]
 use clap::error::{ContextKind, ContextValue};
 
 use args::{Arguments, Command};
@@ -39,6 +38,7 @@ fn main() -> ExitCode {
         Command::New(a) => commands::new::run(&a, quiet),
         Command::Parity(a) => commands::parity::run(&a, quiet),
         Command::Eval(a) => commands::eval::run(&a, quiet),
+        #[cfg(feature = "frames")]
         Command::Render(a) => commands::render::run(&a, quiet),
         #[cfg(feature = "measure")]
         Command::Measure(command) => measure::run(&command, quiet),
@@ -71,19 +71,27 @@ fn threads() {
     }
 }
 
+/// Commands that are part of a Cargo feature, and the feature. Where it is there, so are they, and
+/// nobody asks.
+const LEFT_OUT: [(&str, &str); 4] = [
+    ("render", "frames"),
+    ("bench", "measure"),
+    ("judge", "measure"),
+    ("stress", "measure"),
+];
+
 /// Prints clap's help, or what it has against the arguments: exit codes 0 and 2.
 fn show(message: &clap::Error) -> ExitCode {
     let text = message.render();
     if message.use_stderr() {
         // With colours where the terminal has them; who closed the stream wants no message.
         let _ = message.print();
-        #[cfg(not(feature = "measure"))]
         if let Some(ContextValue::String(name)) = message.get(ContextKind::InvalidSubcommand)
-            && ["bench", "judge", "stress"].contains(&name.as_str())
+            && let Some((_, feature)) = LEFT_OUT.iter().find(|(command, _)| command == name)
         {
             print::note(format_args!(
-                "\nThis `hankel` was built without what measures. With it: \
-                 cargo install --path cli --features measure"
+                "\nThis `hankel` was built without the feature `{feature}`. With it: \
+                 cargo install --path cli --features {feature}"
             ));
         }
         return ExitCode::from(2);

@@ -98,7 +98,8 @@ impl hankel_toolchain::Progress for Progress {
     }
 }
 
-impl hankel_host::frame::Progress for Progress {
+#[cfg(feature = "frames")]
+impl hankel_frames::Progress for Progress {
     fn begin(&mut self, name: &str, step: usize, steps: usize) {
         self.bar.set_style(spinner());
         Self::begin(self, &format!("[{step}/{steps}] {name}"));

@@ -4,8 +4,6 @@ pub mod crates;
 pub mod device;
 pub mod eval;
 pub mod flat;
-pub mod frame;
 pub mod inputs;
 pub mod parity;
-pub mod scene;
 pub mod worker;

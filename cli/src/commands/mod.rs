@@ -9,5 +9,6 @@ pub mod functions;
 pub mod list;
 pub mod new;
 pub mod parity;
+#[cfg(feature = "frames")]
 pub mod render;
 pub mod toolchain;

@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use hankel_frames::graph::Summary;
+use hankel_frames::scene::{Geometry, Scene};
+use hankel_frames::{Difference, Memory, Picture, Rendering, Timing, compare, render};
 use hankel_host::device::Backend;
-use hankel_host::frame::{Difference, Picture, Plan, Rendering, Timing, compare, render};
-use hankel_host::scene::{Geometry, Scene};
 use hankel_system::output::{self, Output};
 use serde::Serialize;
 
@@ -18,7 +19,8 @@ struct Report<'a> {
     pictures: Vec<PathBuf>,
     devices: Vec<&'a str>,
     triangles: usize,
-    plan: &'a Plan,
+    plan: &'a Summary,
+    memory: Vec<Memory>,
     timings: Vec<&'a [Timing]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     difference: Option<&'a Difference>,
@@ -115,6 +117,7 @@ fn print(
             devices: renderings.iter().map(|r| r.device.as_str()).collect(),
             triangles: first.triangles,
             plan: &first.plan,
+            memory: renderings.iter().map(|r| r.memory).collect(),
             timings: renderings.iter().map(|r| r.timings.as_slice()).collect(),
             difference,
             edges: first.edges,
@@ -127,10 +130,12 @@ fn print(
     say!("{}", first.plan);
     for r in renderings {
         say!(
-            "{}: {:.2} s, {} triangles",
+            "{}: {:.2} s, {} triangles, {:.1} MB ({:.1} MB if passes shared no memory)",
             r.device,
             r.seconds(),
-            r.triangles
+            r.triangles,
+            r.memory.bytes as f64 / 1e6,
+            r.memory.unshared as f64 / 1e6
         );
         for t in &r.timings {
             say!("  {:<16} {:>8.1} ms", t.name, t.seconds * 1e3);

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bolero::check;
-use hankel_host::scene::{Geometry, Scene};
+use hankel_frames::scene::{Geometry, Scene};
 
 use crate::damage::{Damage, keep, says, time};
 

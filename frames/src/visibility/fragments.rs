@@ -5,8 +5,6 @@
 //! pixel's centre, be that inside of the triangle or not.
 
 use super::cast::{Caster, Lens, SAMPLES, in_bands};
-use crate::scene::Mesh;
-
 /// No triangle.
 const NONE: u32 = u32::MAX;
 
@@ -43,7 +41,7 @@ impl Fragments {
     /// Casts a ray through each sample. `advance` is told the share that is done.
     #[must_use]
     pub fn find(
-        caster: &Caster<'_>,
+        caster: &Caster,
         lens: &Lens,
         [width, height]: [u32; 2],
         advance: &mut dyn FnMut(f32),
@@ -84,7 +82,7 @@ impl Fragments {
 
     /// Values at the fragments, interpolated with perspective at their pixels' centres.
     #[must_use]
-    pub fn interpolate(&self, mesh: &Mesh, lens: &Lens, varyings: &[Varying]) -> Vec<Vec<f32>> {
+    pub fn interpolate(&self, caster: &Caster, lens: &Lens, varyings: &[Varying]) -> Vec<Vec<f32>> {
         let mut all: Vec<Vec<f32>> = varyings
             .iter()
             .map(|v| Vec::with_capacity(v.components * self.count()))
@@ -95,9 +93,9 @@ impl Fragments {
             for triangle in distinct(pixel) {
                 // Seen edge-on through the centre, any point of the triangle will do.
                 let weights = segment
-                    .weights(mesh.corners(triangle as usize))
+                    .weights(caster.corners(triangle))
                     .unwrap_or([1.0 / 3.0; 3]);
-                let corners = mesh.triangles[triangle as usize].map(|v| v as usize);
+                let corners = caster.vertices(triangle).map(|v| v as usize);
                 for (values, varying) in all.iter_mut().zip(varyings) {
                     values.extend((0..varying.components).map(|c| {
                         let at = |k: usize| {

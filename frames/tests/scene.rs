@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
-use hankel_host::scene::{
-    DepthRange, Geometry, MapFormat, Mesh, Procedural, Scene, SceneError, Shadow, Technique,
+use hankel_frames::scene::{
+    DepthRange, Geometry, MapFormat, Mesh, Procedural, Scene, SceneError, Shadow,
 };
+use hankel_frames::techniques::Technique;
 
 const LEAST: &str = r#"
 [geometry]
@@ -86,7 +87,7 @@ fn every_field_is_read() {
     assert_eq!(
         scene.shadow,
         Shadow {
-            technique: Technique::Hausdorff,
+            technique: Technique::named("hausdorff").unwrap(),
             size: 512,
             depth_range: DepthRange::Unit,
             format: MapFormat::Rgba16unorm,
@@ -137,10 +138,10 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
             &["`shadow.leak_cut` is 1", "0 to 0.9"],
         ),
         (
-            with("[shadow]\ntechnique = 'esm'"),
+            with("[shadow]\ntechnique = 'magic'"),
             &[
                 "shadow.technique",
-                "`esm`",
+                "`magic`",
                 "hamburger",
                 "hausdorff",
                 "vsm",

@@ -1,38 +1,13 @@
 //! Both backends draw the same picture. The shaders are the committed SPIR-V of the built-in
 //! kernels.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+mod common;
 
-use hankel_host::frame::{Comparison, Quiet, compare};
-use hankel_host::scene::Scene;
+use std::path::Path;
 
-/// The committed SPIR-V.
-fn shaders() -> BTreeMap<String, Vec<u32>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../snapshots/spirv");
-    let modules: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
-        .map(|entry| entry.unwrap_or_else(|e| panic!("{e}")).path())
-        .filter(|path| path.extension().is_some_and(|e| e == "spv"))
-        .collect();
-    assert!(
-        !modules.is_empty(),
-        "there are no modules in {}",
-        folder.display()
-    );
-    modules
-        .iter()
-        .map(|path| {
-            let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-            let name = path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            (name, bytemuck::pod_collect_to_vec(&bytes))
-        })
-        .collect()
-}
+use common::shaders;
+use hankel_frames::scene::Scene;
+use hankel_frames::{Comparison, Quiet, compare, techniques};
 
 fn both(geometry: &str, shadow: &str) -> Comparison {
     let eye = if geometry == "box" {
@@ -81,8 +56,8 @@ fn agree(geometry: &str, shadow: &str) {
 
 #[test]
 fn every_technique_agrees_on_a_box() {
-    for technique in ["hamburger", "hausdorff", "vsm", "pcf"] {
-        agree("box", &format!("technique = '{technique}'"));
+    for technique in techniques::ALL {
+        agree("box", &format!("technique = '{}'", technique.name));
     }
 }
 

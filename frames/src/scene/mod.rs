@@ -17,13 +17,13 @@
 //! direction = [-0.5, -0.8, -0.3]  # the way the light goes
 //!
 //! [shadow]
-//! technique = "hamburger"         # hausdorff | vsm | pcf
+//! technique = "hamburger"         # or another of `techniques::ALL`
 //! size = 1024                     # texels along an edge of the map
 //! format = "rgba16unorm"          # or "rgba32float"
 //! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1], for rgba16unorm
 //! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
 //! moment_bias = 6e-5
-//! depth_bias = 0.0                # default; hausdorff 0.001, pcf 0.002
+//! depth_bias = 0.0                # each technique has its default
 //! leak_cut = 0.02
 //!
 //! [output]
@@ -41,7 +41,6 @@ mod procedural;
 mod text;
 mod view;
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
@@ -49,6 +48,8 @@ use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_system::input;
 use serde::Deserialize;
+
+use crate::techniques::{self, Technique};
 
 pub use error::{Place, Result, SceneError};
 pub use mesh::{Bounds, Mesh};
@@ -104,31 +105,6 @@ pub struct Camera {
     pub fov: f32,
 }
 
-/// A way to turn depths into shadows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Technique {
-    /// Four moments, Hamburger problem: depths anywhere on the line.
-    Hamburger,
-    /// Four moments, Hausdorff problem: depths within the map's range. Leaks less.
-    Hausdorff,
-    /// Two moments: variance shadow mapping.
-    Vsm,
-    /// Percentage-closer filtering of the depth map itself, the reference.
-    Pcf,
-}
-
-impl fmt::Display for Technique {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Hamburger => "hamburger",
-            Self::Hausdorff => "hausdorff",
-            Self::Vsm => "vsm",
-            Self::Pcf => "pcf",
-        })
-    }
-}
-
 /// The interval that depths are mapped to before moments are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -164,7 +140,7 @@ impl MapFormat {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shadow {
     /// From depths to shadow.
-    pub technique: Technique,
+    pub technique: &'static Technique,
     /// Texels along an edge of the map, 16 to [`Scene::MAX_MAP`].
     pub size: u32,
     /// Interval of depths; [`DepthRange::Symmetric`] with [`MapFormat::Rgba32float`]. PCF takes no
@@ -190,24 +166,6 @@ impl Shadow {
         Self::published(depth_range, format).strength as f32
     }
 
-    /// The depth bias unless given.
-    ///
-    /// - Hamburger and variance: none. The moment bias spreads a single surface a little, which
-    ///   keeps it from shading itself.
-    /// - Hausdorff: 1e-3. The published biases put their weight at the ends of the depth range,
-    ///   where the Hausdorff problem discards it: a surface stays sharp, and what 16 bits round
-    ///   would decide between light and full shadow.
-    /// - Percentage-closer filtering: 2e-3. The comparison has no slack, and a slope would be
-    ///   shaded by its own texels.
-    #[must_use]
-    pub const fn default_depth_bias(technique: Technique) -> f32 {
-        match technique {
-            Technique::Hamburger | Technique::Vsm => 0.0,
-            Technique::Hausdorff => 1e-3,
-            Technique::Pcf => 2e-3,
-        }
-    }
-
     /// The published bias for a map.
     pub(crate) const fn published(depth_range: DepthRange, format: MapFormat) -> Bias {
         match (format, depth_range) {
@@ -222,7 +180,7 @@ impl Default for Shadow {
     fn default() -> Self {
         let (depth_range, format) = (DepthRange::Symmetric, MapFormat::Rgba16unorm);
         Self {
-            technique: Technique::Hamburger,
+            technique: techniques::ALL[0],
             size: 1024,
             depth_range,
             format,

@@ -30,10 +30,11 @@ pub const SAMPLES: [[f64; 2]; 4] = [
 ];
 
 /// Triangles that rays can be cast at.
-pub struct Caster<'a> {
-    mesh: &'a Mesh,
+pub struct Caster {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
     /// What the tree's numbers mean.
-    triangles: Vec<u32>,
+    leaves: Vec<u32>,
     tree: Bvh2,
 }
 
@@ -138,25 +139,25 @@ impl Lens {
     }
 }
 
-impl<'a> Caster<'a> {
-    /// Builds the tree.
+impl Caster {
+    /// Builds the tree. Indices are in range: whoever fills a mesh sees to it.
     #[must_use]
-    pub fn new(mesh: &'a Mesh) -> Self {
-        let slack = mesh.bounds().map_or(0.0, |b| {
-            4e-6 * (b.low.abs().max(b.high.abs()).max_element())
-        });
+    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let far = positions.iter().map(|p| p.abs().max_element());
+        let slack = 4e-6 * far.fold(0.0, f32::max);
+        let corners_of = |i: u32| triangles[i as usize].map(|v| positions[v as usize]);
         // Of triangles in the same place, a ray meets the first: the others only cost time, each
         // one in each ray.
-        let mut places = HashSet::with_capacity(mesh.triangles.len());
+        let mut places = HashSet::with_capacity(triangles.len());
         let is_new = |i: &u32| {
-            let corners = mesh.corners(*i as usize);
+            let corners = corners_of(*i);
             places.insert(corners.map(|p| p.to_array().map(f32::to_bits)))
         };
-        let triangles: Vec<u32> = (0..mesh.triangles.len() as u32).filter(is_new).collect();
-        let boxes: Vec<Aabb> = triangles
+        let leaves: Vec<u32> = (0..triangles.len() as u32).filter(is_new).collect();
+        let boxes: Vec<Aabb> = leaves
             .iter()
             .map(|&i| {
-                let [a, b, c] = mesh.corners(i as usize);
+                let [a, b, c] = corners_of(i);
                 let (low, high) = (a.min(b).min(c) - slack, a.max(b).max(c) + slack);
                 Aabb::new(low.to_array().into(), high.to_array().into())
             })
@@ -164,10 +165,35 @@ impl<'a> Caster<'a> {
         let mut time = std::time::Duration::ZERO;
         let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut time);
         Self {
-            mesh,
-            triangles,
+            positions: positions.to_vec(),
+            triangles: triangles.to_vec(),
+            leaves,
             tree,
         }
+    }
+
+    /// A mesh's triangles.
+    #[must_use]
+    pub fn of(mesh: &Mesh) -> Self {
+        Self::new(&mesh.positions, &mesh.triangles)
+    }
+
+    /// The vertices of a triangle.
+    #[must_use]
+    pub fn vertices(&self, triangle: u32) -> [u32; 3] {
+        self.triangles[triangle as usize]
+    }
+
+    /// The corners of a triangle.
+    #[must_use]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.vertices(triangle).map(|v| self.positions[v as usize])
+    }
+
+    /// How many vertices there are.
+    #[must_use]
+    pub const fn vertex_count(&self) -> usize {
+        self.positions.len()
     }
 
     /// The first triangle that a segment meets.
@@ -185,8 +211,8 @@ impl<'a> Caster<'a> {
         let mut near = RayHit::none();
         near.t = ray.tmax;
         self.tree.ray_traverse(ray, &mut near, |_, slot| {
-            let triangle = self.triangles[self.tree.primitive_indices[slot] as usize];
-            let Some(t) = segment.meet(self.mesh.corners(triangle as usize)) else {
+            let triangle = self.leaves[self.tree.primitive_indices[slot] as usize];
+            let Some(t) = segment.meet(self.corners(triangle)) else {
                 return f32::INFINITY;
             };
             if best.is_some_and(|b| b.t < t || (b.t == t && b.triangle < triangle)) {
@@ -200,18 +226,17 @@ impl<'a> Caster<'a> {
     }
 
     /// The depth in every sample of a map: 1 where nothing is. `clip` is where the vertices go in
-    /// clip space (w is 1: no perspective), `lens` the same transform; `advance` is told the share
-    /// that is done.
+    /// clip space, `lens` the same transform; `advance` is told the share that is done.
     #[must_use]
     pub fn depths(
         &self,
         lens: &Lens,
         clip: &[Vec4],
-        size: u32,
+        [width, height]: [u32; 2],
         advance: &mut dyn FnMut(f32),
     ) -> Vec<f32> {
-        let row_len = size as usize * SAMPLES.len();
-        let mut depths = vec![1.0; row_len * size as usize];
+        let row_len = width as usize * SAMPLES.len();
+        let mut depths = vec![1.0; row_len * height as usize];
         in_bands(&mut depths, row_len, advance, |y, row: &mut [f32]| {
             for (x, texel) in row.chunks_mut(SAMPLES.len()).enumerate() {
                 for (depth, at) in texel.iter_mut().zip(SAMPLES) {
@@ -226,18 +251,26 @@ impl<'a> Caster<'a> {
     }
 
     fn depth(&self, segment: &Segment, hit: Hit, clip: &[Vec4]) -> f32 {
-        let corners = self.mesh.triangles[hit.triangle as usize];
-        match segment.weights(self.mesh.corners(hit.triangle as usize)) {
-            Some(w) => (0..3)
-                .map(|k| w[k] * f64::from(clip[corners[k] as usize].z))
-                .sum::<f64>() as f32,
-            None => hit.t as f32,
+        let vertices = self.vertices(hit.triangle).map(|v| clip[v as usize]);
+        let Some(weights) = segment.weights(self.corners(hit.triangle)) else {
+            return hit.t as f32;
+        };
+        let at = |of: fn(&Vec4) -> f32| -> f64 {
+            let products = weights.iter().zip(&vertices);
+            products.map(|(w, v)| w * f64::from(of(v))).sum()
+        };
+        let z = at(|v| v.z);
+        // Without perspective w is 1, but for what rounding makes of the weights' sum.
+        if vertices.iter().all(|v| v.w == 1.0) {
+            z as f32
+        } else {
+            (z / at(|v| v.w)) as f32
         }
     }
 }
 
 /// Rows in parallel, some at a time, so that progress can be told in between.
-pub(super) fn in_bands<T: Send>(
+pub(crate) fn in_bands<T: Send>(
     all: &mut [T],
     row_len: usize,
     advance: &mut dyn FnMut(f32),
@@ -266,7 +299,7 @@ mod tests {
         let mut mesh = Mesh::default();
         mesh.sphere(Vec3::ZERO, 1.0, 40);
         mesh.drop_degenerate();
-        let caster = Caster::new(&mesh);
+        let caster = Caster::of(&mesh);
         // Towards every vertex and the middle of every edge: where gaps would be.
         for t in 0..mesh.triangles.len() {
             let [a, b, c] = mesh.corners(t);
@@ -281,7 +314,7 @@ mod tests {
     #[test]
     fn the_tree_finds_what_trying_all_finds() {
         let mesh = Procedural::Yard.mesh();
-        let caster = Caster::new(&mesh);
+        let caster = Caster::of(&mesh);
         let view = perspective(0.8, 1.0, 0.1, 200.0)
             * look_at_mat4(Vec3::new(9.0, 5.0, 8.0), Vec3::ZERO, Vec3::Y);
         let lens = Lens::new(view, 16, 16);
@@ -316,7 +349,7 @@ mod tests {
             assert!(share > done);
             done = share;
         };
-        let depths = Caster::new(&mesh).depths(&Lens::new(view, 8, 8), &clip, 8, &mut advance);
+        let depths = Caster::of(&mesh).depths(&Lens::new(view, 8, 8), &clip, [8, 8], &mut advance);
         assert_eq!(done, 1.0);
         for (i, texel) in depths.chunks(4).enumerate() {
             for (depth, at) in texel.iter().zip(SAMPLES) {

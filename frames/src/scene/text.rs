@@ -9,9 +9,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
-use super::{
-    Camera, DepthRange, FAR_OFF, Geometry, MapFormat, Procedural, Scene, Shadow, Technique,
-};
+use super::{Camera, DepthRange, FAR_OFF, Geometry, MapFormat, Procedural, Scene, Shadow};
+use crate::techniques::{self, Technique};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,7 +50,7 @@ struct LightText {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ShadowText {
-    technique: Option<Technique>,
+    technique: Option<Spanned<String>>,
     size: Option<Spanned<i64>>,
     depth_range: Option<Spanned<DepthRange>>,
     format: Option<MapFormat>,
@@ -290,9 +289,23 @@ impl Reader<'_> {
         if filter.is_multiple_of(2) {
             return self.refuse(filter_span, "shadow.filter", filter, "odd");
         }
-        let technique = s.technique.unwrap_or(d.technique);
+        let technique = match &s.technique {
+            Some(name) => match Technique::named(name.get_ref()) {
+                Some(technique) => technique,
+                None => {
+                    let names = techniques::ALL.map(|t| format!("`{}`", t.name));
+                    return self.refuse(
+                        name.span(),
+                        "shadow.technique",
+                        format!("`{}`", name.get_ref()),
+                        format!("one of {}", names.join(", ")),
+                    );
+                }
+            },
+            None => d.technique,
+        };
         let bias = Shadow::recommended_bias(depth_range, format);
-        let depth_bias = Shadow::default_depth_bias(technique);
+        let depth_bias = technique.depth_bias;
         Ok(Shadow {
             technique,
             size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,

@@ -1,0 +1,363 @@
+//! From a scene to a picture.
+
+use std::borrow::Cow;
+use std::time::Instant;
+
+use hankel_dsl::glam::{Mat4, Vec3, Vec4};
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_host::device::{self, Backend, Device};
+use hankel_shadows::depth::Transform;
+use hankel_shadows::shade::Light;
+use serde::Serialize;
+
+use crate::error::{FrameError, Result};
+use crate::executor::{Clock, Executor, Memory, Progress, Run, Shaders, Timing};
+use crate::graph::{self, Graph, Handle, Summary};
+use crate::passes::Given;
+use crate::picture::{Difference, Picture};
+use crate::scene::{Camera, CameraView, LightView, Mesh, Scene};
+
+/// What is seen where nothing is: a pale sky, in linear light.
+const BACKGROUND: [f32; 3] = [0.5, 0.6, 0.72];
+/// Light from the sky.
+const AMBIENT: Vec4 = Vec4::new(0.24, 0.28, 0.33, 0.0);
+/// What the light adds on a surface that faces it.
+const IRRADIANCE: f32 = 1.15;
+/// What pictures are kept in until they are encoded: linear light.
+const PICTURE: TexelFormat = TexelFormat::Rgba16Float;
+
+pub(crate) fn transform(clip_from_world: Mat4) -> Transform {
+    Transform {
+        row_x: clip_from_world.row(0),
+        row_y: clip_from_world.row(1),
+        row_z: clip_from_world.row(2),
+        row_w: clip_from_world.row(3),
+    }
+}
+
+pub(crate) fn camera_view(scene: &Scene, camera: &Camera, mesh: &Mesh) -> CameraView {
+    CameraView::new(camera, mesh, scene.width as f32 / scene.height as f32)
+}
+
+pub(crate) fn light_view(scene: &Scene, direction: Vec3, mesh: &Mesh) -> LightView {
+    let shadow = &scene.shadow;
+    // The filter and the sampler's interpolation stay inside of the map.
+    LightView::new(direction, mesh, shadow.size, shadow.filter / 2 + 1)
+}
+
+/// What a frame shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Show {
+    /// The scene, lit.
+    Picture,
+    /// The share of light that arrives, 1 minus the shadow, in 32-bit floats: white surfaces that
+    /// face the light everywhere. The same passes by the same kernels make it.
+    Light,
+}
+
+/// The light as the shading kernels take it.
+pub(crate) fn light(scene: &Scene, view: &LightView, show: Show) -> Light {
+    let shadow = &scene.shadow;
+    let clip = view.clip_from_world;
+    let target = crate::scene::Shadow::published(shadow.depth_range, shadow.format).four();
+    let (irradiance, ambient) = match show {
+        Show::Picture => (IRRADIANCE, AMBIENT),
+        Show::Light => (1.0, Vec4::ZERO),
+    };
+    Light {
+        row_u: clip.row(0) * 0.5 + Vec4::W * 0.5,
+        // Rows of the map count from the top.
+        row_v: clip.row(1) * -0.5 + Vec4::W * 0.5,
+        row_depth: clip.row(2),
+        toward: (-view.direction).extend(irradiance),
+        ambient,
+        bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
+        moment_bias: shadow.moment_bias,
+        depth_bias: shadow.depth_bias,
+        light_leak: shadow.leak_cut,
+        filter_radius: shadow.filter / 2,
+    }
+}
+
+/// The graph of a scene's frame: what its technique starts from, and the picture, in linear light.
+///
+/// # Errors
+/// [`graph::GraphError`] for a technique that does not fit its kernels.
+pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Given, Handle)> {
+    let view = light_view(scene, scene.light, mesh);
+    let camera = camera_view(scene, &scene.camera, mesh);
+    let mut graph = Graph::new(hankel_shadows::entries());
+    let vertices = mesh.positions.len();
+    let (normals, colours, format, [r, g, b]) = match show {
+        Show::Picture => (
+            Cow::Borrowed(&mesh.normals),
+            Cow::Borrowed(&mesh.colours),
+            PICTURE,
+            BACKGROUND.map(f64::from),
+        ),
+        Show::Light => (
+            Cow::Owned(vec![-view.direction; vertices]),
+            Cow::Owned(vec![Vec3::ONE; vertices]),
+            TexelFormat::Rgba32Float,
+            [1.0; 3],
+        ),
+    };
+    let given = Given {
+        positions: graph.buffer("positions", &mesh.positions),
+        normals: graph.buffer("normals", &normals),
+        colours: graph.buffer("colours", &colours),
+        indices: graph.buffer("indices", mesh.indices()),
+        light_view: graph.parameter("light's view", &transform(view.clip_from_world)),
+        camera: graph.parameter("camera", &transform(camera.clip_from_world)),
+        light: graph.parameter("light", &light(scene, &view, show)),
+        shadow: scene.shadow,
+        size: [scene.width, scene.height],
+        format,
+        background: [r, g, b, 1.0],
+    };
+    let picture = (scene.shadow.technique.add)(&mut graph, &given)?;
+    graph.keep(picture);
+    Ok((graph, given, picture))
+}
+
+/// A scene's frame on a device: to be drawn again after the camera or the light has moved.
+pub struct Frame<'d> {
+    executor: Executor<'d>,
+    scene: Scene,
+    mesh: &'d Mesh,
+    show: Show,
+    given: Given,
+    picture: Handle,
+}
+
+impl<'d> Frame<'d> {
+    /// Makes everything that the frame needs on the device.
+    ///
+    /// # Errors
+    /// See [`FrameError`].
+    pub fn new(
+        device: &'d mut dyn Device,
+        shaders: &'d dyn Shaders,
+        scene: &Scene,
+        mesh: &'d Mesh,
+        show: Show,
+    ) -> Result<Self> {
+        let (graph, given, picture) = graph(scene, mesh, show)?;
+        Ok(Self {
+            executor: Executor::new(device, shaders, graph)?,
+            scene: scene.clone(),
+            mesh,
+            show,
+            given,
+            picture,
+        })
+    }
+
+    /// Moves the camera.
+    ///
+    /// # Errors
+    /// [`FrameError::Device`].
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        let view = camera_view(&self.scene, camera, self.mesh);
+        let camera = transform(view.clip_from_world);
+        self.executor.set(self.given.camera, &camera)
+    }
+
+    /// Turns the light: `direction` is the way it goes, not zero.
+    ///
+    /// # Errors
+    /// [`FrameError::Device`].
+    pub fn set_light(&mut self, direction: Vec3) -> Result<()> {
+        let view = light_view(&self.scene, direction, self.mesh);
+        let uniform = light(&self.scene, &view, self.show);
+        if self.show == Show::Light {
+            let normals = vec![-view.direction; self.mesh.positions.len()];
+            self.executor.set_buffer(self.given.normals, &normals)?;
+        }
+        self.executor.set(self.given.light, &uniform)?;
+        let transform = transform(view.clip_from_world);
+        self.executor.set(self.given.light_view, &transform)
+    }
+
+    /// Runs what has to run; see [`Executor::run`].
+    ///
+    /// # Errors
+    /// [`FrameError::Device`].
+    pub fn run(&mut self, clock: Clock, progress: &mut dyn Progress) -> Result<Run> {
+        self.executor.run(clock, progress)
+    }
+
+    /// The executor.
+    pub const fn executor(&mut self) -> &mut Executor<'d> {
+        &mut self.executor
+    }
+
+    /// The picture of the last run, in linear light, rows from the top.
+    ///
+    /// # Errors
+    /// [`FrameError::Value`] before the first run; [`FrameError::Device`].
+    pub fn linear(&mut self) -> Result<Vec<Vec4>> {
+        let texels = self.executor.read(self.picture)?;
+        let format = self.given.format;
+        let texels = texels.chunks_exact(format.bytes());
+        Ok(texels.map(|t| format.load(t)).collect())
+    }
+
+    /// The picture of the last run.
+    ///
+    /// # Errors
+    /// As for [`Frame::linear`].
+    pub fn picture(&mut self) -> Result<Picture> {
+        let [width, height] = self.given.size;
+        Ok(Picture::from_linear(
+            width,
+            height,
+            self.linear()?.into_iter(),
+        ))
+    }
+}
+
+/// A picture and how it came about. All but the picture can be serialised.
+#[derive(Clone, Debug, Serialize)]
+pub struct Rendering {
+    /// The picture.
+    #[serde(skip)]
+    pub picture: Picture,
+    /// Which device made it.
+    pub device: String,
+    /// The scene's triangles.
+    pub triangles: usize,
+    /// Edge of the shadow map's texels in world units, along x and y.
+    pub texel: [f32; 2],
+    /// Share of the pixels whose samples see different triangles, where that was counted
+    /// (natively): where rounding may decide what a sample sees.
+    pub edges: Option<f64>,
+    /// What was done, and what was not.
+    pub plan: Summary,
+    /// What it took on the device.
+    pub memory: Memory,
+    /// How long it took, in order.
+    pub timings: Vec<Timing>,
+}
+
+impl Rendering {
+    /// Wall time of all parts.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.timings.iter().map(|t| t.seconds).sum()
+    }
+}
+
+/// Both pictures of a scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// From this machine's processor.
+    pub native: Rendering,
+    /// From Vulkan.
+    pub vulkan: Rendering,
+    /// How they differ.
+    pub difference: Difference,
+}
+
+/// Share of the pixels where rounding of the sampler's weights, of the target to half precision and
+/// of the moments to 16 bits may be seen, away from edges.
+const ROUNDED: f64 = 0.01;
+
+impl Comparison {
+    /// The share of pixels that may differ by more than 1/255 between the backends.
+    ///
+    /// A rasteriser puts vertices on a grid of 1/256 pixel, rays do not. So an edge may be half a
+    /// step and a rounding away from where the ray sees it, at most 1/256 pixel, and a sample sees
+    /// another triangle only if it lies in a strip of that half-width along the edge. A strip
+    /// crosses at most sqrt(2) of a pixel; four samples, none likelier than another to lie in it: of
+    /// the pixels with an edge, at most 4 * sqrt(2) * 2/256 = 4.4 % have such a sample. The same
+    /// happens to texels of the shadow map, where a changed sample is a quarter of one texel and the
+    /// filter spreads it: its share of the picture is counted as once more as much.
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        let edges = self.native.edges.unwrap_or(0.0);
+        2.0 * 4.0 * 2.0_f64.sqrt() * 2.0 / 256.0 * edges + ROUNDED
+    }
+}
+
+/// By how much [`compare`] amplifies the difference picture unless told otherwise.
+pub const AMPLIFICATION: u32 = 16;
+
+/// Loads the scene's geometry, opens a device, and renders.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn render(
+    scene: &Scene,
+    backend: Backend,
+    shaders: &dyn Shaders,
+    progress: &mut dyn Progress,
+) -> Result<Rendering> {
+    let mesh = scene.mesh()?;
+    let mut device = open(backend)?;
+    render_on(&mut *device, scene, &mesh, shaders, progress)
+}
+
+/// Renders a scene natively and on Vulkan, and compares the pictures; `amplification` is that of
+/// the difference picture.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn compare(
+    scene: &Scene,
+    shaders: &dyn Shaders,
+    amplification: u32,
+    progress: &mut dyn Progress,
+) -> Result<Comparison> {
+    // Whether there is a driver shows before the long work starts.
+    let mut vulkan = open(Backend::Vulkan)?;
+    let mut native = open(Backend::Native)?;
+    let mesh = scene.mesh()?;
+    let native = render_on(&mut *native, scene, &mesh, shaders, progress)?;
+    let vulkan = render_on(&mut *vulkan, scene, &mesh, shaders, progress)?;
+    let difference = native.picture.difference(&vulkan.picture, amplification)?;
+    Ok(Comparison {
+        native,
+        vulkan,
+        difference,
+    })
+}
+
+/// Renders a scene's triangles once, on a device that is open already.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn render_on(
+    device: &mut dyn Device,
+    scene: &Scene,
+    mesh: &Mesh,
+    shaders: &dyn Shaders,
+    progress: &mut dyn Progress,
+) -> Result<Rendering> {
+    let start = Instant::now();
+    let name = device.name().to_string();
+    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Picture)?;
+    let mut timings = vec![Timing::new("set-up", start.elapsed())];
+    let run = frame.run(Clock::Passes, progress)?;
+    timings.extend(run.ran);
+    let start = Instant::now();
+    let picture = frame.picture()?;
+    timings.push(Timing::new("read back", start.elapsed()));
+    Ok(Rendering {
+        picture,
+        device: name,
+        triangles: mesh.triangles.len(),
+        texel: light_view(scene, scene.light, mesh).texel,
+        edges: run.edges,
+        plan: frame.executor.graph().summary(),
+        memory: frame.executor.memory(),
+        timings,
+    })
+}
+
+fn open(backend: Backend) -> Result<Box<dyn Device>> {
+    device::open(backend).map_err(|source| FrameError::Device {
+        during: format!("opening the {backend} device"),
+        source,
+    })
+}

@@ -1,0 +1,437 @@
+//! Whether a pass fits its kernels.
+
+use std::fmt;
+
+use hankel_dsl::glam::{Vec3, Vec4};
+use hankel_dsl::native::describe::{Domain, Kernel, Layout, Output, Role, Scalar, Stage, Type};
+use hankel_dsl::native::layout::Element;
+use hankel_host::device::slots::{self, Given, Slot, Use};
+use hankel_host::device::{DeviceError, extent};
+use hankel_shadows::depth::Transform;
+
+use super::{Argument, Call, Graph, Handle, Origin, Result, Shape, Surfaces};
+
+/// Why a pass was refused.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GraphError {
+    /// Its kernel.
+    #[error("pass `{pass}`, kernel `{kernel}`: {problem}")]
+    Kernel {
+        /// The pass.
+        pass: String,
+        /// The kernel.
+        kernel: String,
+        /// What does not fit, and what would.
+        problem: String,
+    },
+    /// An argument of its kernel.
+    #[error("pass `{pass}`, kernel `{kernel}`, `{parameter}`: {problem}")]
+    Argument {
+        /// The pass.
+        pass: String,
+        /// The kernel.
+        kernel: String,
+        /// The parameter, or `output`.
+        parameter: String,
+        /// What does not fit, and what would.
+        problem: String,
+    },
+    /// What it draws, or draws into.
+    #[error("pass `{pass}`: {problem}")]
+    Draw {
+        /// The pass.
+        pass: String,
+        /// What does not fit, and what would.
+        problem: String,
+    },
+}
+
+/// Names of a pass and its kernel, for messages.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub pass: &'a str,
+    pub kernel: &'a str,
+}
+
+impl Place<'_> {
+    pub fn kernel(self, problem: impl Into<String>) -> GraphError {
+        GraphError::Kernel {
+            pass: self.pass.into(),
+            kernel: self.kernel.into(),
+            problem: problem.into(),
+        }
+    }
+
+    pub fn argument(self, parameter: &str, problem: impl Into<String>) -> GraphError {
+        GraphError::Argument {
+            pass: self.pass.into(),
+            kernel: self.kernel.into(),
+            parameter: parameter.into(),
+            problem: problem.into(),
+        }
+    }
+
+    /// The devices' rules, in this module's words.
+    fn device(self, slots: &[Slot<'_>], error: DeviceError) -> GraphError {
+        match error {
+            DeviceError::Argument {
+                argument, problem, ..
+            } => {
+                let slot = slots.iter().find(|s| s.to_string() == argument);
+                self.argument(slot.map_or(argument.as_str(), |s| &s.name), problem)
+            }
+            DeviceError::Constants { problem, .. } | DeviceError::Stage { problem, .. } => {
+                self.kernel(problem)
+            }
+            other => self.kernel(other.to_string()),
+        }
+    }
+}
+
+/// Names with commas.
+pub(super) fn listed<T: fmt::Display>(names: impl IntoIterator<Item = T>) -> String {
+    let names: Vec<String> = names.into_iter().map(|n| format!("`{n}`")).collect();
+    if names.is_empty() {
+        "nothing".into()
+    } else {
+        names.join(", ")
+    }
+}
+
+pub(super) const fn stage_name(stage: &Stage) -> &'static str {
+    match stage {
+        Stage::Compute { .. } => "compute",
+        Stage::Vertex => "vertex",
+        Stage::Fragment => "fragment",
+    }
+}
+
+/// The type of an element.
+fn element(layout: &Layout) -> Type {
+    match layout.fields.as_slice() {
+        [field] if field.name.is_empty() => field.ty.clone(),
+        _ => Type::Struct {
+            layout: layout.clone(),
+        },
+    }
+}
+
+/// Whether both are the same in memory, and called the same. What their numbers are like may be
+/// said in different places.
+fn same_type(a: &Type, b: &Type) -> bool {
+    match (a, b) {
+        (Type::Struct { layout: a }, Type::Struct { layout: b }) => same(a, b),
+        (
+            Type::Array {
+                element: a,
+                length,
+                stride,
+            },
+            Type::Array {
+                element: b,
+                length: other_length,
+                stride: other_stride,
+            },
+        ) => (length, stride) == (other_length, other_stride) && same_type(a, b),
+        _ => a == b,
+    }
+}
+
+fn same(a: &Layout, b: &Layout) -> bool {
+    (&a.name, a.size, a.fields.len()) == (&b.name, b.size, b.fields.len())
+        && a.fields.iter().zip(&b.fields).all(|(a, b)| {
+            (&a.name, a.offset, a.size) == (&b.name, b.offset, b.size) && same_type(&a.ty, &b.ty)
+        })
+}
+
+impl Graph {
+    /// The number of a kernel.
+    pub(super) fn find(&self, place: Place<'_>) -> Result<usize> {
+        let all = || self.kernels.iter().map(|e| &e.kernel);
+        if let Some(i) = all().position(|k| k.name == place.kernel) {
+            return Ok(i);
+        }
+        let variants: Vec<&str> = all()
+            .filter(|k| k.function == place.kernel)
+            .map(|k| k.name.as_str())
+            .collect();
+        let help = if variants.is_empty() {
+            let close = |k: &&Kernel| {
+                let (a, b) = (k.name.as_str(), place.kernel);
+                let head = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+                head * 2 > a.len().max(b.len())
+            };
+            let close: Vec<&str> = all().filter(close).map(|k| k.name.as_str()).collect();
+            match close.as_slice() {
+                [] => "list it in `kernels![…]` of its crate".into(),
+                names => format!("did you mean {}?", listed(names)),
+            }
+        } else {
+            format!(
+                "that function makes {}: name one of them",
+                listed(&variants)
+            )
+        };
+        Err(place.kernel(format!("there is no such kernel; {help}")))
+    }
+
+    /// The value of a handle that a pass wants to read now.
+    pub(super) fn current(
+        &self,
+        handle: Handle,
+        refuse: impl Fn(String) -> GraphError,
+    ) -> Result<&super::Value> {
+        let Some(value) = self.value(handle) else {
+            return Err(refuse(
+                "the handle belongs to another graph: use what this graph's passes returned".into(),
+            ));
+        };
+        if let Some(pass) = value.changed_by {
+            return Err(refuse(format!(
+                "pass `{}` has changed `{}` in its place: use the handle that it returned",
+                self.passes[pass].label, value.label
+            )));
+        }
+        Ok(value)
+    }
+
+    /// The value that was first in the place of another: the same for all that share a place.
+    pub(crate) fn root(&self, mut handle: Handle) -> Handle {
+        while let Origin::Changed { from, .. } = self.values[handle.at()].origin {
+            handle = from;
+        }
+        handle
+    }
+
+    /// What the devices' checks look at.
+    fn seen<'a>(&'a self, slot: &Slot<'_>, argument: &Argument) -> Given<'a> {
+        match argument {
+            Argument::Sampler(sampler) => Given::Sampler(*sampler),
+            Argument::Value(handle) => {
+                let value = &self.values[handle.at()];
+                match (&value.origin, &value.shape) {
+                    (Origin::Given { bytes, .. }, _) if !slot.role.is_written() => {
+                        Given::Bytes(bytes)
+                    }
+                    (_, Shape::Buffer { bytes, .. }) => Given::Buffer {
+                        id: self.root(*handle).index,
+                        bytes: *bytes,
+                    },
+                    (_, Shape::Texture(shape)) => Given::Texture {
+                        id: self.root(*handle).index,
+                        shape: *shape,
+                    },
+                }
+            }
+        }
+    }
+
+    /// Checks a compute kernel's call, or a stage's.
+    pub(super) fn check(&self, place: Place<'_>, call: &Call) -> Result<()> {
+        let kernel = &self.kernels[call.kernel].kernel;
+        let is_compute = matches!(kernel.stage, Stage::Compute { .. });
+        let slots = if is_compute {
+            slots::slots(kernel)
+        } else {
+            slots::drawn_slots(kernel)
+        };
+        let given: Vec<Given<'_>> = slots
+            .iter()
+            .zip(&call.args)
+            .map(|(slot, argument)| self.seen(slot, argument))
+            .collect();
+        for (slot, argument) in slots.iter().zip(&call.args) {
+            self.check_type(place, slot, argument)?;
+        }
+        slots::check(kernel, &slots, &given).map_err(|e| place.device(&slots, e))?;
+        if is_compute {
+            extent::extent(kernel, &slots, &given).map_err(|e| place.device(&slots, e))?;
+        }
+        Ok(())
+    }
+
+    /// Whether the elements of a buffer are what the kernel takes them for.
+    fn check_type(&self, place: Place<'_>, slot: &Slot<'_>, argument: &Argument) -> Result<()> {
+        let Argument::Value(handle) = argument else {
+            return Ok(());
+        };
+        let value = &self.values[handle.at()];
+        let Shape::Buffer { layout, .. } = &value.shape else {
+            return Ok(());
+        };
+        let fits = match slot.role {
+            Use::Uniform(wanted)
+            | Use::Element(wanted)
+            | Use::Storage(wanted)
+            | Use::ElementMut(wanted)
+            | Use::Output(wanted) => same(layout, wanted),
+            Use::StorageMut { layout: wanted, .. } => same(layout, wanted),
+            Use::Attribute(_, wanted) => same_type(&element(layout), wanted),
+            Use::Atomic { scalar, .. } => element(layout) == Type::Scalar { scalar },
+            _ => return Ok(()),
+        };
+        if fits {
+            return Ok(());
+        }
+        let wanted = match slot.role {
+            Use::Uniform(l) | Use::Element(l) | Use::Storage(l) | Use::ElementMut(l) => {
+                l.name.clone()
+            }
+            Use::StorageMut { layout, .. } => layout.name.clone(),
+            Use::Attribute(_, ty) => type_name(ty),
+            Use::Atomic { scalar, .. } => type_name(&Type::Scalar { scalar }),
+            _ => "something else".into(),
+        };
+        let has = &layout.name;
+        let problem = if *has == wanted {
+            format!(
+                "`{}` holds another {has} than the kernel takes: its fields differ",
+                value.label
+            )
+        } else {
+            format!(
+                "`{}` holds {has}, but the kernel takes {wanted}",
+                value.label
+            )
+        };
+        Err(place.argument(&slot.name, problem))
+    }
+
+    /// What a pass draws: positions, indices and transform.
+    pub(super) fn check_surfaces(&self, pass: &str, surfaces: &Surfaces) -> Result<()> {
+        let refuse = |what: &str, problem: String| GraphError::Draw {
+            pass: pass.into(),
+            problem: format!("its {what}: {problem}"),
+        };
+        let wanted = [
+            ("positions", surfaces.positions, Vec3::layout()),
+            ("indices", surfaces.indices, u32::layout()),
+            (
+                "clip_from_world",
+                surfaces.clip_from_world,
+                Transform::layout(),
+            ),
+        ];
+        for (what, handle, wanted) in wanted {
+            let value = self.current(handle, |problem| refuse(what, problem))?;
+            match &value.shape {
+                Shape::Buffer { layout, bytes } if *layout == wanted => {
+                    if what == "indices" && !bytes.is_multiple_of(12) {
+                        let problem = format!("{} of them are no triangles", bytes / 4);
+                        return Err(refuse(what, problem));
+                    }
+                }
+                _ => {
+                    let problem = format!("`{}` is no buffer of {}", value.label, wanted.name);
+                    return Err(refuse(what, problem));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Each vertex has its attributes.
+    pub(super) fn check_attributes(
+        &self,
+        place: Place<'_>,
+        call: &Call,
+        surfaces: &Surfaces,
+    ) -> Result<()> {
+        let bytes = |handle: Handle| self.values[handle.at()].shape.bytes();
+        let vertices = bytes(surfaces.positions) / size_of::<Vec3>();
+        let kernel = &self.kernels[call.kernel].kernel;
+        for (slot, argument) in slots::drawn_slots(kernel).iter().zip(&call.args) {
+            let (Use::Attribute(_, ty), Argument::Value(handle)) = (slot.role, argument) else {
+                continue;
+            };
+            let elements = bytes(*handle) / slots::type_bytes(ty).max(1);
+            if elements != vertices {
+                return Err(place.argument(
+                    &slot.name,
+                    format!("it has {elements} elements, but there are {vertices} vertices"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The vertex stage hands on what the fragment stage takes, and that gives one colour.
+    pub(super) fn check_stages(
+        &self,
+        place: Place<'_>,
+        vertex: &Call,
+        kernel: usize,
+    ) -> Result<()> {
+        let vertex = &self.kernels[vertex.kernel].kernel;
+        let fragment = &self.kernels[kernel].kernel;
+        for param in &fragment.params {
+            let Role::Varying { location, ty, flat } = &param.role else {
+                continue;
+            };
+            let is_float = match ty {
+                Type::Scalar { scalar } | Type::Vector { scalar, .. } => *scalar == Scalar::F32,
+                _ => false,
+            };
+            if *flat || !is_float {
+                let problem = "frames interpolate what goes from stage to stage: take an f32 or a \
+                               vector of them, not flat";
+                return Err(place.argument(&param.name, problem));
+            }
+            let handed = vertex.outputs.iter().find_map(|o| match o {
+                Output::Varying {
+                    location: l, ty, ..
+                } if l == location => Some(ty),
+                _ => None,
+            });
+            let problem = match handed {
+                Some(handed) if handed == ty => continue,
+                Some(handed) => format!(
+                    "vertex kernel `{}` hands on {} at location {location}, but this is {}",
+                    vertex.name,
+                    type_name(handed),
+                    type_name(ty)
+                ),
+                None => format!(
+                    "vertex kernel `{}` hands on nothing at location {location}",
+                    vertex.name
+                ),
+            };
+            return Err(place.argument(&param.name, problem));
+        }
+        let colour = Output::Target {
+            location: 0,
+            ty: element(&Vec4::layout()),
+        };
+        if fragment.outputs != [colour] {
+            return Err(place.kernel("it must return one colour, a `Vec4`, and nothing else"));
+        }
+        Ok(())
+    }
+}
+
+/// Whether a constant may have this value.
+pub(super) fn allowed(domain: Option<&Domain>, value: u32) -> std::result::Result<(), String> {
+    let value = f64::from(value);
+    match domain {
+        Some(Domain::Values { values }) if !values.contains(&value) => {
+            Err(format!("it is {value}, but must be one of {values:?}"))
+        }
+        Some(Domain::Range { least, most }) if !(*least..=*most).contains(&value) => {
+            Err(format!("it is {value}, but must be from {least} to {most}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A type's name for messages.
+fn type_name(ty: &Type) -> String {
+    let scalar = |s| format!("{s:?}").to_lowercase();
+    match ty {
+        Type::Scalar { scalar: s } => scalar(s),
+        Type::Vector { scalar: s, size } => format!("{}x{size}", scalar(s)),
+        Type::Array {
+            element, length, ..
+        } => format!("{}[{length}]", type_name(element)),
+        Type::Struct { layout } => layout.name.clone(),
+    }
+}

@@ -1,0 +1,188 @@
+//! Passes that techniques share: functions that take handles and return a handle.
+
+use hankel_dsl::glam::IVec2;
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_dsl::native::Sampler;
+use hankel_shadows::blur::Direction;
+use hankel_shadows::shade::encoding;
+
+use crate::graph::{AddDraw, Graph, Handle, Result, Shape, Surfaces};
+use crate::scene::{DepthRange, MapFormat, Shadow};
+
+/// How maps are looked up.
+pub const BILINEAR: Sampler = Sampler::new(true, false);
+
+/// What every technique starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Given {
+    /// World-space positions of the vertices.
+    pub positions: Handle,
+    /// Their unit normals.
+    pub normals: Handle,
+    /// Their colours.
+    pub colours: Handle,
+    /// Three for each triangle.
+    pub indices: Handle,
+    /// From the world to the shadow map, [`hankel_shadows::depth::Transform`].
+    pub light_view: Handle,
+    /// From the world to the picture, [`hankel_shadows::depth::Transform`].
+    pub camera: Handle,
+    /// How the light shines and its map is read, [`hankel_shadows::shade::Light`].
+    pub light: Handle,
+    /// What the scene asks for.
+    pub shadow: Shadow,
+    /// Pixels of the picture.
+    pub size: [u32; 2],
+    /// What its pixels are.
+    pub format: TexelFormat,
+    /// The colour where nothing is.
+    pub background: [f64; 4],
+}
+
+/// Depth as the light sees it.
+///
+/// # Errors
+/// [`crate::graph::GraphError`], as of all functions here.
+pub fn light_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    let surfaces = Surfaces {
+        positions: given.positions,
+        indices: given.indices,
+        clip_from_world: given.light_view,
+    };
+    graph
+        .draw("depth", surfaces, "light_depth")
+        .arg("position", given.positions)
+        .arg("light", given.light_view)
+        .depth([given.shadow.size; 2])
+}
+
+/// How four moments lie in a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Encoding {
+    /// The kernel that makes them of depths.
+    resolve: &'static str,
+    /// Value of the shading kernels' constant `encoding`.
+    pub constant: u32,
+}
+
+impl Encoding {
+    /// What the scene asks for.
+    pub fn of(graph: &mut Graph, given: &Given) -> Self {
+        let (resolve, constant) = match (given.shadow.format, given.shadow.depth_range) {
+            (MapFormat::Rgba32float, _) => {
+                graph.omit("quantisation", "32 bits hold the moments as they are");
+                ("resolve_plain", encoding::PLAIN)
+            }
+            (MapFormat::Rgba16unorm, DepthRange::Unit) => ("resolve_unit", encoding::UNIT),
+            (MapFormat::Rgba16unorm, DepthRange::Symmetric) => {
+                ("resolve_symmetric", encoding::SYMMETRIC)
+            }
+        };
+        Self { resolve, constant }
+    }
+}
+
+/// The mean of four moments of each texel's samples.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn moments(
+    graph: &mut Graph,
+    given: &Given,
+    encoding: Encoding,
+    depth: Handle,
+) -> Result<Handle> {
+    graph
+        .compute("resolve", encoding.resolve)
+        .arg("depth", depth)
+        .image([given.shadow.size; 2])
+}
+
+/// Weights of a Gaussian with `taps` taps: of the centre and of the taps to one side. They reach
+/// to two standard deviations, and the centre plus twice the others is 1.
+#[must_use]
+pub fn gaussian(taps: u32) -> Vec<f32> {
+    let radius = taps / 2;
+    let sigma = f64::from(radius.max(1)) / 2.0;
+    let raw: Vec<f64> = (0..=radius)
+        .map(|i| (-0.5 * (f64::from(i) / sigma).powi(2)).exp())
+        .collect();
+    let sum = 2.0 * raw.iter().sum::<f64>() - raw[0];
+    raw.iter().map(|w| (w / sum) as f32).collect()
+}
+
+/// The Gaussian that the scene asks for, along rows and along columns; the map itself where that
+/// is one texel wide.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn blur(graph: &mut Graph, given: &Given, map: Handle) -> Result<Handle> {
+    graph.omit("mips", "the map is read at its own resolution");
+    let taps = given.shadow.filter;
+    let Some(Shape::Texture(shape)) = graph.value(map).map(|v| v.shape.clone()) else {
+        return Ok(map);
+    };
+    if taps <= 1 {
+        graph.omit("blur", "the filter is one texel wide");
+        return Ok(map);
+    }
+    let kernel = format!("blur_{}", shape.format.name());
+    let weights = graph.constants("weights", &gaussian(taps));
+    let mut map = map;
+    for (label, step) in [("blur rows", IVec2::X), ("blur columns", IVec2::Y)] {
+        let direction = graph.constant("direction", &Direction { step });
+        map = graph
+            .compute(label, kernel.clone())
+            .arg("direction", direction)
+            .arg("weights", weights)
+            .arg("source", map)
+            .note(format!("{taps} taps"))
+            .image([shape.size[0], shape.size[1]])?;
+    }
+    Ok(map)
+}
+
+/// The picture by a fragment kernel over `world`, `normal` and `colour`; `bind` gives it the map.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn shade(
+    graph: &mut Graph,
+    given: &Given,
+    kernel: &'static str,
+    bind: impl FnOnce(AddDraw<'_>) -> AddDraw<'_>,
+) -> Result<Handle> {
+    if given.shadow.depth_bias == 0.0 {
+        graph.omit("depth bias", "it is 0");
+    }
+    let surfaces = Surfaces {
+        positions: given.positions,
+        indices: given.indices,
+        clip_from_world: given.camera,
+    };
+    let pass = graph
+        .draw("shade", surfaces, "surface")
+        .arg("position", given.positions)
+        .arg("normal", given.normals)
+        .arg("colour", given.colours)
+        .arg("camera", given.camera)
+        .fragment(kernel)
+        .arg("light", given.light);
+    bind(pass).colour(given.size, given.format, given.background)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gaussian_sums_to_one_and_falls() {
+        for taps in [1, 3, 7, 31] {
+            let w = gaussian(taps);
+            assert_eq!(w.len() as u32, taps / 2 + 1);
+            let sum = 2.0 * w.iter().sum::<f32>() - w[0];
+            assert!((sum - 1.0).abs() < 1e-6, "{taps}: {sum}");
+            assert!(w.windows(2).all(|p| p[0] > p[1]));
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! Variance shadow mapping: the least shadow that mean and variance of a texel's depths allow.
+
+use super::Technique;
+use crate::graph::{Graph, Handle, Result};
+use crate::passes::{BILINEAR, Encoding, Given, blur, light_depth, moments, shade};
+
+pub const TECHNIQUE: Technique = Technique {
+    name: "vsm",
+    summary: "two moments: mean and variance",
+    // The least variance keeps a surface from shading itself.
+    depth_bias: 0.0,
+    is_lower_bound: true,
+    add,
+};
+
+fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    let encoding = Encoding::of(graph, given);
+    let depth = light_depth(graph, given)?;
+    let map = moments(graph, given, encoding, depth)?;
+    let map = blur(graph, given, map)?;
+    shade(graph, given, "shade_variance", |pass| {
+        pass.arg("map", map)
+            .arg("sampler", BILINEAR)
+            .constant("encoding", encoding.constant)
+    })
+}

@@ -1,0 +1,303 @@
+//! How wrong a shadow is: pictures of the light that arrives, by a technique and by rays.
+//!
+//! - [`hard`] knows no map: 256 rays through each pixel, and one from each place that they meet
+//!   towards the light.
+//! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
+//!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
+//!   bound is nowhere darker.
+//!
+//! All of it runs on this machine's processor.
+
+use hankel_dsl::glam::{DVec3, Vec3, Vec4};
+use hankel_host::device::NativeDevice;
+use hankel_shadows::depth::row_times_point;
+use serde::Serialize;
+
+use crate::error::{FrameError, Result};
+use crate::executor::{Clock, NoShaders, Quiet};
+use crate::frame::{Frame, Show, camera_view, light, light_view, transform};
+use crate::passes::gaussian;
+use crate::scene::{Mesh, Scene};
+use crate::visibility::SAMPLES;
+use crate::visibility::cast::{Caster, Lens, Segment, in_bands};
+use crate::visibility::fragments::{Fragments, Varying};
+
+/// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arriving {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Rows from the top.
+    pub values: Vec<f32>,
+}
+
+/// How far a picture of the light is from the truth. A value of 1 is all light.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// Root of the mean squared error.
+    pub rms: f64,
+    /// Of 100 pixels, 99 are no farther off.
+    pub percentile_99: f64,
+    /// No pixel is farther off.
+    pub worst: f64,
+    /// Mean of what is too light.
+    pub wrongly_lit: f64,
+    /// Mean of what is too dark.
+    pub wrongly_dark: f64,
+}
+
+impl Arriving {
+    /// How far this is from `truth`.
+    ///
+    /// # Errors
+    /// [`FrameError::Sizes`] unless both have the same size.
+    pub fn errors(&self, truth: &Self) -> Result<Errors> {
+        let sizes = [self, truth].map(|p| [p.width, p.height]);
+        if sizes[0] != sizes[1] {
+            return Err(FrameError::Sizes {
+                left: sizes[0],
+                right: sizes[1],
+            });
+        }
+        let pairs = self.values.iter().zip(&truth.values);
+        let off: Vec<f64> = pairs.map(|(a, b)| f64::from(*a) - f64::from(*b)).collect();
+        let count = off.len().max(1) as f64;
+        let mean = |of: fn(f64) -> f64| off.iter().map(|x| of(*x)).sum::<f64>() / count;
+        let mut sorted: Vec<f64> = off.iter().map(|x| x.abs()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let rank = (sorted.len() * 99).div_ceil(100).saturating_sub(1);
+        Ok(Errors {
+            rms: mean(|x| x * x).sqrt(),
+            percentile_99: sorted.get(rank).copied().unwrap_or(0.0),
+            worst: sorted.last().copied().unwrap_or(0.0),
+            wrongly_lit: mean(|x| x.max(0.0)),
+            wrongly_dark: mean(|x| (-x).max(0.0)),
+        })
+    }
+}
+
+impl std::fmt::Display for Errors {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "rms {:.4}, 99 % {:.4}, worst {:.4}, wrongly lit {:.5}, wrongly dark {:.5}",
+            self.rms, self.percentile_99, self.worst, self.wrongly_lit, self.wrongly_dark
+        )
+    }
+}
+
+/// What the scene's technique lets arrive.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn by_technique(scene: &Scene, mesh: &Mesh) -> Result<Arriving> {
+    let mut device = NativeDevice::new();
+    let mut frame = Frame::new(&mut device, &NoShaders, scene, mesh, Show::Light)?;
+    frame.run(Clock::Frame, &mut Quiet)?;
+    Ok(Arriving {
+        width: scene.width,
+        height: scene.height,
+        values: frame.linear()?.iter().map(|c| c.x).collect(),
+    })
+}
+
+/// Rays through a pixel, along x and along y.
+const GRID: u32 = 16;
+
+/// How far from a surface a ray towards the light begins, in lengths of the scene's diagonal: what
+/// single-precision corners leave uncertain, many times over.
+const AWAY: f64 = 1e-5;
+
+/// The share of 256 rays through each pixel that meet nothing, or a place from which a ray reaches
+/// the light.
+#[must_use]
+pub fn hard(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
+    let caster = Caster::of(mesh);
+    let (width, height) = (scene.width, scene.height);
+    let view = camera_view(scene, &scene.camera, mesh);
+    let lens = Lens::new(view.clip_from_world, width, height);
+    let diagonal = mesh.bounds().map_or(1.0, |b| f64::from(b.size().length()));
+    let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
+    let mut values = vec![0.0; width as usize * height as usize];
+    in_bands(
+        &mut values,
+        width as usize,
+        advance,
+        |y, row: &mut [f32]| {
+            for (x, value) in row.iter_mut().enumerate() {
+                let mut lit = 0_u32;
+                for i in 0..GRID * GRID {
+                    let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
+                    let segment = lens.segment([x as u32, y as u32], at);
+                    lit += u32::from(caster.first(&segment).is_none_or(|hit| {
+                        let from = segment.at(hit.t) + toward * (AWAY * diagonal);
+                        let to_light = Segment::new(from, toward * (2.0 * diagonal));
+                        caster.first(&to_light).is_none()
+                    }));
+                }
+                *value = lit as f32 / (GRID * GRID) as f32;
+            }
+        },
+    );
+    Arriving {
+        width,
+        height,
+        values,
+    }
+}
+
+/// Depth samples of the light's map, and a filter over them.
+struct Filter {
+    size: i64,
+    depths: Vec<f32>,
+    /// Of the taps from one side to the other; their sum is 1.
+    weights: Vec<f64>,
+}
+
+impl Filter {
+    /// The share of the filter's depths around a texel that are nearer than `z`.
+    fn around(&self, x: i64, y: i64, z: f32) -> f64 {
+        let radius = self.weights.len() as i64 / 2;
+        let within = |i: i64| i.clamp(0, self.size - 1);
+        let samples = SAMPLES as usize;
+        let mut sum = 0.0;
+        for (dy, wy) in (-radius..).zip(&self.weights) {
+            for (dx, wx) in (-radius..).zip(&self.weights) {
+                let texel = within(y + dy) * self.size + within(x + dx);
+                let first = texel as usize * samples;
+                let depths = &self.depths[first..first + samples];
+                let nearer = depths.iter().filter(|d| **d < z).count();
+                sum += wy * wx * nearer as f64;
+            }
+        }
+        sum / f64::from(SAMPLES)
+    }
+
+    /// The same between the four nearest texels, as a sampler interpolates.
+    fn at(&self, u: f32, v: f32, z: f32) -> f64 {
+        let place = |t: f32| f64::from(t) * self.size as f64 - 0.5;
+        let (x, y) = (place(u), place(v));
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let (x, y) = (x.floor() as i64, y.floor() as i64);
+        let mut sum = 0.0;
+        for (dy, wy) in [(0, 1.0 - fy), (1, fy)] {
+            for (dx, wx) in [(0, 1.0 - fx), (1, fx)] {
+                // What the sampler repeats at the edge, the filter has to repeat as well.
+                let (x, y) = (x + dx, y + dy);
+                let last = self.size - 1;
+                sum += wx * wy * self.around(x.clamp(0, last), y.clamp(0, last), z);
+            }
+        }
+        sum
+    }
+}
+
+/// What percentage-closer filtering lets arrive that has the weights of the scene's filter and of
+/// bilinear lookup, and compares all depth samples. `leak_cut` is not part of it.
+#[must_use]
+pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
+    let caster = Caster::of(mesh);
+    let view = light_view(scene, scene.light, mesh);
+    let uniform = light(scene, &view, Show::Light);
+    let size = scene.shadow.size;
+    let from_light = transform(view.clip_from_world);
+    let clip: Vec<Vec4> = mesh
+        .positions
+        .iter()
+        .map(|p| from_light.apply(*p))
+        .collect();
+    let lens = Lens::new(view.clip_from_world, size, size);
+    let half = gaussian(scene.shadow.filter);
+    let weights = half[1..].iter().rev().chain(&half).map(|w| f64::from(*w));
+    let weights: Vec<f64> = weights.collect();
+    let sum: f64 = weights.iter().sum();
+    let filter = Filter {
+        size: i64::from(size),
+        depths: caster.depths(&lens, &clip, [size; 2], &mut |share| advance(share * 0.4)),
+        weights: weights.iter().map(|w| w / sum).collect(),
+    };
+
+    let camera = camera_view(scene, &scene.camera, mesh);
+    let lens = Lens::new(camera.clip_from_world, scene.width, scene.height);
+    let pixels = [scene.width, scene.height];
+    let fragments = Fragments::find(&caster, &lens, pixels, &mut |s| advance(0.4 + s * 0.3));
+    let world = Varying {
+        components: 3,
+        vertices: bytemuck::cast_slice(&mesh.positions).to_vec(),
+    };
+    let world = fragments.interpolate(&caster, &lens, &[world]);
+    let world: &[Vec3] = bytemuck::cast_slice(&world[0]);
+    let mut arriving = vec![0.0; world.len()];
+    let mut rest = |share: f32| advance(0.7 + share * 0.3);
+    in_bands(
+        &mut arriving,
+        1 << 10,
+        &mut rest,
+        |band, part: &mut [f64]| {
+            let places = &world[band << 10..];
+            for (value, p) in part.iter_mut().zip(places) {
+                let row = |row: Vec4| row_times_point(row, *p);
+                let z = row(uniform.row_depth) - uniform.depth_bias;
+                *value = 1.0 - filter.at(row(uniform.row_u), row(uniform.row_v), z);
+            }
+        },
+    );
+    let pixel = |samples: [Option<usize>; SAMPLES as usize]| {
+        let sum: f64 = samples.iter().map(|s| s.map_or(1.0, |i| arriving[i])).sum();
+        (sum / f64::from(SAMPLES)) as f32
+    };
+    Arriving {
+        width: scene.width,
+        height: scene.height,
+        values: fragments.samples().map(pixel).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(values: &[f32]) -> Arriving {
+        Arriving {
+            width: values.len() as u32,
+            height: 1,
+            values: values.to_vec(),
+        }
+    }
+
+    #[test]
+    fn errors_tell_light_from_dark() {
+        let truth = row(&[0.0, 1.0, 0.5, 0.5]);
+        let errors = row(&[0.5, 1.0, 0.25, 0.5]).errors(&truth).unwrap();
+        assert!((errors.rms - (0.3125_f64 / 4.0).sqrt()).abs() < 1e-12);
+        assert_eq!((errors.percentile_99, errors.worst), (0.5, 0.5));
+        assert_eq!((errors.wrongly_lit, errors.wrongly_dark), (0.125, 0.0625));
+        assert!(row(&[0.0]).errors(&truth).is_err());
+        // The 99th of 100 is not the last.
+        let mut one_off = vec![0.0; 100];
+        one_off[7] = 1.0;
+        let errors = row(&one_off).errors(&row(&[0.0; 100])).unwrap();
+        assert_eq!((errors.percentile_99, errors.worst), (0.0, 1.0));
+    }
+
+    #[test]
+    fn a_filter_weighs_depths_as_it_should() {
+        // Two texels, the left one near with all samples, the right one far with all but one.
+        let mut depths = vec![0.2_f32; 4];
+        depths.extend([0.8, 0.8, 0.8, 0.2]);
+        depths.extend([0.9; 8]);
+        let filter = Filter {
+            size: 2,
+            depths,
+            weights: vec![1.0],
+        };
+        assert_eq!(filter.around(0, 0, 0.5), 1.0);
+        assert_eq!(filter.around(1, 0, 0.5), 0.25);
+        assert_eq!(filter.around(9, -3, 0.5), 0.25);
+        // Half way between the two, and half way down.
+        assert_eq!(filter.at(0.5, 0.25, 0.5), 0.625);
+        assert_eq!(filter.at(0.5, 0.5, 0.5), 0.3125);
+    }
+}

@@ -1,0 +1,338 @@
+//! Visibility by rays, for the device without a rasteriser: one ray through each sample, and the
+//! stages' kernels over arrays of what the rays found.
+//!
+//! A tree is built when triangles change, rays through pixels are cast when the view changes; what
+//! changes neither shades the same fragments again.
+
+use std::collections::HashMap;
+
+use hankel_dsl::glam::{Mat4, Vec3, Vec4};
+use hankel_dsl::native::describe::{Kernel, Output, Role, TexelFormat};
+use hankel_host::device::slots::{POSITION, type_bytes};
+use hankel_host::device::{Bind, BufferId, Device, Program};
+
+use super::cast::{Caster, Lens, SAMPLES};
+use super::fragments::{Fragments, Varying};
+use super::{Draw, Onto, Stage};
+use crate::error::{FrameError, Result, during};
+
+/// Fragments that are shaded at once.
+const BATCH: usize = 1 << 14;
+
+/// What rays found through the pixels of a view.
+struct Found {
+    stamps: [u64; 3],
+    size: [u32; 2],
+    fragments: Fragments,
+}
+
+/// What is kept from run to run.
+#[derive(Default)]
+pub struct Rays {
+    /// By buffers of positions and indices; with their stamps.
+    casters: HashMap<[BufferId; 2], ([u64; 2], Caster)>,
+    /// By pass: outputs of the vertex kernel.
+    vertices: HashMap<usize, Vec<BufferId>>,
+    /// By pass.
+    found: HashMap<usize, Found>,
+    /// What a batch is shaded into.
+    batch: Option<BufferId>,
+    pub bytes: usize,
+}
+
+impl Rays {
+    pub fn draw(
+        &mut self,
+        device: &mut dyn Device,
+        draw: &Draw<'_>,
+        advance: &mut dyn FnMut(f32),
+    ) -> Result<Option<f64>> {
+        self.build(device, draw)?;
+        let bytes = device
+            .read_buffer(draw.clip_from_world.buffer)
+            .map_err(during(draw.label))?;
+        // Rows, as `hankel_shadows::depth::Transform` has them.
+        let rows: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
+        let rows = <[f32; 16]>::try_from(rows).map_err(|_| FrameError::Value {
+            value: draw.label.into(),
+            problem: "its transform is no 4x4 matrix".into(),
+        })?;
+        let clip_from_world = Mat4::from_cols_array(&rows).transpose();
+        let [width, height, _] = draw.shape.size;
+        let lens = Lens::new(clip_from_world, width, height);
+        match (draw.onto, &draw.fragment) {
+            (
+                Onto::Colour {
+                    texture,
+                    background,
+                },
+                Some(stage),
+            ) => {
+                self.find(draw, &lens, advance);
+                let vertices = self.run_vertices(device, draw)?;
+                let texels = self.shade(device, draw, stage, &lens, &vertices, background)?;
+                device
+                    .write_texture(texture, &texels)
+                    .map_err(during(draw.label))?;
+                Ok(self.found.get(&draw.pass).map(|f| f.fragments.edges()))
+            }
+            (Onto::Colour { texture, .. } | Onto::Depth(texture), _) => {
+                let vertices = self.run_vertices(device, draw)?;
+                let position = vertices.first().map_or(&[][..], Vec::as_slice);
+                let clip: Vec<Vec4> = bytemuck::pod_collect_to_vec(position);
+                let caster = self.caster(draw)?;
+                let depths = caster.depths(&lens, &clip, [width, height], advance);
+                device
+                    .write_texture(texture, bytemuck::cast_slice(&depths))
+                    .map_err(during(draw.label))?;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Builds the tree if triangles have changed.
+    fn build(&mut self, device: &mut dyn Device, draw: &Draw<'_>) -> Result<()> {
+        let buffers = [draw.positions.buffer, draw.indices.buffer];
+        let stamps = [draw.positions.stamp, draw.indices.stamp];
+        if self
+            .casters
+            .get(&buffers)
+            .is_some_and(|(s, _)| *s == stamps)
+        {
+            return Ok(());
+        }
+        let mut read = |id| device.read_buffer(id).map_err(during(draw.label));
+        let positions: Vec<Vec3> = bytemuck::pod_collect_to_vec(&read(buffers[0])?);
+        let triangles: Vec<[u32; 3]> = bytemuck::pod_collect_to_vec(&read(buffers[1])?);
+        let far = triangles.as_flattened().iter().max();
+        if let Some(far) = far.filter(|i| **i as usize >= positions.len()) {
+            return Err(FrameError::Value {
+                value: draw.label.into(),
+                problem: format!(
+                    "its indices name vertex {far}, but there are {}, counted from 0",
+                    positions.len()
+                ),
+            });
+        }
+        let caster = Caster::new(&positions, &triangles);
+        self.casters.insert(buffers, (stamps, caster));
+        Ok(())
+    }
+
+    fn caster(&self, draw: &Draw<'_>) -> Result<&Caster> {
+        let buffers = [draw.positions.buffer, draw.indices.buffer];
+        let built = self.casters.get(&buffers).map(|(_, caster)| caster);
+        built.ok_or_else(|| FrameError::Value {
+            value: draw.label.into(),
+            problem: "its triangles are not there".into(),
+        })
+    }
+
+    /// Casts rays through the pixels if triangles or view have changed.
+    fn find(&mut self, draw: &Draw<'_>, lens: &Lens, advance: &mut dyn FnMut(f32)) {
+        let stamps = [draw.positions, draw.indices, draw.clip_from_world].map(|s| s.stamp);
+        let [width, height, _] = draw.shape.size;
+        let size = [width, height];
+        let same = |f: &Found| f.stamps == stamps && f.size == size;
+        if self.found.get(&draw.pass).is_some_and(same) {
+            return;
+        }
+        let buffers = [draw.positions.buffer, draw.indices.buffer];
+        if let Some((_, caster)) = self.casters.get(&buffers) {
+            // Shading is the rest.
+            let mut cast = |share: f32| advance(share * 0.7);
+            let fragments = Fragments::find(caster, lens, size, &mut cast);
+            let found = Found {
+                stamps,
+                size,
+                fragments,
+            };
+            self.found.insert(draw.pass, found);
+        }
+    }
+
+    /// Runs the vertex kernel over all vertices: the bytes of each of its outputs.
+    fn run_vertices(&mut self, device: &mut dyn Device, draw: &Draw<'_>) -> Result<Vec<Vec<u8>>> {
+        let Stage { entry, args, .. } = &draw.vertex;
+        if !self.vertices.contains_key(&draw.pass) {
+            let count = self.caster(draw)?.vertex_count();
+            let mut made = Vec::new();
+            for output in &entry.kernel.outputs {
+                let bytes = components(output) * size_of::<f32>() * count;
+                made.push(
+                    device
+                        .buffer(draw.label, bytes)
+                        .map_err(during(draw.label))?,
+                );
+                self.bytes += bytes;
+            }
+            self.vertices.insert(draw.pass, made);
+        }
+        let outputs = &self.vertices[&draw.pass];
+        let mut all = args.clone();
+        all.extend(outputs.iter().map(|id| Bind::Buffer(*id)));
+        device
+            .dispatch(&native(&draw.vertex), &all)
+            .map_err(during(draw.label))?;
+        outputs
+            .iter()
+            .map(|id| device.read_buffer(*id).map_err(during(draw.label)))
+            .collect()
+    }
+
+    /// Runs the fragment kernel over what the rays found: the target's texels.
+    fn shade(
+        &mut self,
+        device: &mut dyn Device,
+        draw: &Draw<'_>,
+        stage: &Stage<'_>,
+        lens: &Lens,
+        vertices: &[Vec<u8>],
+        background: [f64; 4],
+    ) -> Result<Vec<u8>> {
+        let batch = match self.batch {
+            Some(batch) => batch,
+            None => {
+                let bytes = BATCH * size_of::<Vec4>();
+                let batch = device
+                    .buffer("fragments", bytes)
+                    .map_err(during(draw.label))?;
+                self.bytes += bytes;
+                *self.batch.insert(batch)
+            }
+        };
+        let caster = self.caster(draw)?;
+        let Some(Found { fragments, .. }) = self.found.get(&draw.pass) else {
+            return Ok(Vec::new());
+        };
+        let varyings = varyings(&draw.vertex.entry.kernel, &stage.entry.kernel, vertices);
+        let values = fragments.interpolate(caster, lens, &varyings);
+        let program = native(stage);
+        let mut colours: Vec<Vec4> = Vec::with_capacity(fragments.count());
+        // Always as many, so that one buffer is enough for all frames: the last ones may be
+        // nobody's.
+        let mut parts: Vec<Vec<f32>> = vec![Vec::new(); values.len()];
+        while colours.len() < fragments.count() {
+            let begin = colours.len();
+            let count = BATCH.min(fragments.count() - begin);
+            for ((part, all), varying) in parts.iter_mut().zip(&values).zip(&varyings) {
+                let n = varying.components;
+                part.clear();
+                part.extend_from_slice(&all[begin * n..(begin + count) * n]);
+                part.resize(BATCH * n, 0.0);
+            }
+            let args: Vec<Bind<'_>> = arguments(&stage.entry.kernel, &stage.args, &parts)
+                .chain([Bind::Buffer(batch)])
+                .collect();
+            device
+                .dispatch(&program, &args)
+                .map_err(during(draw.label))?;
+            let bytes = device.read_buffer(batch).map_err(during(draw.label))?;
+            let shaded: Vec<Vec4> = bytemuck::pod_collect_to_vec(&bytes);
+            colours.extend_from_slice(&shaded[..count]);
+        }
+        let background = Vec4::from(background.map(|c| c as f32));
+        Ok(resolve(
+            fragments,
+            &colours,
+            background,
+            draw.shape.format.texel(),
+        ))
+    }
+
+    pub fn free(&mut self, device: &mut dyn Device) {
+        let outputs = self.vertices.drain().flat_map(|(_, buffers)| buffers);
+        for buffer in outputs.chain(self.batch.take()) {
+            // The device is gone if it cannot free.
+            let _ = device.free_buffer(buffer);
+        }
+        self.bytes = 0;
+    }
+}
+
+/// The stage's kernel as the native device runs it.
+const fn native<'a>(stage: &Stage<'a>) -> Program<'a> {
+    Program {
+        shader: None,
+        ..stage.program
+    }
+}
+
+/// Floats of a stage's output.
+fn components(output: &Output) -> usize {
+    let ty = match output {
+        Output::Varying { ty, .. } | Output::Target { ty, .. } => ty,
+        _ => &POSITION,
+    };
+    type_bytes(ty) / size_of::<f32>()
+}
+
+/// What the vertex stage hands to the fragment stage, in the order in which that takes it. That it
+/// does was checked with the graph.
+fn varyings(vertex: &Kernel, fragment: &Kernel, vertices: &[Vec<u8>]) -> Vec<Varying> {
+    let wanted = fragment.params.iter().filter_map(|p| match &p.role {
+        Role::Varying { location, .. } => Some(*location),
+        _ => None,
+    });
+    wanted
+        .filter_map(|wanted| {
+            let is_it =
+                |o: &Output| matches!(o, Output::Varying { location, .. } if *location == wanted);
+            let mut handed = vertex.outputs.iter().zip(vertices);
+            handed.find(|(o, _)| is_it(o)).map(|(o, bytes)| Varying {
+                components: components(o),
+                vertices: bytemuck::pod_collect_to_vec(bytes),
+            })
+        })
+        .collect()
+}
+
+/// The arguments of the fragment kernel in the order of its parameters: varyings among the others.
+fn arguments<'a>(
+    kernel: &'a Kernel,
+    others: &'a [Bind<'a>],
+    varyings: &'a [Vec<f32>],
+) -> impl Iterator<Item = Bind<'a>> {
+    let mut others = others.iter();
+    let mut varyings = varyings.iter();
+    let slots = hankel_host::device::slots::slots(kernel);
+    let kinds: Vec<bool> = slots
+        .iter()
+        .filter(|s| !matches!(s.role, hankel_host::device::slots::Use::Interface(_)))
+        .map(|s| matches!(s.role, hankel_host::device::slots::Use::Varying(..)))
+        .collect();
+    kinds.into_iter().filter_map(move |is_varying| {
+        if is_varying {
+            let values = varyings.next()?;
+            Some(Bind::Bytes(bytemuck::cast_slice(values)))
+        } else {
+            others.next().copied()
+        }
+    })
+}
+
+/// The mean of each pixel's samples, stored as the colour targets store them.
+fn resolve(
+    fragments: &Fragments,
+    colours: &[Vec4],
+    background: Vec4,
+    format: TexelFormat,
+) -> Vec<u8> {
+    let mut texel = vec![0; format.bytes()];
+    let mut through = |c: Vec4| {
+        format.store(&mut texel, c);
+        format.load(&texel)
+    };
+    let background = through(background);
+    let colours: Vec<Vec4> = colours.iter().map(|&c| through(c)).collect();
+    let mut picture = Vec::new();
+    for samples in fragments.samples() {
+        let sum: Vec4 = samples
+            .iter()
+            .map(|s| s.map_or(background, |i| colours[i]))
+            .sum();
+        format.store(&mut texel, sum / SAMPLES.len() as f32);
+        picture.extend_from_slice(&texel);
+    }
+    picture
+}
