@@ -354,6 +354,7 @@ Examples:
   hankel render scenes/scan.toml --out scan.png
   hankel render scenes/hard.toml --out hard.png --backend vulkan
   hankel render scenes/scan.toml --out scan.png --compare
+  hankel render scenes/hard.toml --out hard.png --errors
 
 With --compare, OUT is the native picture; OUT-vulkan and OUT-difference are written beside it.")]
 pub struct Render {
@@ -377,6 +378,10 @@ pub struct Render {
     /// How much the difference picture is amplified.
     #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION)]
     pub amplify: u32,
+    /// Also tells how wrong the shadow is, against rays and against filtering without moments; takes
+    /// some minutes for a large picture.
+    #[arg(long)]
+    pub errors: bool,
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,

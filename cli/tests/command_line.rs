@@ -645,6 +645,20 @@ fn a_scene_is_rendered_and_compared() {
         .code(0)
         .out();
     assert!(out.contains("\"psnr\""), "{out}");
+    assert!(out.contains("\"unshared\""), "{out}");
+    let out = desk
+        .hankel("render scene.toml --out a.png --errors")
+        .code(0)
+        .out();
+    for line in [
+        "1. depth: light_depth",
+        "no mips",
+        "MB if passes shared no memory",
+        "light against rays: rms 0.",
+        "light against all samples, filtered: rms 0.",
+    ] {
+        assert!(out.contains(line), "{line}: {out}");
+    }
     desk.hankel("render scene.toml --out a.png --compare --limit 0")
         .fails(1, &["the pictures differ", "at most 0.000 %"]);
     desk.hankel("render scene.toml --out a.png --compare --limit 101")

@@ -29,3 +29,8 @@ pub use frame::{
     render_on,
 };
 pub use picture::{Difference, Picture};
+
+/// The page about frames: its code is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/frames.md")]
+struct Page;

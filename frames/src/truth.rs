@@ -14,7 +14,7 @@ use hankel_shadows::depth::row_times_point;
 use serde::Serialize;
 
 use crate::error::{FrameError, Result};
-use crate::executor::{Clock, NoShaders, Quiet};
+use crate::executor::{Clock, NoShaders, Progress, Quiet};
 use crate::frame::{Frame, Show, camera_view, light, light_view, transform};
 use crate::passes::gaussian;
 use crate::scene::{Mesh, Scene};
@@ -100,6 +100,32 @@ pub fn by_technique(scene: &Scene, mesh: &Mesh) -> Result<Arriving> {
         width: scene.width,
         height: scene.height,
         values: frame.linear()?.iter().map(|c| c.x).collect(),
+    })
+}
+
+/// A technique's errors on a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Measured {
+    /// Against [`hard`]: what an observer would say.
+    pub rays: Errors,
+    /// Against [`filtered`]: what the reconstruction adds.
+    pub filtered: Errors,
+}
+
+/// Measures the scene's technique.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Result<Measured> {
+    progress.begin("light by the technique", 1, 3);
+    let picture = by_technique(scene, mesh)?;
+    progress.begin("light by all samples", 2, 3);
+    let soft = filtered(scene, mesh, &mut |share| progress.advance(share));
+    progress.begin("light by rays", 3, 3);
+    let sharp = hard(scene, mesh, &mut |share| progress.advance(share));
+    Ok(Measured {
+        rays: picture.errors(&sharp)?,
+        filtered: picture.errors(&soft)?,
     })
 }
 

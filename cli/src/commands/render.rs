@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use hankel_frames::graph::Summary;
 use hankel_frames::scene::{Geometry, Scene};
+use hankel_frames::truth::{Measured, measure};
 use hankel_frames::{Difference, Memory, Picture, Rendering, Timing, compare, render};
 use hankel_host::device::Backend;
 use hankel_system::output::{self, Output};
@@ -24,6 +25,8 @@ struct Report<'a> {
     timings: Vec<&'a [Timing]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     difference: Option<&'a Difference>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    errors: Option<&'a Measured>,
     /// Share of the pixels where rounding may decide what a sample sees.
     #[serde(skip_serializing_if = "Option::is_none")]
     edges: Option<f64>,
@@ -53,13 +56,21 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
             Backend::Vulkan => session.all_words()?,
         };
         let rendering = render(&scene, backend, &shaders, &mut progress)?;
+        let errors = errors(args, &scene, &mut progress)?;
         drop(progress);
         save([&rendering.picture], outputs)?;
-        print(args, quiet, pictures, &[&rendering], None);
+        let told = Told {
+            pictures,
+            renderings: &[&rendering],
+            difference: None,
+            errors,
+        };
+        print(args, quiet, told);
         return Ok(Outcome::Fine);
     }
     let shaders = session.all_words()?;
     let comparison = compare(&scene, &shaders, args.amplify, &mut progress)?;
+    let errors = errors(args, &scene, &mut progress)?;
     drop(progress);
     let made = [
         &comparison.native.picture,
@@ -67,13 +78,13 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         &comparison.difference.picture,
     ];
     save(made, outputs)?;
-    print(
-        args,
-        quiet,
+    let told = Told {
         pictures,
-        &[&comparison.native, &comparison.vulkan],
-        Some(&comparison.difference),
-    );
+        renderings: &[&comparison.native, &comparison.vulkan],
+        difference: Some(&comparison.difference),
+        errors,
+    };
+    print(args, quiet, told);
     let limit = args
         .limit
         .map_or_else(|| comparison.limit(), |percent| percent / 100.0);
@@ -86,6 +97,13 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         );
     }
     Ok(Outcome::of(share <= limit))
+}
+
+fn errors(args: &Render, scene: &Scene, progress: &mut Progress) -> Result<Option<Measured>> {
+    if !args.errors {
+        return Ok(None);
+    }
+    Ok(Some(measure(scene, &scene.mesh()?, progress)?))
 }
 
 fn save<const N: usize>(pictures: [&Picture; N], outputs: Vec<Output>) -> Result<()> {
@@ -103,13 +121,21 @@ fn beside(out: &Path, what: &str) -> PathBuf {
     out.with_file_name(format!("{stem}-{what}{dot}{extension}"))
 }
 
-fn print(
-    args: &Render,
-    quiet: bool,
+/// What there is to tell.
+struct Told<'a> {
     pictures: Vec<PathBuf>,
-    renderings: &[&Rendering],
-    difference: Option<&Difference>,
-) {
+    renderings: &'a [&'a Rendering],
+    difference: Option<&'a Difference>,
+    errors: Option<Measured>,
+}
+
+fn print(args: &Render, quiet: bool, told: Told<'_>) {
+    let Told {
+        pictures,
+        renderings,
+        difference,
+        errors,
+    } = told;
     let first = renderings[0];
     if args.format == Format::Json {
         print::json(&Report {
@@ -120,6 +146,7 @@ fn print(
             memory: renderings.iter().map(|r| r.memory).collect(),
             timings: renderings.iter().map(|r| r.timings.as_slice()).collect(),
             difference,
+            errors: errors.as_ref(),
             edges: first.edges,
         });
         return;
@@ -149,6 +176,10 @@ fn print(
                 edges * 100.0
             );
         }
+    }
+    if let Some(Measured { rays, filtered }) = errors {
+        say!("light against rays: {rays}");
+        say!("light against all samples, filtered: {filtered}");
     }
     for p in &pictures {
         say!("{}", p.display());

@@ -304,7 +304,8 @@ impl Reader<'_> {
             },
             None => d.technique,
         };
-        let bias = Shadow::recommended_bias(depth_range, format);
+        let published = Shadow::recommended_bias(depth_range, format);
+        let bias = technique.moment_bias.unwrap_or(published);
         let depth_bias = technique.depth_bias;
         Ok(Shadow {
             technique,

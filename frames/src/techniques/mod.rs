@@ -20,6 +20,9 @@ pub struct Technique {
     /// What is taken off a receiver's depth unless the scene says otherwise, in units of the map's
     /// whole depth.
     pub depth_bias: f32,
+    /// How far moments are pulled towards those of a harmless distribution unless the scene says
+    /// otherwise; none takes what is published for four power moments in the scene's format.
+    pub moment_bias: Option<f32>,
     /// Whether its shadow is never darker than [`crate::truth::filtered`], but for rounding.
     pub is_lower_bound: bool,
     /// Adds its passes; gives the picture.
