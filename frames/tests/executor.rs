@@ -124,6 +124,41 @@ fn values_that_cannot_be_set_or_read_are_refused() {
     assert!(executor.read(both).is_ok());
 }
 
+/// Four values in a row need two places, whoever is kept; results are those of four.
+#[test]
+fn values_of_other_times_share_a_place() {
+    let mut device = NativeDevice::new();
+    let mut graph = Graph::new(hankel_conformance::entries());
+    let cells = graph.buffer("cells", &[1.0_f32; 16]);
+    let constant = graph.constant("grid", &grid(1.0));
+    let last = graph.parameter("last", &grid(1.0));
+    let mut value = cells;
+    for (label, grid) in [
+        ("a", constant),
+        ("b", constant),
+        ("c", constant),
+        ("d", last),
+    ] {
+        let pass = graph.compute(label, "blur_grid").arg("grid", grid);
+        value = pass.arg("cells", value).elements(16).unwrap();
+    }
+    graph.keep(value);
+    let mut executor = Executor::new(&mut device, &NoShaders, graph).unwrap();
+    let memory = executor.memory();
+    assert_eq!(memory.unshared - memory.bytes, 2 * 64);
+    let check = |executor: &mut Executor<'_>, ran: &[&str], wanted: f32| {
+        assert_eq!(run(executor), ran);
+        assert_eq!(floats(&executor.read(value).unwrap()), [wanted; 16]);
+    };
+    check(&mut executor, &["a", "b", "c", "d"], 81.0);
+    executor.set(last, &grid(2.0)).unwrap();
+    check(&mut executor, &["d"], 162.0);
+    executor.set_buffer(cells, &[2.0_f32; 16]).unwrap();
+    check(&mut executor, &["a", "b", "c", "d"], 324.0);
+    executor.set(last, &grid(1.0)).unwrap();
+    check(&mut executor, &["d"], 162.0);
+}
+
 /// What is added to begins anew whenever it is added to anew.
 #[test]
 fn changes_in_place_begin_anew() {

@@ -76,6 +76,19 @@ fn lower_bounds_are_nowhere_darker_than_all_samples_filtered() {
     }
 }
 
+/// The kernel does in single precision what the truth does in double precision.
+#[test]
+fn filtering_comparisons_of_all_samples_is_the_truth() {
+    for filter in [1, 5] {
+        let shadow = format!("technique = 'pcf-gaussian'\nfilter = {filter}");
+        let (scene, mesh) = scene("yard", 256, &shadow);
+        let truth = filtered(&scene, &mesh, &mut |_| ());
+        let errors = technique(&scene, &mesh).errors(&truth).unwrap();
+        // A place is rounded to 256 * 2^-24 texels.
+        assert!(errors.worst < 1e-4, "{filter}: {errors}");
+    }
+}
+
 /// Truth that was darker nowhere would prove nothing: it has shadow, light, and what is between.
 #[test]
 fn the_filtered_truth_is_a_soft_picture_of_the_hard_one() {

@@ -304,8 +304,7 @@ impl Reader<'_> {
             },
             None => d.technique,
         };
-        let published = Shadow::recommended_bias(depth_range, format);
-        let bias = technique.moment_bias.unwrap_or(published);
+        let bias = Shadow::recommended_bias(depth_range, format);
         let depth_bias = technique.depth_bias;
         Ok(Shadow {
             technique,

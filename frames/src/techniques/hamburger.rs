@@ -10,7 +10,6 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "four moments, depths anywhere on the line",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
     depth_bias: 0.0,
-    moment_bias: None,
     is_lower_bound: true,
     add,
 };

@@ -12,7 +12,6 @@ pub const TECHNIQUE: Technique = Technique {
     // problem discards it: a surface stays sharp, and what 16 bits round would decide between
     // light and full shadow.
     depth_bias: 1e-3,
-    moment_bias: None,
     is_lower_bound: true,
     add,
 };

@@ -4,6 +4,7 @@
 mod hamburger;
 mod hausdorff;
 mod pcf;
+mod pcf_gaussian;
 mod vsm;
 
 use std::fmt;
@@ -20,9 +21,6 @@ pub struct Technique {
     /// What is taken off a receiver's depth unless the scene says otherwise, in units of the map's
     /// whole depth.
     pub depth_bias: f32,
-    /// How far moments are pulled towards those of a harmless distribution unless the scene says
-    /// otherwise; none takes what is published for four power moments in the scene's format.
-    pub moment_bias: Option<f32>,
     /// Whether its shadow is never darker than [`crate::truth::filtered`], but for rounding.
     pub is_lower_bound: bool,
     /// Adds its passes; gives the picture.
@@ -30,11 +28,12 @@ pub struct Technique {
 }
 
 /// All of them.
-pub const ALL: [&Technique; 4] = [
+pub const ALL: [&Technique; 5] = [
     &hamburger::TECHNIQUE,
     &hausdorff::TECHNIQUE,
     &vsm::TECHNIQUE,
     &pcf::TECHNIQUE,
+    &pcf_gaussian::TECHNIQUE,
 ];
 
 impl Technique {

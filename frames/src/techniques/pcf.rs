@@ -10,7 +10,6 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "percentage-closer filtering of the depths themselves",
     // The comparison has no slack, and a slope would be shaded by its own texels.
     depth_bias: 2e-3,
-    moment_bias: None,
     is_lower_bound: false,
     add,
 };

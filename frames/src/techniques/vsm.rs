@@ -9,7 +9,6 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "two moments: mean and variance",
     // The least variance keeps a surface from shading itself.
     depth_bias: 0.0,
-    moment_bias: None,
     is_lower_bound: true,
     add,
 };

@@ -7,7 +7,7 @@
 //! | resolve to four moments, quantised | [`resolve_unit`](resolve::resolve_unit), [`resolve_symmetric`](resolve::resolve_symmetric), [`resolve_plain`](resolve::resolve_plain) |
 //! | separable filter, twice | [`blur`](blur::blur) |
 //! | geometry from the camera | [`surface`](shade::surface) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian) |
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -39,6 +39,7 @@ hankel_dsl::kernels![
     shade::shade_hausdorff,
     shade::shade_variance,
     shade::shade_pcf,
+    shade::shade_pcf_gaussian,
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,

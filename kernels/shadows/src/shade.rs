@@ -2,7 +2,9 @@
 //! uniforms and map.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel, to_i32};
+use hankel_dsl::{
+    Buffer, Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel, to_i32,
+};
 use hankel_moments::{
     Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
     hausdorff_4, hausdorff_4_symmetric, variance_2,
@@ -286,7 +288,7 @@ pub fn shade_pcf(
     #[range(0.0..=1.0)]
     colour: Vec3,
     #[uniform] light: &Light,
-    #[texture] depth: hankel_dsl::Texture2dMultisampled<'_>,
+    #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     let (uv, z) = receiver(light, world);
     let size = depth.size();
@@ -310,4 +312,73 @@ pub fn shade_pcf(
     }
     let width = (2 * radius + 1) as f32;
     lit(light, normal, colour, shadowed / (width * width))
+}
+
+/// Shading with percentage-closer filtering that has the weights of a separable filter and of
+/// bilinear lookup, over all samples of each texel: what a filtered shadow map approximates, and
+/// what lower bounds are never darker than. `weights` are those of [`crate::blur::blur`].
+#[kernel(
+    fragment,
+    inputs = crate::inputs::maps::weighted_depths,
+    parity(
+        ulp = 0,
+        absolute = 4e-5,
+        why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
+    )
+)]
+pub fn shade_pcf_gaussian(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[storage]
+    #[length(1..=7)]
+    #[range(0.0..=0.15)]
+    weights: Buffer<'_, f32>,
+    #[texture] depth: Texture2dMultisampled<'_>,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+) -> Vec4 {
+    let (uv, z) = receiver(light, world);
+    let size = depth.size();
+    // In texels from the first one's centre; beyond the edge as at it.
+    let place = |t: f32, size: u32| Real::clamp(t * size as f32 - 0.5, 0.0, (size - 1) as f32);
+    let (x, y) = (place(uv.x, size.x), place(uv.y, size.y));
+    let (left, top) = (to_i32(x), to_i32(y));
+    let (right_share, low_share) = (x - left as f32, y - top as f32);
+    let count = weights.len() as i32;
+    let weight = |d: i32| {
+        let d = if d < 0 { -d } else { d };
+        if d < count {
+            weights.get(d as u32)
+        } else {
+            0.0
+        }
+    };
+    let mut shadowed = 0.0;
+    let mut dy = 1 - count;
+    while dy <= count {
+        let mut row = 0.0;
+        let mut dx = 1 - count;
+        while dx <= count {
+            let at = UVec2::new(within(left + dx, size.x), within(top + dy, size.y));
+            let mut nearer = 0.0;
+            let mut i = 0;
+            while i < samples {
+                nearer += if depth.load(at, i).x < z { 1.0 } else { 0.0 };
+                i += 1;
+            }
+            row += (weight(dx) * (1.0 - right_share) + weight(dx - 1) * right_share) * nearer;
+            dx += 1;
+        }
+        shadowed += (weight(dy) * (1.0 - low_share) + weight(dy - 1) * low_share) * row;
+        dy += 1;
+    }
+    let shadow = Real::saturate(shadowed / samples as f32);
+    lit(light, normal, colour, shadow)
 }

@@ -234,6 +234,16 @@ pub fn shaded_depths(request: &Request) -> Vec<Given> {
         .collect()
 }
 
+/// What shading with a map of depths and a filter reads.
+#[must_use]
+pub fn weighted_depths(request: &Request) -> Vec<Given> {
+    let all = [&[1.0_f32][..], &[0.5, 0.25], &[0.32, 0.24, 0.1]];
+    let given = shaded_depths(request).into_iter().zip(all);
+    given
+        .map(|(given, weights)| given.buffer("weights", weights))
+        .collect()
+}
+
 /// Depths of several samples.
 #[must_use]
 pub fn depths(_: &Request) -> Vec<Given> {
