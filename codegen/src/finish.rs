@@ -13,6 +13,7 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::Memory;
 use crate::spirv::{self, exact, libm, names, order, refused, split, trim, uniform};
+use crate::translate::reading;
 
 /// What the modules are for.
 const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
@@ -73,6 +74,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);
     trim::write_only_textures(&mut module);
+    reading::coordinate_types(&mut module);
     split::apply(&mut module, kernel);
     names::apply(&mut module, kernel)?;
     let words = spirv::store(&module);

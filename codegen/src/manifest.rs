@@ -239,7 +239,8 @@ pub struct Binding {
     /// Buffers of elements: what an element belongs to.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub element_for_each: Option<String>,
-    /// Textures: `2d`, `2d-multisampled`, `3d`.
+    /// Textures: `1d`, `2d`, `2d-array`, `2d-multisampled`, `3d`, `cube`, `cube-array`; of depths
+    /// `depth-2d`, `depth-2d-array`, `depth-cube`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub texture: Option<String>,
     /// Written textures: the format.
@@ -265,6 +266,38 @@ pub enum BindingKind {
     StorageTexture,
     /// A sampler.
     Sampler,
+    /// A sampler that compares depths with a reference.
+    ComparisonSampler,
+}
+
+/// Before and after how a texture is seen, in [`Binding::texture`].
+const DEPTH: &str = "depth-";
+const MULTISAMPLED: &str = "-multisampled";
+
+impl Binding {
+    /// How a texture is seen, in WebGPU's words.
+    #[must_use]
+    pub fn view_dimension(&self) -> Option<&str> {
+        let texture = self.texture.as_deref()?;
+        let texture = texture.strip_prefix(DEPTH).unwrap_or(texture);
+        Some(texture.strip_suffix(MULTISAMPLED).unwrap_or(texture))
+    }
+
+    /// Whether it is a texture of depths.
+    #[must_use]
+    pub fn is_depth(&self) -> bool {
+        self.texture
+            .as_deref()
+            .is_some_and(|it| it.starts_with(DEPTH))
+    }
+
+    /// Whether it is a texture with several samples in each texel.
+    #[must_use]
+    pub fn is_multisampled(&self) -> bool {
+        self.texture
+            .as_deref()
+            .is_some_and(|it| it.ends_with(MULTISAMPLED))
+    }
 }
 
 /// A specialisation constant.
@@ -603,13 +636,14 @@ fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                 ..plain(*binding, name, BindingKind::Atomic)
             },
             Role::Texture { binding, texture } => {
-                let shape = match texture {
-                    describe::TextureKind::Texture2d => "2d",
-                    describe::TextureKind::Texture2dMultisampled => "2d-multisampled",
-                    describe::TextureKind::Texture3d => "3d",
+                let before = if texture.is_depth() { DEPTH } else { "" };
+                let after = if texture.is_multisampled() {
+                    MULTISAMPLED
+                } else {
+                    ""
                 };
                 Binding {
-                    texture: Some(shape.into()),
+                    texture: Some(format!("{before}{}{after}", texture.view())),
                     ..plain(*binding, name, BindingKind::Texture)
                 }
             }
@@ -623,7 +657,17 @@ fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                 format: Some(format_name(*format)),
                 ..plain(*binding, name, BindingKind::StorageTexture)
             },
-            Role::Sampler { binding } => plain(*binding, name, BindingKind::Sampler),
+            Role::Sampler {
+                binding,
+                comparison,
+            } => {
+                let kind = if *comparison {
+                    BindingKind::ComparisonSampler
+                } else {
+                    BindingKind::Sampler
+                };
+                plain(*binding, name, kind)
+            }
             _ => return None,
         })
     });

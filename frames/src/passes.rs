@@ -2,7 +2,7 @@
 
 use hankel_dsl::glam::IVec2;
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::Sampler;
+use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_shadows::blur::Direction;
 use hankel_shadows::shade::encoding;
 
@@ -10,7 +10,7 @@ use crate::graph::{AddDraw, Graph, Handle, Result, Shape, Surfaces};
 use crate::scene::{DepthRange, MapFormat, Shadow};
 
 /// How maps are looked up.
-pub const BILINEAR: Sampler = Sampler::new(true, false);
+pub const BILINEAR: Sampler = Sampler::new(Filter::Linear, Address::ClampToEdge);
 
 /// What every technique starts from.
 #[derive(Clone, Copy, Debug)]

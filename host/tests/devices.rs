@@ -4,14 +4,14 @@
 mod common;
 
 use common::*;
-use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::*;
+use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::{
     Bind, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, NativeDevice, Pass, Program,
     Shader, TextureShape, Topology, VulkanDevice,
 };
 
-const NEAREST: Sampler = Sampler::new(false, false);
+const NEAREST: Sampler = Sampler::new(Filter::Nearest, Address::ClampToEdge);
 
 fn bytes<T: bytemuck::NoUninit>(values: &[T]) -> Vec<u8> {
     bytemuck::cast_slice(values).to_vec()
@@ -195,6 +195,46 @@ fn textures_run_on_both() {
     }
     assert!(results.iter().all(|r| *r == results[0]));
     assert!(results[0].iter().any(|&b| b != 0));
+}
+
+#[test]
+fn levels_layers_and_depths_come_back_as_they_were_written() {
+    let shapes = [
+        TextureShape::d1(19, TexelFormat::R32Float),
+        TextureShape::d2(12, 9, TexelFormat::R32Float).with_levels(4),
+        TextureShape::d2(7, 7, TexelFormat::R32Float)
+            .with_levels(3)
+            .with_layers(6),
+        TextureShape::d3([6, 5, 4], TexelFormat::R32Float).with_levels(2),
+        TextureShape::depth(6, 5).with_levels(2).with_layers(3),
+    ];
+    for device in [&mut NativeDevice::new() as &mut dyn Device, &mut vulkan()] {
+        for shape in &shapes {
+            let count = shape.bytes() / 4;
+            let texels: Vec<f32> = (0..count).map(|i| i as f32 / count as f32).collect();
+            let id = device.texture_from("t", shape, &bytes(&texels)).unwrap();
+            assert_eq!(
+                device.read_texture(id).unwrap(),
+                bytes(&texels),
+                "{shape:?}"
+            );
+        }
+    }
+    let refused = |shape: TextureShape, words: &str| {
+        for text in refusals(|d| d.texture("t", &shape).map(|_| ())) {
+            assert!(text.contains(words), "{text}");
+        }
+    };
+    let flat = TextureShape::d2(12, 9, TexelFormat::R32Float);
+    refused(flat.with_levels(5), "its size has 1 to 4");
+    refused(flat.with_layers(0), "0 layers");
+    refused(flat.multisampled(4).with_levels(2), "several samples and");
+    let volume = TextureShape::d3([2, 2, 2], TexelFormat::R32Float);
+    refused(volume.with_layers(6), "6 layers in 3 dimensions");
+    let mut gpu = vulkan();
+    let depth = gpu.texture("d", &TextureShape::depth(1, 1)).unwrap();
+    let error = gpu.write_texture(depth, &bytes(&[1.5_f32])).unwrap_err();
+    assert!(error.to_string().contains("between 0 and 1"), "{error}");
 }
 
 /// A triangle over the whole target, and one over its left half, in front.

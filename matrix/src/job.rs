@@ -8,13 +8,14 @@
 //! - It reads a [`Job`] from each line of its standard input, and answers each with one line,
 //!   a [`Reply`].
 //! - [`Job::inputs`] holds the bytes that the arguments point into; of a texture they are packed,
-//!   row by row, slice by slice, a texel's samples together.
+//!   level by level, layer by layer, slice by slice, row by row, a texel's samples together.
 //! - [`Job::results`] is written whole before the reply: for every case in order, for every slot
 //!   that is written in order, its bytes. A buffer or texture has as many as its argument. What a
 //!   vertex or fragment stage returns has `invocations` tightly packed values.
 
 use std::path::PathBuf;
 
+use hankel_dsl::native::Sampler;
 use serde::{Deserialize, Serialize};
 
 /// A kernel to be run.
@@ -103,8 +104,10 @@ pub enum Role {
     Write,
     /// A texture that is read.
     Texture {
-        /// 2 or 3.
-        dimensions: u32,
+        /// How it is seen, in WebGPU's words: `2d`, `cube-array`.
+        view: String,
+        /// Whether it holds depths.
+        depth: bool,
         /// Whether it has several samples.
         multisampled: bool,
     },
@@ -211,12 +214,18 @@ pub enum Arg {
         /// How many bytes.
         length: u64,
     },
-    /// A texture, one mip level.
+    /// A texture: its texels are packed, level after level, in each layer after layer.
     Texture {
         /// WebGPU's name of its format.
         format: String,
-        /// Texels along each axis.
+        /// 1, 2 or 3.
+        dimensions: u32,
+        /// Texels of level 0 along each axis.
         size: [u32; 3],
+        /// Mip levels.
+        levels: u32,
+        /// Layers; of a cube its six faces: +x, -x, +y, -y, +z, -z.
+        layers: u32,
         /// 1 or 4.
         samples: u32,
         /// Where its texels begin in the inputs.
@@ -224,13 +233,8 @@ pub enum Arg {
         /// How many bytes.
         length: u64,
     },
-    /// A sampler; the same filter and address mode in all directions, one mip level.
-    Sampler {
-        /// Linear, else nearest.
-        linear: bool,
-        /// Repeats, else clamps to the edge.
-        repeat: bool,
-    },
+    /// A sampler, in WebGPU's words.
+    Sampler(Sampler),
 }
 
 /// A runner's answer.

@@ -4,8 +4,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use hankel_dsl::native::describe::{self, Kernel, Output, TextureKind, Type};
-use hankel_dsl::native::{Address, Filter};
+use hankel_dsl::native::describe::{self, Kernel, Output, Type};
 use hankel_host::device::extent;
 use hankel_host::device::slots::{self, Given, Use};
 use hankel_host::inputs::{Case as HostCase, Input};
@@ -88,7 +87,7 @@ impl Prepared {
                     Arg::Bytes { length, .. } | Arg::Texture { length, .. } => {
                         usize::try_from(*length).unwrap_or(usize::MAX)
                     }
-                    Arg::Sampler { .. } => 0,
+                    Arg::Sampler(_) => 0,
                 };
                 let (own, rest) = bytes.split_at_checked(length).ok_or_else(|| {
                     format!("the results have {whole} bytes, which is fewer than the cases write")
@@ -129,16 +128,16 @@ fn run(kernel: &Kernel, case: &HostCase, bytes: &mut Vec<u8>) -> Case {
                 let (offset, length) = put(own);
                 Arg::Texture {
                     format: shape.format.name().into(),
+                    dimensions: shape.dimensions,
                     size: shape.size,
+                    levels: shape.levels,
+                    layers: shape.layers,
                     samples: shape.samples,
                     offset,
                     length,
                 }
             }
-            Input::Sampler(s) => Arg::Sampler {
-                linear: s.filter == Filter::Linear,
-                repeat: s.address == Address::Repeat,
-            },
+            Input::Sampler(s) => Arg::Sampler(*s),
         })
         .collect();
     Case {
@@ -194,10 +193,11 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
         Use::Element(_) | Use::Storage(_) => Role::Read,
         Use::Atomic { .. } => Role::Atomic,
         Use::ElementMut(_) | Use::StorageMut { .. } | Use::Output(_) => Role::Write,
-        Use::Sampler => Role::Sampler,
+        Use::Sampler { .. } => Role::Sampler,
         Use::Texture(kind) => Role::Texture {
-            dimensions: if kind == TextureKind::Texture3d { 3 } else { 2 },
-            multisampled: kind == TextureKind::Texture2dMultisampled,
+            view: kind.view().into(),
+            depth: kind.is_depth(),
+            multisampled: kind.is_multisampled(),
         },
         Use::StorageTexture { format, dimensions } => Role::StorageTexture {
             format: format.name().into(),

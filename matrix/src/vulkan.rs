@@ -3,7 +3,6 @@
 
 use std::fs;
 
-use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_host::device::{DeviceError, Format, Program, Shader, TextureShape, VulkanDevice};
 use hankel_host::inputs::{Case, Class, Input};
@@ -113,24 +112,34 @@ fn cases(job: &Job, inputs: &[u8]) -> Result<Vec<Case>, String> {
             Arg::Bytes { offset, length } => Input::Bytes(bytes(*offset, *length)?),
             Arg::Texture {
                 format,
+                dimensions,
                 size,
+                levels,
+                layers,
                 samples,
                 offset,
                 length,
             } => {
-                let texel: TexelFormat = serde_json::from_value(format.as_str().into())
-                    .map_err(|_| format!("`{format}` is no format"))?;
+                let format = if format == Format::Depth32.name() {
+                    Format::Depth32
+                } else {
+                    let texel: TexelFormat = serde_json::from_value(format.as_str().into())
+                        .map_err(|_| format!("`{format}` is no format"))?;
+                    Format::Texel(texel)
+                };
                 Input::Texture {
                     shape: TextureShape {
-                        dimensions: if size[2] > 1 { 3 } else { 2 },
+                        dimensions: *dimensions,
                         size: *size,
+                        levels: *levels,
+                        layers: *layers,
                         samples: *samples,
-                        format: Format::Texel(texel),
+                        format,
                     },
                     bytes: bytes(*offset, *length)?,
                 }
             }
-            Arg::Sampler { linear, repeat } => Input::Sampler(Sampler::new(*linear, *repeat)),
+            Arg::Sampler(sampler) => Input::Sampler(*sampler),
         })
     };
     job.cases

@@ -1,7 +1,8 @@
 //! What vertex and fragment kernels say is in the texts and in the manifest, or is refused.
 
-use hankel_codegen::Language::{Essl300, Essl310, Hlsl, Msl, Wgsl};
+use hankel_codegen::Language::{Essl300, Essl310, Glsl, Hlsl, Msl, Wgsl};
 use hankel_codegen::build::Generated;
+use hankel_codegen::manifest::BindingKind;
 use hankel_tests::Crate;
 
 fn text(generated: &Generated, kernel: &str, extension: &str) -> String {
@@ -58,4 +59,134 @@ fn what_a_language_cannot_ask_for_is_refused() {
     let gathered = &generated.manifest.kernels["gathered"];
     assert!(gathered.unsupported[&Essl300].contains("gather"));
     assert!(gathered.languages.contains_key(&Essl310));
+}
+
+#[test]
+fn what_textures_are_sampled_with_is_in_the_texts() {
+    let generated = Crate::conformance().generate();
+    for (kernel, wgsl, hlsl, msl) in [
+        (
+            "levels",
+            "textureDimensions(source, ",
+            ".GetDimensions(",
+            ".get_width(",
+        ),
+        (
+            "level_count",
+            "textureNumLevels",
+            "GetDimensions",
+            "get_num_mip_levels",
+        ),
+        (
+            "trilinear",
+            "textureSampleLevel",
+            "SampleLevel",
+            "metal::level(",
+        ),
+        (
+            "by_gradients",
+            "textureSampleGrad",
+            "SampleGrad",
+            "gradient2d(",
+        ),
+        (
+            "receding",
+            "textureSampleBias",
+            "SampleBias",
+            "metal::bias(",
+        ),
+        (
+            "soft",
+            "textureSampleCompareLevel",
+            "SampleCmpLevelZero",
+            "sample_compare(",
+        ),
+        (
+            "four_lit",
+            "textureGatherCompare",
+            "GatherCmp",
+            "gather_compare(",
+        ),
+        (
+            "stacked",
+            "texture_2d_array",
+            "Texture2DArray",
+            "texture2d_array",
+        ),
+        ("around", "texture_cube", "TextureCube", "texturecube"),
+        (
+            "surroundings",
+            "texture_cube_array",
+            "TextureCubeArray",
+            "texturecube_array",
+        ),
+        ("along", "texture_1d", "Texture1D", "texture1d"),
+    ] {
+        for (extension, word) in [(".wgsl", wgsl), (".hlsl", hlsl), (".metal", msl)] {
+            let text = text(&generated, kernel, extension);
+            assert!(text.contains(word), "no {word} in {text}");
+        }
+    }
+    let binding = |kernel: &str, name: &str| {
+        let bindings = &generated.manifest.kernels[kernel].bindings;
+        let found = bindings.iter().find(|binding| binding.name == name);
+        found.unwrap_or_else(|| panic!("{kernel} has no {name}"))
+    };
+    let depths = binding("layers_lit", "depths");
+    assert_eq!(depths.texture.as_deref(), Some("depth-2d-array"));
+    assert_eq!(depths.view_dimension(), Some("2d-array"));
+    assert!(depths.is_depth() && !depths.is_multisampled());
+    let sampler = binding("layers_lit", "sampler");
+    assert_eq!(sampler.kind, BindingKind::ComparisonSampler);
+    let cubes = binding("surroundings", "source");
+    assert_eq!(cubes.texture.as_deref(), Some("cube-array"));
+    let header = |name: &str| {
+        let found = generated
+            .files
+            .iter()
+            .find(|(path, _)| path.ends_with(name));
+        let (_, bytes) = found.unwrap_or_else(|| panic!("no {name}"));
+        String::from_utf8(bytes.clone()).expect("it is text")
+    };
+    for (name, words) in [
+        (
+            "hankel.js",
+            ["\"comparison\"", "\"depth\"", "\"cube-array\""],
+        ),
+        (
+            "hankel_wgpu.rs",
+            [
+                "BindingType::Comparison",
+                "SampleType::Depth",
+                "Dimension::CubeArray",
+            ],
+        ),
+    ] {
+        let text = header(name);
+        for word in words {
+            assert!(text.contains(word), "no {word} in {name}");
+        }
+    }
+}
+
+#[test]
+fn what_a_language_does_not_sample_is_refused() {
+    let generated = Crate::conformance().generate();
+    for (kernel, languages, word) in [
+        ("level_count", &[Essl310][..], "TEXTURE_LEVELS"),
+        (
+            "deepest",
+            &[Glsl, Essl310],
+            "through a sampler that compares",
+        ),
+        ("layers_lit", &[Glsl, Essl310], "a gather of comparisons"),
+        ("hidden", &[Msl], "leaves level 0 out of a comparison"),
+        ("along", &[Essl310], "one-dimensional"),
+    ] {
+        let kernel = &generated.manifest.kernels[kernel];
+        for language in languages {
+            let reason = &kernel.unsupported[language];
+            assert!(reason.contains(word), "{reason}");
+        }
+    }
 }

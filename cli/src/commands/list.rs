@@ -129,7 +129,14 @@ fn bindings(kernel: &Kernel) {
             } => {
                 format!("binding {binding}: texture {}, written", format.name())
             }
-            Role::Sampler { binding } => format!("binding {binding}: sampler"),
+            Role::Sampler {
+                binding,
+                comparison: false,
+            } => format!("binding {binding}: sampler"),
+            Role::Sampler {
+                binding,
+                comparison: true,
+            } => format!("binding {binding}: sampler that compares"),
             Role::Constant { id, default } => format!("constant {id}, default {default}"),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
             Role::Varying { location, ty, flat } => varying(*location, ty, *flat),

@@ -185,11 +185,13 @@ fn put(text: &mut String, layouts: &Layouts, ty: &Type, value: &str, at: &str, d
 /// A `GPUBindGroupLayoutEntry`.
 fn layout_entry(binding: &Binding, stage: u32, filters: bool) -> serde_json::Value {
     let mut entry = json!({ "binding": binding.binding, "visibility": stage });
-    let multisampled = binding.texture.as_deref() == Some("2d-multisampled");
-    let dimension = binding
-        .texture
-        .as_deref()
-        .map(|it| it.trim_end_matches("-multisampled"));
+    let multisampled = binding.is_multisampled();
+    let dimension = binding.view_dimension();
+    let sample_type = match (binding.is_depth(), filters && !multisampled) {
+        (true, _) => "depth",
+        (false, true) => "float",
+        (false, false) => "unfilterable-float",
+    };
     let (key, value) = match binding.kind {
         BindingKind::Uniform => ("buffer", json!({ "type": "uniform" })),
         BindingKind::Storage if !binding.written => {
@@ -199,7 +201,7 @@ fn layout_entry(binding: &Binding, stage: u32, filters: bool) -> serde_json::Val
         BindingKind::Texture => (
             "texture",
             json!({
-                "sampleType": if filters && !multisampled { "float" } else { "unfilterable-float" },
+                "sampleType": sample_type,
                 "viewDimension": dimension,
                 "multisampled": multisampled,
             }),
@@ -209,6 +211,7 @@ fn layout_entry(binding: &Binding, stage: u32, filters: bool) -> serde_json::Val
             json!({ "access": "write-only", "format": binding.format, "viewDimension": dimension }),
         ),
         BindingKind::Sampler => ("sampler", json!({ "type": "filtering" })),
+        BindingKind::ComparisonSampler => ("sampler", json!({ "type": "comparison" })),
     };
     entry[key] = value;
     entry

@@ -97,7 +97,7 @@ fn ty(binding: &Binding, filters: bool) -> String {
              has_dynamic_offset: false, min_binding_size: core::num::NonZeroU64::new({least}) }}"
         )
     };
-    let dimension = match binding.texture.as_deref() {
+    let dimension = match binding.view_dimension() {
         Some("1d") => "D1",
         Some("3d") => "D3",
         Some("cube") => "Cube",
@@ -113,12 +113,16 @@ fn ty(binding: &Binding, filters: bool) -> String {
         }),
         BindingKind::Atomic => buffer("Storage { read_only: false }"),
         BindingKind::Texture => {
-            let multisampled = binding.texture.as_deref() == Some("2d-multisampled");
+            let multisampled = binding.is_multisampled();
+            let sample_type = if binding.is_depth() {
+                "Depth".into()
+            } else {
+                format!("Float {{ filterable: {} }}", filters && !multisampled)
+            };
             format!(
-                "wgpu::BindingType::Texture {{ sample_type: wgpu::TextureSampleType::Float {{ \
-                 filterable: {} }}, view_dimension: wgpu::TextureViewDimension::{dimension}, \
-                 multisampled: {multisampled} }}",
-                filters && !multisampled
+                "wgpu::BindingType::Texture {{ sample_type: wgpu::TextureSampleType::{sample_type}, \
+                 view_dimension: wgpu::TextureViewDimension::{dimension}, \
+                 multisampled: {multisampled} }}"
             )
         }
         BindingKind::StorageTexture => {
@@ -130,6 +134,9 @@ fn ty(binding: &Binding, filters: bool) -> String {
         }
         BindingKind::Sampler => {
             "wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)".into()
+        }
+        BindingKind::ComparisonSampler => {
+            "wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)".into()
         }
     }
 }

@@ -46,7 +46,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
             }
             Role::Texture { binding, .. }
             | Role::StorageTexture { binding, .. }
-            | Role::Sampler { binding } => {
+            | Role::Sampler { binding, .. } => {
                 if let Some(variable) = bound(module, *binding) {
                     names.set(variable, &param.name);
                 }

@@ -1,17 +1,21 @@
-//! What rust-gpu 0.10.0 gets wrong, and nothing after it can put right: the kernel is refused, at the
-//! author's line.
+//! What is refused at the author's line, where nothing after rust-gpu can put it right.
 //!
-//! Rotations of 64-bit numbers: it rotates by the amount modulo 32 and takes what falls off from 32
+//! Differences between neighbours, in a stage that has none: derivatives, and textures that are
+//! sampled at the level that follows from them.
+//!
+//! What rust-gpu 0.10.0 gets wrong. Rotations of 64-bit numbers: it rotates by the amount modulo 32 and takes what falls off from 32
 //! bits (EmbarkStudios/rust-gpu#1062). Constant amounts of 3 and 35 look alike afterwards.
 
 use std::collections::HashMap;
 
-use rspirv::dr::{Instruction, Module};
-use rspirv::spirv::{Op, Word};
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{ExecutionModel, Op, Word};
 
 use super::lines::Lines;
 use super::{global, id, literal, op};
 use crate::error::{Failure, Step};
+
+const FRAGMENT: ExecutionModel = ExecutionModel::Fragment;
 
 /// Looks through a module as rust-gpu writes it.
 ///
@@ -25,9 +29,22 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
         .flat_map(|function| function.all_inst_iter())
         .filter_map(|it| Some((it.result_id?, it)))
         .collect();
+    let fragment = module
+        .entry_points
+        .iter()
+        .all(|entry| entry.operands.first() == Some(&Operand::ExecutionModel(FRAGMENT)));
     for function in &module.functions {
         for block in &function.blocks {
             for (place, it) in block.instructions.iter().enumerate() {
+                if let (Some(instead), false) = (of_neighbours(op(it)), fragment) {
+                    return Err(Failure {
+                        kernel: kernel.into(),
+                        step: Step::Meaning,
+                        construct: Lines::of(module).before(block, place),
+                        message: format!("only a fragment has neighbours: {instead}"),
+                        panicked: false,
+                    });
+                }
                 if op(it) == Op::Select && rotates_wrongly(module, &made, it) == Some(true) {
                     return Err(Failure {
                         kernel: kernel.into(),
@@ -44,6 +61,24 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// What to write instead of what takes differences between neighbours.
+fn of_neighbours(op: Op) -> Option<&'static str> {
+    match op {
+        Op::ImageSampleImplicitLod => Some("write `sample_level` for `sample` and `sample_bias`"),
+        Op::ImageSampleDrefImplicitLod => Some("write `compare_level_zero` for `compare`"),
+        Op::DPdx
+        | Op::DPdy
+        | Op::Fwidth
+        | Op::DPdxFine
+        | Op::DPdyFine
+        | Op::FwidthFine
+        | Op::DPdxCoarse
+        | Op::DPdyCoarse
+        | Op::FwidthCoarse => Some("no derivative is taken elsewhere"),
+        _ => None,
+    }
 }
 
 /// `n == 0 ? x : (x << n | x >> m)` of 64 bits, or the other way round: rust-gpu writes nothing else
@@ -69,4 +104,39 @@ fn rotates_wrongly(
     let amount = id(zero, 0);
     let by_it = id(left, 1) == amount || id(right, 1) == amount;
     Some(same && by_it)
+}
+
+#[cfg(test)]
+mod tests {
+    use rspirv::dr::{Block, Function};
+
+    use super::*;
+
+    #[test]
+    fn only_fragments_have_neighbours() {
+        let check = |model: ExecutionModel, op: Op| {
+            let mut module = Module::new();
+            let operands = vec![Operand::ExecutionModel(model)];
+            module
+                .entry_points
+                .push(Instruction::new(Op::EntryPoint, None, None, operands));
+            let (mut function, mut block) = (Function::new(), Block::new());
+            let sample = Instruction::new(op, Some(1), Some(2), vec![Operand::IdRef(3)]);
+            block.instructions.push(sample);
+            function.blocks.push(block);
+            module.functions.push(function);
+            check(&module, "k")
+        };
+        for op in [Op::ImageSampleImplicitLod, Op::DPdx] {
+            assert!(check(ExecutionModel::Fragment, op).is_ok());
+            for model in [ExecutionModel::GLCompute, ExecutionModel::Vertex] {
+                let message = check(model, op).unwrap_err().message;
+                assert!(
+                    message.contains("only a fragment has neighbours"),
+                    "{message}"
+                );
+            }
+        }
+        assert!(check(ExecutionModel::GLCompute, Op::ImageSampleExplicitLod).is_ok());
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{
-    AddressingModel, BuiltIn, Capability, Decoration, ImageFormat, MemoryAccess, MemoryModel,
+    AddressingModel, BuiltIn, Capability, Decoration, Dim, ImageFormat, MemoryAccess, MemoryModel,
     MemorySemantics, Op, Scope, StorageClass, Word,
 };
 
@@ -28,13 +28,15 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 6] = [
+pub const ENABLED: [Capability; 8] = [
     Capability::Float64,
     Capability::Int64,
     Capability::ImageQuery,
     Capability::StorageImageExtendedFormats,
     Capability::DerivativeControl,
     Capability::SampleRateShading,
+    Capability::Sampled1D,
+    Capability::SampledCubeArray,
 ];
 
 fn needs(instruction: &Instruction) -> Option<Capability> {
@@ -46,12 +48,20 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
         | Op::ImageQueryLod
         | Op::ImageQueryLevels
         | Op::ImageQuerySamples => Some(Capability::ImageQuery),
-        Op::TypeImage => match instruction.operands.get(6) {
-            Some(Operand::ImageFormat(format)) => {
-                (!is_core(*format)).then_some(Capability::StorageImageExtendedFormats)
+        Op::TypeImage => {
+            let arrayed = literal(instruction, 3) == Some(1);
+            match (instruction.operands.get(1), instruction.operands.get(6)) {
+                // No kernel writes these, so that a format does not matter.
+                (Some(Operand::Dim(Dim::Dim1D)), _) => Some(Capability::Sampled1D),
+                (Some(Operand::Dim(Dim::DimCube)), _) if arrayed => {
+                    Some(Capability::SampledCubeArray)
+                }
+                (_, Some(Operand::ImageFormat(format))) if !is_core(*format) => {
+                    Some(Capability::StorageImageExtendedFormats)
+                }
+                _ => None,
             }
-            _ => None,
-        },
+        }
         Op::DPdxFine
         | Op::DPdyFine
         | Op::FwidthFine

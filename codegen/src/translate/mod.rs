@@ -22,7 +22,7 @@ mod extent;
 mod glsl;
 mod hlsl;
 mod msl;
-mod reading;
+pub(crate) mod reading;
 pub(crate) mod text;
 mod wgsl;
 
@@ -282,8 +282,7 @@ impl Ir {
     /// naga cannot read it, or its validator rejects it.
     pub fn read(spirv: &[u8], kernel: &Kernel) -> Result<Self, Failure> {
         let name = kernel.name.as_str();
-        let mut module = spirv::load(&spirv::words(spirv, name)?, name)?;
-        reading::for_reader(&mut module);
+        let module = spirv::load(&spirv::words(spirv, name)?, name)?;
         Self::of(module, kernel)
     }
 
@@ -474,6 +473,29 @@ impl Ir {
                 "{language} has no coarse and no fine derivatives: use `dpdx`, `dpdy`, `fwidth`"
             ));
         }
+        let glsl = es || language == Language::Glsl;
+        if glsl && self.loads_depths() {
+            return Some(format!(
+                "naga's {language} writer reads a texel of a depth texture through a sampler that \
+                 compares, which {language} does not do: take a `Texture2d`"
+            ));
+        }
+        if glsl && self.gathers_compared_layers() {
+            return Some(format!(
+                "naga's {language} writer gives a gather of comparisons in an array of textures \
+                 gradients, which it does not take"
+            ));
+        }
+        if language == Language::Msl
+            && kernel.stage == Stage::Fragment
+            && self.compares_at_level_zero()
+        {
+            return Some(
+                "naga's MSL writer leaves level 0 out of a comparison, and a fragment would compare \
+                 at its own level: use `compare`"
+                    .into(),
+            );
+        }
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
         if language == Language::Hlsl && old && self.has_wide(ScalarKind::Float) {
             return Some(format!(
@@ -614,6 +636,60 @@ impl Ir {
                     ..
                 }
             )
+        })
+    }
+
+    /// Whether a sampler compares at level 0, whatever the fragment's level is.
+    fn compares_at_level_zero(&self) -> bool {
+        self.has(|expression| {
+            matches!(
+                expression,
+                Expression::ImageSample {
+                    gather: None,
+                    depth_ref: Some(_),
+                    level: naga::SampleLevel::Zero,
+                    ..
+                }
+            )
+        })
+    }
+
+    /// Whether comparisons with the texels of a layer are gathered.
+    fn gathers_compared_layers(&self) -> bool {
+        self.has(|expression| {
+            matches!(
+                expression,
+                Expression::ImageSample {
+                    gather: Some(_),
+                    depth_ref: Some(_),
+                    array_index: Some(_),
+                    ..
+                }
+            )
+        })
+    }
+
+    /// Whether a texel of a depth texture is read as it is.
+    fn loads_depths(&self) -> bool {
+        let functions = self.module.functions.iter().map(|(_, function)| function);
+        let entries = self.module.entry_points.iter().map(|entry| &entry.function);
+        functions.chain(entries).any(|function| {
+            function.expressions.iter().any(|(_, it)| {
+                let Expression::ImageLoad { image, .. } = *it else {
+                    return false;
+                };
+                let Expression::GlobalVariable(image) = function.expressions[image] else {
+                    return false;
+                };
+                let ty = self.module.global_variables[image].ty;
+                matches!(
+                    self.module.types[ty].inner,
+                    TypeInner::Image {
+                        class: ImageClass::Depth { .. },
+                        ..
+                    }
+                )
+            })
         })
     }
 

@@ -108,11 +108,6 @@ fn samplings(module: &Module) -> BTreeMap<(bool, u32), Sampling> {
         .collect()
 }
 
-/// Edits that every language needs. Says whether there were any.
-pub fn for_reader(module: &mut Module) -> bool {
-    coordinate_types(module)
-}
-
 /// Edits that a language needs. Says whether there were any.
 pub fn for_language(module: &mut Module, language: Language) -> bool {
     match language {
@@ -122,8 +117,9 @@ pub fn for_language(module: &mut Module, language: Language) -> bool {
     }
 }
 
-/// naga looks for the type of a coordinate without the layer, which nobody may have used.
-fn coordinate_types(module: &mut Module) -> bool {
+/// naga looks for the type of a coordinate without the layer, which nobody may have used. It is part
+/// of the final SPIR-V, which others read with naga, too.
+pub fn coordinate_types(module: &mut Module) {
     let types: HashMap<Word, Word> = module
         .all_inst_iter()
         .filter_map(|it| Some((it.result_id?, it.result_type?)))
@@ -144,7 +140,6 @@ fn coordinate_types(module: &mut Module) -> bool {
         };
         wanted.extend(vector());
     }
-    let mut changed = false;
     for (scalar, size) in wanted {
         let operands = vec![Operand::IdRef(scalar), Operand::LiteralBit32(size)];
         let there = module
@@ -157,9 +152,7 @@ fn coordinate_types(module: &mut Module) -> bool {
         let new = Instruction::new(Op::TypeVector, None, Some(header.bound), operands);
         header.bound += 1;
         module.types_global_values.push(new);
-        changed = true;
     }
-    changed
 }
 
 /// `x % y` of signed numbers is `x - x / y * y`: quotients are truncated everywhere.

@@ -176,7 +176,13 @@ pub fn resample() -> Kernel {
             param("index", Role::Index),
             param("taps", Role::Constant { id: 7, default: 3 }),
             param("source", texture(0, TextureKind::Texture2d)),
-            param("linear", Role::Sampler { binding: 1 }),
+            param(
+                "linear",
+                Role::Sampler {
+                    binding: 1,
+                    comparison: false,
+                },
+            ),
             param("depth", texture(2, TextureKind::Texture2dMultisampled)),
         ],
         vec![Output::Texture {
@@ -278,7 +284,13 @@ pub fn tint() -> Kernel {
         Stage::Fragment,
         vec![
             param("map", map),
-            param("linear", Role::Sampler { binding: 1 }),
+            param(
+                "linear",
+                Role::Sampler {
+                    binding: 1,
+                    comparison: false,
+                },
+            ),
             param(
                 "uv",
                 Role::Varying {

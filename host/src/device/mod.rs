@@ -21,7 +21,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
-use hankel_dsl::native::{Call, CallError, Sampler};
+use hankel_dsl::native::{Call, CallError, Sampler, level_size, texture_bytes};
 use serde::{Deserialize, Serialize};
 
 pub use error::{DeviceError, Result};
@@ -109,13 +109,19 @@ impl Format {
     }
 }
 
-/// What a texture is to be. One mip level, one layer.
+/// What a texture is to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TextureShape {
-    /// 2 or 3.
+    /// 1, 2 or 3.
     pub dimensions: u32,
-    /// Width, height, depth in texels, each at least 1; depth 1 in two dimensions.
+    /// Width, height, depth of level 0 in texels, each at least 1, and 1 beyond the dimensions.
     pub size: [u32; 3],
+    /// Mip levels, at least 1; more in two and three dimensions, with one sample. What is drawn, and
+    /// what a kernel writes, goes to level 0.
+    pub levels: u32,
+    /// Layers, at least 1; more in two dimensions, with one sample. Six of them are the faces of a
+    /// cube: +x, -x, +y, -y, +z, -z. What is drawn goes to the first one.
+    pub layers: u32,
     /// Samples of a texel: 1, or 4 in two dimensions.
     pub samples: u32,
     /// Its texels.
@@ -123,12 +129,23 @@ pub struct TextureShape {
 }
 
 impl TextureShape {
+    /// One dimension.
+    #[must_use]
+    pub const fn d1(width: u32, format: TexelFormat) -> Self {
+        Self {
+            dimensions: 1,
+            ..Self::d2(width, 1, format)
+        }
+    }
+
     /// Two dimensions, one sample.
     #[must_use]
     pub const fn d2(width: u32, height: u32, format: TexelFormat) -> Self {
         Self {
             dimensions: 2,
             size: [width, height, 1],
+            levels: 1,
+            layers: 1,
             samples: 1,
             format: Format::Texel(format),
         }
@@ -140,6 +157,8 @@ impl TextureShape {
         Self {
             dimensions: 3,
             size,
+            levels: 1,
+            layers: 1,
             samples: 1,
             format: Format::Texel(format),
         }
@@ -151,6 +170,8 @@ impl TextureShape {
         Self {
             dimensions: 2,
             size: [width, height, 1],
+            levels: 1,
+            layers: 1,
             samples: 1,
             format: Format::Depth32,
         }
@@ -163,28 +184,83 @@ impl TextureShape {
         self
     }
 
-    /// Bytes of all texels, packed: row by row, slice by slice, a texel's samples together.
+    /// The same with so many mip levels.
+    #[must_use]
+    pub const fn with_levels(mut self, levels: u32) -> Self {
+        self.levels = levels;
+        self
+    }
+
+    /// The same with so many layers.
+    #[must_use]
+    pub const fn with_layers(mut self, layers: u32) -> Self {
+        self.layers = layers;
+        self
+    }
+
+    /// Bytes of all texels, packed: level after level, in each layer after layer, slice after slice,
+    /// row after row, a texel's samples together.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.size.iter().fold(
-            self.samples as usize * self.format.texel().bytes(),
-            |n, &s| n.saturating_mul(s as usize),
+        self.bytes_before(self.levels)
+    }
+
+    /// Bytes of the levels before one.
+    #[must_use]
+    pub fn bytes_before(&self, level: u32) -> usize {
+        texture_bytes(
+            self.size,
+            level,
+            self.layers,
+            self.samples,
+            self.format.texel(),
         )
+    }
+
+    /// A level: how many texels it has along each axis.
+    #[must_use]
+    pub fn level_size(&self, level: u32) -> [u32; 3] {
+        level_size(self.size, level)
+    }
+
+    /// The most levels that its size allows.
+    #[must_use]
+    pub fn most_levels(&self) -> u32 {
+        self.size.iter().max().map_or(1, |n| n.max(&1).ilog2() + 1)
     }
 }
 
 /// Refuses shapes that no device has.
 fn check_shape(label: &str, shape: &TextureShape) -> Result<()> {
-    let problem = if !matches!(shape.dimensions, 2 | 3) {
-        format!("{} dimensions; textures have 2 or 3", shape.dimensions)
+    let single = shape.levels == 1 && shape.layers == 1 && shape.samples == 1;
+    let problem = if !matches!(shape.dimensions, 1..=3) {
+        format!("{} dimensions; textures have 1, 2 or 3", shape.dimensions)
     } else if shape.size.contains(&0) {
         format!("a size of {:?}; each must be at least 1", shape.size)
-    } else if shape.dimensions == 2 && shape.size[2] != 1 {
-        format!("a depth of {} in two dimensions", shape.size[2])
+    } else if shape.size[shape.dimensions as usize..] != [1, 1][shape.dimensions as usize - 1..] {
+        format!(
+            "a size of {:?} in {} dimensions",
+            shape.size, shape.dimensions
+        )
+    } else if !(1..=shape.most_levels()).contains(&shape.levels) {
+        format!(
+            "{} mip levels; its size has 1 to {}",
+            shape.levels,
+            shape.most_levels()
+        )
     } else if !matches!(shape.samples, 1 | 4) {
         format!("{} samples; textures have 1 or 4", shape.samples)
-    } else if shape.dimensions == 3 && (shape.samples != 1 || shape.format == Format::Depth32) {
-        "several samples or depth in three dimensions".into()
+    } else if shape.samples != 1 && (shape.levels != 1 || shape.layers != 1) {
+        "several samples and several levels or layers".into()
+    } else if shape.layers == 0 || (shape.dimensions != 2 && shape.layers != 1) {
+        format!("{} layers in {} dimensions", shape.layers, shape.dimensions)
+    } else if shape.dimensions == 1 && !single {
+        "several samples or levels in one dimension".into()
+    } else if shape.dimensions != 2 && (shape.samples != 1 || shape.format == Format::Depth32) {
+        format!(
+            "several samples or depth in {} dimensions",
+            shape.dimensions
+        )
     } else {
         return Ok(());
     };
@@ -386,8 +462,7 @@ pub trait Device {
     /// [`DeviceError::Transfer`] if `bytes` is longer than the buffer.
     fn write_buffer(&mut self, buffer: BufferId, bytes: &[u8]) -> Result<()>;
 
-    /// Overwrites a texture: [`TextureShape::bytes`] bytes. A depth buffer only takes what is
-    /// drawn into it.
+    /// Overwrites a texture: [`TextureShape::bytes`] bytes. Depths lie between 0 and 1.
     ///
     /// # Errors
     /// [`DeviceError::Transfer`] for any other number of bytes.

@@ -1,7 +1,7 @@
 //! This machine's processor as a device: buffers are memory, kernels are called directly.
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
-use hankel_dsl::native::{Arg, Call, Mode, Sampler, TextureMut, TextureRef};
+use hankel_dsl::native::{Arg, Call, Mode, TextureMut, TextureRef};
 
 use super::error::{DeviceError, Result};
 use super::extent;
@@ -226,12 +226,14 @@ impl NativeDevice {
                     .ok_or_else(gone)?;
                 Arg::Texture(TextureRef {
                     size: texture.shape.size,
+                    levels: texture.shape.levels,
+                    layers: texture.shape.layers,
                     samples: texture.shape.samples,
                     format: texture.shape.format.texel(),
                     bytes: texture.memory.get(),
                 })
             }
-            Bind::Sampler(s) => Arg::Sampler(Sampler { ..*s }),
+            Bind::Sampler(s) => Arg::Sampler(*s),
         })
     }
 }

@@ -39,7 +39,10 @@ pub enum Use<'a> {
     /// A texture that is read.
     Texture(TextureKind),
     /// A sampler.
-    Sampler,
+    Sampler {
+        /// It compares depths with a reference.
+        comparison: bool,
+    },
     /// One value for each vertex.
     Attribute(u32, &'a Type),
     /// One value for each fragment; an argument on the native device only.
@@ -103,7 +106,7 @@ impl Use<'_> {
             Self::StorageMut { layout, .. } | Self::Output(layout) => layout.size as usize,
             Self::Atomic { .. } => 4,
             Self::Attribute(_, ty) | Self::Varying(_, ty) | Self::Interface(ty) => type_bytes(ty),
-            Self::Texture(_) | Self::Sampler | Self::StorageTexture { .. } => return None,
+            Self::Texture(_) | Self::Sampler { .. } | Self::StorageTexture { .. } => return None,
         })
     }
 
@@ -111,7 +114,8 @@ impl Use<'_> {
     const fn wanted(&self) -> &'static str {
         match self {
             Self::Texture(_) => "a texture",
-            Self::Sampler => "a sampler",
+            Self::Sampler { comparison: false } => "a sampler that does not compare",
+            Self::Sampler { comparison: true } => "a sampler that compares",
             Self::StorageTexture { .. } => "a texture to write",
             Self::Uniform(_)
             | Self::Element(_)
@@ -203,7 +207,15 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                     dimensions: *dimensions,
                 },
             ),
-            Role::Sampler { binding } => (Some(*binding), Use::Sampler),
+            Role::Sampler {
+                binding,
+                comparison,
+            } => (
+                Some(*binding),
+                Use::Sampler {
+                    comparison: *comparison,
+                },
+            ),
             Role::Attribute { location, ty } => (None, Use::Attribute(*location, ty)),
             Role::Varying { location, ty, .. } => (None, Use::Varying(*location, ty)),
             Role::Constant { .. } | Role::Index | Role::BuiltIn { .. } | Role::Shared { .. } => {
@@ -398,7 +410,11 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
         return Ok(());
     }
     match (slot.role, given) {
-        (Use::Sampler, Given::Sampler(_)) => Ok(()),
+        (Use::Sampler { comparison }, Given::Sampler(sampler))
+            if sampler.compare.is_some() == comparison =>
+        {
+            Ok(())
+        }
         (Use::Texture(kind), Given::Texture { shape, .. }) => check_texture(kind, shape),
         (Use::StorageTexture { format, dimensions }, Given::Texture { shape, .. }) => {
             if shape.format != Format::Texel(format) {
@@ -414,6 +430,11 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
                 ))
             } else if shape.samples != 1 {
                 Err("it is multisampled".into())
+            } else if shape.levels != 1 || shape.layers != 1 {
+                Err(format!(
+                    "it has {} levels and {} layers, but the kernel writes one",
+                    shape.levels, shape.layers
+                ))
             } else {
                 Ok(())
             }
@@ -423,11 +444,7 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
 }
 
 fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result<(), String> {
-    let (dimensions, multisampled) = match kind {
-        TextureKind::Texture2d => (2, false),
-        TextureKind::Texture2dMultisampled => (2, true),
-        TextureKind::Texture3d => (3, false),
-    };
+    let (dimensions, multisampled) = (kind.dimensions(), kind.is_multisampled());
     if shape.dimensions != dimensions {
         return Err(format!(
             "it has {} dimensions, not {dimensions}",
@@ -440,6 +457,21 @@ fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result
             return Err(format!("it has {n} samples, but the kernel reads one"));
         }
         _ => {}
+    }
+    if let Some(problem) = kind.misfit(shape.layers) {
+        return Err(problem);
+    }
+    if !kind.has_levels() && shape.levels != 1 {
+        return Err(format!("it has {} levels, not 1", shape.levels));
+    }
+    if kind.is_cube() && shape.size[0] != shape.size[1] {
+        return Err("the faces of a cube are squares".into());
+    }
+    if kind.is_depth() && shape.format != Format::Depth32 {
+        return Err(format!(
+            "its format is {}, but the kernel reads depths",
+            shape.format.name()
+        ));
     }
     if shape.format.texel().is_uint() {
         return Err(format!(

@@ -14,17 +14,17 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use fastrand::Rng;
-use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{
     Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Stage, TexelFormat,
     TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
+use hankel_dsl::native::{Address, Compare, Filter, Sampler};
 use serde::{Deserialize, Serialize};
 
 use crate::crates::KernelEntry;
-use crate::device::TextureShape;
 use crate::device::slots::{self, Slot, Use};
+use crate::device::{Format, TextureShape};
 use crate::flat;
 use values::Values;
 
@@ -106,6 +106,10 @@ const STAGE_ELEMENTS: usize = 1009;
 const FLAT: [u32; 3] = [61, 37, 1];
 /// Texels of a three-dimensional run.
 const VOLUME: [u32; 3] = [13, 11, 7];
+/// Texels along each side of a cube.
+const FACE: u32 = 17;
+/// Layers of an array, or its cubes.
+const LAYERS: u32 = 3;
 /// Elements of a buffer that is read anywhere, by kernels that do not run over rows.
 const TABLE: usize = 7;
 /// Counters.
@@ -475,19 +479,34 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
         (
             Value::Texture {
                 size,
+                levels,
+                layers,
                 samples,
                 format,
                 bytes,
             },
             Use::Texture(kind),
         ) => {
-            let shape = match kind {
-                TextureKind::Texture3d => TextureShape::d3(*size, *format),
-                _ => TextureShape::d2(size[0], size[1], *format).multisampled(*samples),
+            let shape = TextureShape {
+                dimensions: kind.dimensions(),
+                size: *size,
+                levels: *levels,
+                layers: *layers,
+                samples: *samples,
+                format: if kind.is_depth() {
+                    Format::Depth32
+                } else {
+                    Format::Texel(*format)
+                },
             };
-            let multisampled = kind == TextureKind::Texture2dMultisampled;
-            if multisampled != (*samples > 1) {
+            if kind.is_depth() && *format != TexelFormat::R32Float {
+                return Err(format!("depths are r32float, not {}", format.name()));
+            }
+            if kind.is_multisampled() != (*samples > 1) {
                 return Err(format!("it has {samples} samples in each texel"));
+            }
+            if let Some(problem) = kind.misfit(*layers) {
+                return Err(problem);
             }
             if shape.bytes() == bytes.len() && !bytes.is_empty() {
                 Ok(Input::Texture {
@@ -502,8 +521,10 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
                 ))
             }
         }
-        (Value::Sampler { linear, repeat }, Use::Sampler) => {
-            Ok(Input::Sampler(Sampler::new(*linear, *repeat)))
+        (Value::Sampler(sampler), Use::Sampler { comparison })
+            if sampler.compare.is_some() == comparison =>
+        {
+            Ok(Input::Sampler(*sampler))
         }
         _ => Err("it is of another kind".into()),
     }
@@ -670,6 +691,8 @@ fn texels_of(kernel: &Kernel, name: &str, kind: TextureKind, otherwise: [u32; 3]
     match about(kernel, name).and_then(|p| p.inputs.size) {
         Some(size) => size,
         None if kind == TextureKind::Texture3d => VOLUME,
+        None if kind == TextureKind::Texture1d => [otherwise[0], 1, 1],
+        None if kind.is_cube() => [FACE, FACE, 1],
         None => [otherwise[0], otherwise[1], 1],
     }
 }
@@ -716,19 +739,45 @@ fn input(
         }
         Use::Texture(kind) => {
             let size = texels_of(kernel, &slot.name, kind, extents.size);
-            let shape = match kind {
-                TextureKind::Texture2d => {
-                    TextureShape::d2(size[0], size[1], TexelFormat::Rgba32Float)
+            let layers = match (kind.is_array(), kind.is_cube()) {
+                (false, cube) => {
+                    if cube {
+                        6
+                    } else {
+                        1
+                    }
                 }
-                TextureKind::Texture2dMultisampled => {
-                    TextureShape::d2(size[0], size[1], TexelFormat::R32Float).multisampled(4)
-                }
-                TextureKind::Texture3d => TextureShape::d3(size, TexelFormat::Rgba32Float),
+                (true, cube) => said.layers.unwrap_or(LAYERS) * if cube { 6 } else { 1 },
+            };
+            let shape = TextureShape {
+                dimensions: kind.dimensions(),
+                size,
+                levels: said.levels.unwrap_or(1),
+                layers,
+                samples: if kind.is_multisampled() { 4 } else { 1 },
+                format: if kind.is_depth() {
+                    Format::Depth32
+                } else if kind.is_multisampled() {
+                    Format::Texel(TexelFormat::R32Float)
+                } else {
+                    Format::Texel(TexelFormat::Rgba32Float)
+                },
             };
             let bytes = values.texels(said, &shape)?;
             Input::Texture { shape, bytes }
         }
-        Use::Sampler => Input::Sampler(Sampler::new(true, values.class == Class::Edge)),
+        Use::Sampler { comparison } => {
+            let filter = said.filter.unwrap_or(Filter::Linear);
+            let address = said.address.unwrap_or(match values.class {
+                Class::Edge => Address::Repeat,
+                Class::Ordinary | Class::Hostile => Address::ClampToEdge,
+            });
+            Input::Sampler(Sampler {
+                mip: said.mip_filter.unwrap_or(Filter::Linear),
+                compare: comparison.then(|| said.compare.unwrap_or(Compare::LessEqual)),
+                ..Sampler::new(filter, address)
+            })
+        }
     })
 }
 

@@ -7,7 +7,7 @@ use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::{Domain, Inputs, Scalar, TexelFormat};
 
 use super::{Class, InputError};
-use crate::device::TextureShape;
+use crate::device::{Format, TextureShape};
 use crate::flat::{Leaf, Number};
 
 /// Makes numbers of one class.
@@ -232,11 +232,18 @@ impl Values {
     /// # Errors
     /// As of [`Values::elements`].
     pub fn texels(&mut self, inputs: &Inputs, shape: &TextureShape) -> Result<Vec<u8>, InputError> {
+        let depth = shape.format == Format::Depth32;
         let domain = self.resolved(inputs.domain.clone())?.unwrap_or(TEXELS);
         let format: TexelFormat = shape.format.texel();
         let mut bytes = vec![0; shape.bytes()];
         for texel in bytes.chunks_exact_mut(format.bytes()) {
             let v = Vec4::from_array([(); 4].map(|()| self.float(&domain, false) as f32));
+            // A depth buffer holds nothing else.
+            let v = if depth {
+                v.clamp(Vec4::ZERO, Vec4::ONE)
+            } else {
+                v
+            };
             format.store(texel, v);
         }
         Ok(bytes)

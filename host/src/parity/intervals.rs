@@ -8,6 +8,9 @@
 //! result. What lies between the places of the grid may go beyond them by as much as the largest step
 //! between two neighbours.
 //!
+//! The fraction of a level of detail has 8 bits in Direct3D 11 as well, so that the level is moved by
+//! 1/256 up and down, where a texture has levels.
+//!
 //! The filter's own sums round, too. Each channel is moved by 4 units of 2^-24 of the largest texel
 //! up and down; what the channels change is added up.
 //!
@@ -24,6 +27,8 @@ use crate::inputs::{Case, Input};
 const PLACES: [i16; 5] = [-4, -2, 0, 2, 4];
 /// The same for 3-D textures.
 const PLACES_3D: [i16; 3] = [-4, 0, 4];
+/// Rounding of a level of detail, in 1/1024: 1/256.
+const LEVEL: i16 = 4;
 /// Rounding of the filter's sums, in 2^-24 of the largest texel: three sums, and products of two.
 const SUMS: i8 = 4;
 
@@ -118,6 +123,14 @@ impl Intervals {
                     sums.push(with(deviation)?);
                 }
             }
+            if case.args.iter().any(has_levels) {
+                for level in [-LEVEL, LEVEL] {
+                    sums.push(with(Deviation {
+                        level,
+                        ..Deviation::NONE
+                    })?);
+                }
+            }
             for (i, interval) in intervals.iter_mut().enumerate() {
                 let (down, up) = around(i, centre[i], grid, &places, &sums);
                 interval.low -= down;
@@ -126,6 +139,11 @@ impl Intervals {
         }
         Ok(Some(Self(intervals)))
     }
+}
+
+/// Whether an argument is a texture with more than one level.
+fn has_levels(arg: &Input) -> bool {
+    matches!(arg, Input::Texture { shape, .. } if shape.levels > 1)
 }
 
 /// Places of a coordinate along each axis.
@@ -180,7 +198,7 @@ impl Grid {
     }
 }
 
-/// How far number `i` may lie below and above `centre`.
+/// How far number `i` may lie below and above `centre`; `sums` are pairs, down and up.
 fn around(i: usize, centre: f64, grid: Grid, places: &[Vec<f64>], sums: &[Vec<f64>]) -> (f64, f64) {
     let (mut down, mut up) = (0.0_f64, 0.0_f64);
     for values in places {
@@ -195,7 +213,7 @@ fn around(i: usize, centre: f64, grid: Grid, places: &[Vec<f64>], sums: &[Vec<f6
         .neighbours()
         .map(|(a, b)| apart(places[a][i], places[b][i]))
         .fold(0.0, f64::max);
-    // Down and up of each channel.
+    // Down and up of each channel, and of the level.
     let rounding: f64 = sums
         .chunks(2)
         .map(|pair| {

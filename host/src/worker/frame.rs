@@ -4,9 +4,7 @@ use std::io::{self, Read, Write};
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::inputs;
-use hankel_dsl::native::{
-    Address, Arg, Call, Deviation, Filter, Mode, Sampler, TextureMut, TextureRef,
-};
+use hankel_dsl::native::{Arg, Call, Mode, Sampler, TextureMut, TextureRef};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +40,8 @@ enum Shape {
     BytesMut(usize),
     Texture {
         size: [u32; 3],
+        levels: u32,
+        layers: u32,
         samples: u32,
         format: TexelFormat,
         bytes: usize,
@@ -51,13 +51,7 @@ enum Shape {
         format: TexelFormat,
         bytes: usize,
     },
-    Sampler {
-        linear: bool,
-        repeat: bool,
-        /// Of its [`Deviation`].
-        offset: [i16; 3],
-        channels: [i8; 4],
-    },
+    Sampler(Sampler),
 }
 
 impl Shape {
@@ -65,7 +59,7 @@ impl Shape {
         match self {
             Self::Bytes(n) | Self::BytesMut(n) => *n,
             Self::Texture { bytes, .. } | Self::TextureMut { bytes, .. } => *bytes,
-            Self::Sampler { .. } => 0,
+            Self::Sampler(_) => 0,
         }
     }
 }
@@ -116,6 +110,8 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         Arg::BytesMut(b) => Shape::BytesMut(b.len()),
         Arg::Texture(t) => Shape::Texture {
             size: t.size,
+            levels: t.levels,
+            layers: t.layers,
             samples: t.samples,
             format: t.format,
             bytes: t.bytes.len(),
@@ -125,12 +121,7 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
             format: t.format,
             bytes: t.bytes.len(),
         },
-        Arg::Sampler(s) => Shape::Sampler {
-            linear: s.filter == Filter::Linear,
-            repeat: s.address == Address::Repeat,
-            offset: s.deviation.offset,
-            channels: s.deviation.channels,
-        },
+        Arg::Sampler(s) => Shape::Sampler(*s),
     });
     let request = Request {
         kernel,
@@ -195,11 +186,15 @@ impl Arrived {
                 Shape::BytesMut(_) => Arg::BytesMut(bytes),
                 Shape::Texture {
                     size,
+                    levels,
+                    layers,
                     samples,
                     format,
                     ..
                 } => Arg::Texture(TextureRef {
                     size,
+                    levels,
+                    layers,
                     samples,
                     format,
                     bytes,
@@ -209,15 +204,7 @@ impl Arrived {
                     format,
                     bytes,
                 }),
-                Shape::Sampler {
-                    linear,
-                    repeat,
-                    offset,
-                    channels,
-                } => Arg::Sampler(Sampler {
-                    deviation: Deviation { offset, channels },
-                    ..Sampler::new(linear, repeat)
-                }),
+                Shape::Sampler(sampler) => Arg::Sampler(sampler),
             }
         });
         Call {
@@ -246,6 +233,7 @@ impl Arrived {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hankel_dsl::native::{Address, Compare, Deviation, Filter};
 
     #[test]
     fn a_call_arrives_as_it_was_sent_and_comes_back() {
@@ -259,16 +247,20 @@ mod tests {
                 Arg::Bytes(&read),
                 Arg::Texture(TextureRef {
                     size,
+                    levels: 1,
+                    layers: 1,
                     samples: 1,
                     format,
                     bytes: &texels,
                 }),
                 Arg::Sampler(Sampler {
+                    compare: Some(Compare::Greater),
                     deviation: Deviation {
                         offset: [-4, 3, 0],
+                        level: 2,
                         channels: [1, -2, 3, -4],
                     },
-                    ..Sampler::new(true, true)
+                    ..Sampler::new(Filter::Linear, Address::MirrorRepeat)
                 }),
                 Arg::BytesMut(&mut written),
                 Arg::TextureMut(TextureMut {

@@ -454,7 +454,13 @@ pub fn image() -> Sample {
                     texture: TextureKind::Texture3d,
                 },
             ),
-            param("nearest", Role::Sampler { binding: 2 }),
+            param(
+                "nearest",
+                Role::Sampler {
+                    binding: 2,
+                    comparison: false,
+                },
+            ),
             param("index", Role::Index),
         ],
         vec![Output::Texture {
@@ -478,7 +484,7 @@ pub fn image() -> Sample {
         };
         let samples = f32s(ms.bytes);
         let (volume, sampler) = (Texture3d::new(*volume), hankel_dsl::Sampler::new(*sampler));
-        let filtered = volume.sample(sampler, Vec3::splat(0.25));
+        let filtered = volume.sample_level(sampler, Vec3::splat(0.25), 0.0);
         for (i, texel) in out.bytes.chunks_exact_mut(8).enumerate() {
             let s = &samples[i * 4..i * 4 + 4];
             let mut v = filtered;

@@ -144,7 +144,11 @@ pub use stage::{
 };
 pub use storage::{StorageMut, Stored};
 pub use storage_texture::{Format, StorageTexture2d, StorageTexture3d, format};
-pub use texture::{Sampler, Texel, Texture2d, Texture2dMultisampled, Texture3d};
+pub use texture::{
+    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler, Texel,
+    Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
+    TextureCubeArray,
+};
 pub use workgroup::{Shared, SharedAtomics, barrier, storage_barrier};
 
 #[cfg(target_arch = "spirv")]

@@ -1,7 +1,10 @@
 //! Textures and samplers as a kernel sees them. On both sides a value of a few words that is
 //! passed by copy; coordinates beyond the edge read the nearest texel with `load`.
+//!
+//! Every texture of a kind is declared once, in [`textures`]; what its methods compute is declared
+//! once for each side: `spirv` and `host`.
 
-use glam::{UVec2, UVec3, Vec2, Vec4};
+use glam::{UVec2, UVec3, Vec2, Vec3, Vec4};
 
 #[cfg(not(target_arch = "spirv"))]
 use crate::native;
@@ -30,9 +33,45 @@ pub mod image {
             );
         }
     }
-    pub type Sampled2d = Image!(2D, type=f32, sampled);
-    pub type Sampled2dMultisampled = Image!(2D, type=f32, sampled, multisampled);
-    pub type Sampled3d = Image!(3D, type=f32, sampled);
+    /// The comparison of a reference with each of four texels.
+    ///
+    /// # Safety
+    /// `image` holds depths, `sampler` compares, `at` is a coordinate for the image.
+    #[inline(always)]
+    pub unsafe fn gather_compare<I, C>(
+        image: &I,
+        sampler: spirv_std::Sampler,
+        at: C,
+        reference: f32,
+    ) -> glam::Vec4 {
+        let mut result = glam::Vec4::ZERO;
+        // SAFETY: the caller's.
+        unsafe {
+            asm!(
+                "%image = OpLoad _ {image}",
+                "%sampler = OpLoad _ {sampler}",
+                "%at = OpLoad _ {at}",
+                "%reference = OpLoad _ {reference}",
+                "%sampled = OpSampledImage _ %image %sampler",
+                "%result = OpImageDrefGather typeof*{result} %sampled %at %reference",
+                "OpStore {result} %result",
+                image = in(reg) image, sampler = in(reg) &sampler, at = in(reg) &at,
+                reference = in(reg) &reference, result = in(reg) &mut result,
+            );
+        }
+        result
+    }
+
+    pub type Texture1d = Image!(1D, type=f32, sampled);
+    pub type Texture2d = Image!(2D, type=f32, sampled);
+    pub type Texture2dArray = Image!(2D, type=f32, sampled, arrayed);
+    pub type Texture2dMultisampled = Image!(2D, type=f32, sampled, multisampled);
+    pub type Texture3d = Image!(3D, type=f32, sampled);
+    pub type TextureCube = Image!(cube, type=f32, sampled);
+    pub type TextureCubeArray = Image!(cube, type=f32, sampled, arrayed);
+    pub type DepthTexture2d = Image!(2D, type=f32, sampled, depth);
+    pub type DepthTexture2dArray = Image!(2D, type=f32, sampled, arrayed, depth);
+    pub type DepthTextureCube = Image!(cube, type=f32, sampled, depth);
 
     // One for each texel format that a kernel can write.
     pub type Storage2dR32Float = Image!(2D, format = r32f, sampled = false);
@@ -50,36 +89,91 @@ pub mod image {
     pub type Storage3dR32Uint = Image!(3D, format = r32ui, sampled = false);
     pub type Storage3dRgba32Uint = Image!(3D, format = rgba32ui, sampled = false);
 }
-#[cfg(target_arch = "spirv")]
-use image::{Sampled2d, Sampled2dMultisampled, Sampled3d};
+/// Declares textures, and makes them of what the macros bind.
+macro_rules! textures {
+    ($($(#[doc = $doc:literal])* $name:ident;)*) => { $(
+        $(#[doc = $doc])*
+        #[derive(Clone, Copy)]
+        pub struct $name<'a>(
+            #[cfg(target_arch = "spirv")] &'a image::$name,
+            #[cfg(not(target_arch = "spirv"))] native::TextureRef<'a>,
+        );
 
-/// A filterable texture of two dimensions.
-#[derive(Clone, Copy)]
-pub struct Texture2d<'a>(
-    #[cfg(target_arch = "spirv")] &'a Sampled2d,
-    #[cfg(not(target_arch = "spirv"))] native::TextureRef<'a>,
-);
+        impl<'a> $name<'a> {
+            #[cfg(target_arch = "spirv")]
+            #[doc(hidden)]
+            #[inline(always)]
+            pub fn new(image: &'a image::$name) -> Self {
+                Self(image)
+            }
+            #[cfg(not(target_arch = "spirv"))]
+            #[doc(hidden)]
+            #[must_use]
+            pub fn new(texture: native::TextureRef<'a>) -> Self {
+                Self(texture)
+            }
+        }
+    )* };
+}
 
-/// A texture of two dimensions with several samples in each texel.
-#[derive(Clone, Copy)]
-pub struct Texture2dMultisampled<'a>(
-    #[cfg(target_arch = "spirv")] &'a Sampled2dMultisampled,
-    #[cfg(not(target_arch = "spirv"))] native::TextureRef<'a>,
-);
+textures! {
+    /// A filterable texture of one dimension; it has one level.
+    Texture1d;
+    /// A filterable texture of two dimensions.
+    Texture2d;
+    /// Layers of filterable textures of two dimensions.
+    Texture2dArray;
+    /// A texture of two dimensions with several samples in each texel.
+    Texture2dMultisampled;
+    /// A filterable texture of three dimensions.
+    Texture3d;
+    /// Six filterable textures of two dimensions on the faces of a cube, sampled by a direction.
+    TextureCube;
+    /// Cubes in an array.
+    TextureCubeArray;
+    /// Depths in two dimensions, which a [`ComparisonSampler`] compares with a reference.
+    DepthTexture2d;
+    /// Layers of such depths.
+    DepthTexture2dArray;
+    /// Such depths on the faces of a cube.
+    DepthTextureCube;
+}
 
-/// A filterable texture of three dimensions.
-#[derive(Clone, Copy)]
-pub struct Texture3d<'a>(
-    #[cfg(target_arch = "spirv")] &'a Sampled3d,
-    #[cfg(not(target_arch = "spirv"))] native::TextureRef<'a>,
-);
-
-/// How a texture is filtered between texels and beyond its edge.
+/// How a texture is filtered between texels, between levels, and beyond the edge.
 #[derive(Clone, Copy)]
 pub struct Sampler(
     #[cfg(target_arch = "spirv")] spirv_std::Sampler,
     #[cfg(not(target_arch = "spirv"))] native::Sampler,
 );
+
+/// The same for depths, and how they are compared with a reference: what is filtered is how many
+/// comparisons hold.
+#[derive(Clone, Copy)]
+pub struct ComparisonSampler(
+    #[cfg(target_arch = "spirv")] spirv_std::Sampler,
+    #[cfg(not(target_arch = "spirv"))] native::Sampler,
+);
+
+macro_rules! samplers {
+    ($($name:ident)*) => { $(
+        impl $name {
+            #[cfg(target_arch = "spirv")]
+            #[doc(hidden)]
+            #[inline(always)]
+            pub fn new(sampler: &spirv_std::Sampler) -> Self {
+                Self(*sampler)
+            }
+            #[cfg(not(target_arch = "spirv"))]
+            #[doc(hidden)]
+            #[must_use]
+            pub fn new(sampler: native::Sampler) -> Self {
+                Self(sampler)
+            }
+        }
+    )* };
+}
+
+samplers!(Sampler ComparisonSampler);
 
 #[cfg(target_arch = "spirv")]
 #[allow(missing_docs, reason = "documented on the host's side")]
@@ -87,36 +181,180 @@ mod spirv {
     use super::*;
     use spirv_std::image::{ImageWithMethods, sample_with};
 
-    impl<'a> Texture2d<'a> {
-        #[doc(hidden)]
+    /// `$size` is the type of a size, `$place` makes a coordinate for floats of what a method takes,
+    /// `$texel` one for whole numbers.
+    macro_rules! sizes {
+        ($($name:ident: $size:ty, $query:ty, $take:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn size(self) -> $size {
+                    self.level_size(0)
+                }
+                #[inline(always)]
+                pub fn level_size(self, level: u32) -> $size {
+                    let size: $query = self.0.query_size_lod(level);
+                    $take(size)
+                }
+                #[inline(always)]
+                pub fn levels(self) -> u32 {
+                    self.0.query_levels()
+                }
+            }
+        )* };
+    }
+    sizes! {
+        Texture2d: UVec2, UVec2, |size| size;
+        Texture2dArray: UVec2, UVec3, UVec3::truncate;
+        Texture3d: UVec3, UVec3, |size| size;
+        TextureCube: UVec2, UVec2, |size| size;
+        TextureCubeArray: UVec2, UVec3, UVec3::truncate;
+        DepthTexture2d: UVec2, UVec2, |size| size;
+        DepthTexture2dArray: UVec2, UVec3, UVec3::truncate;
+        DepthTextureCube: UVec2, UVec2, |size| size;
+    }
+
+    macro_rules! loads {
+        ($($name:ident: $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $take:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn load(self, $($arg: $ty),*) -> $value {
+                    self.load_level($($arg,)* 0)
+                }
+                #[inline(always)]
+                pub fn load_level(self, $($arg: $ty,)* level: u32) -> $value {
+                    let texel: Vec4 = self.0.fetch_with_lod($at, level);
+                    $take(texel)
+                }
+            }
+        )* };
+    }
+    loads! {
+        Texture2d: Vec4, (at: UVec2), at, |texel| texel;
+        Texture2dArray: Vec4, (at: UVec2, layer: u32), at.extend(layer), |texel| texel;
+        Texture3d: Vec4, (at: UVec3), at, |texel| texel;
+        DepthTexture2d: f32, (at: UVec2), at, |texel: Vec4| texel.x;
+        DepthTexture2dArray: f32, (at: UVec2, layer: u32), at.extend(layer), |texel: Vec4| texel.x;
+    }
+
+    macro_rules! samples {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $gradient:ty, $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    self.0.sample(sampler.0, $at)
+                }
+                #[inline(always)]
+                pub fn sample_bias(self, sampler: Sampler, $($arg: $ty,)* bias: f32) -> Vec4 {
+                    self.0.sample_bias(sampler.0, $at, bias)
+                }
+                #[inline(always)]
+                pub fn sample_level(self, sampler: Sampler, $($arg: $ty,)* level: f32) -> Vec4 {
+                    self.0.sample_by_lod(sampler.0, $at, level)
+                }
+                #[inline(always)]
+                pub fn sample_gradient(
+                    self,
+                    sampler: Sampler,
+                    $($arg: $ty,)*
+                    dx: $gradient,
+                    dy: $gradient,
+                ) -> Vec4 {
+                    self.0.sample_by_gradient(sampler.0, $at, dx, dy)
+                }
+            }
+        )* };
+    }
+    samples! {
+        Texture2d: (uv: Vec2), Vec2, uv;
+        Texture2dArray: (uv: Vec2, layer: u32), Vec2, uv.extend(layer as f32);
+        Texture3d: (uvw: Vec3), Vec3, uvw;
+        TextureCube: (direction: Vec3), Vec3, direction;
+        TextureCubeArray: (direction: Vec3, cube: u32), Vec3, direction.extend(cube as f32);
+    }
+
+    macro_rules! gathers {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    self.0.gather(sampler.0, $at, CHANNEL)
+                }
+            }
+        )* };
+    }
+    gathers! {
+        Texture2d: (uv: Vec2), uv;
+        Texture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+    }
+
+    macro_rules! comparisons {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn compare(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> f32 {
+                    self.0.sample_depth_reference(sampler.0, $at, reference)
+                }
+                #[inline(always)]
+                pub fn compare_level_zero(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> f32 {
+                    self.0
+                        .sample_depth_reference_by_lod(sampler.0, $at, reference, 0.0)
+                }
+            }
+        )* };
+    }
+    comparisons! {
+        DepthTexture2d: (uv: Vec2), uv;
+        DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+        DepthTextureCube: (direction: Vec3), direction;
+    }
+
+    macro_rules! compared_gathers {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn gather_compare(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> Vec4 {
+                    // SAFETY: the types are right.
+                    unsafe { image::gather_compare(self.0, sampler.0, $at, reference) }
+                }
+            }
+        )* };
+    }
+    compared_gathers! {
+        DepthTexture2d: (uv: Vec2), uv;
+        DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+    }
+
+    impl Texture1d<'_> {
         #[inline(always)]
-        pub fn new(image: &'a Sampled2d) -> Self {
-            Self(image)
-        }
-        #[inline(always)]
-        pub fn size(self) -> UVec2 {
+        pub fn size(self) -> u32 {
             self.0.query_size_lod(0)
         }
         #[inline(always)]
-        pub fn load(self, at: UVec2) -> Vec4 {
+        pub fn load(self, at: u32) -> Vec4 {
             self.0.fetch_with_lod(at, 0)
         }
         #[inline(always)]
-        pub fn sample(self, sampler: Sampler, uv: Vec2) -> Vec4 {
-            self.0.sample_by_lod(sampler.0, uv, 0.0)
-        }
-        #[inline(always)]
-        pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, uv: Vec2) -> Vec4 {
-            self.0.gather(sampler.0, uv, CHANNEL)
+        pub fn sample(self, sampler: Sampler, u: f32) -> Vec4 {
+            self.0.sample(sampler.0, u)
         }
     }
 
-    impl<'a> Texture2dMultisampled<'a> {
-        #[doc(hidden)]
-        #[inline(always)]
-        pub fn new(image: &'a Sampled2dMultisampled) -> Self {
-            Self(image)
-        }
+    impl Texture2dMultisampled<'_> {
         #[inline(always)]
         pub fn size(self) -> UVec2 {
             self.0.query_size()
@@ -127,227 +365,305 @@ mod spirv {
                 .fetch_with(at, sample_with::sample_index(sample as i32))
         }
     }
-
-    impl<'a> Texture3d<'a> {
-        #[doc(hidden)]
-        #[inline(always)]
-        pub fn new(image: &'a Sampled3d) -> Self {
-            Self(image)
-        }
-        #[inline(always)]
-        pub fn size(self) -> UVec3 {
-            self.0.query_size_lod(0)
-        }
-        #[inline(always)]
-        pub fn load(self, at: UVec3) -> Vec4 {
-            self.0.fetch_with_lod(at, 0)
-        }
-        #[inline(always)]
-        pub fn sample(self, sampler: Sampler, uvw: glam::Vec3) -> Vec4 {
-            self.0.sample_by_lod(sampler.0, uvw, 0.0)
-        }
-    }
-
-    impl Sampler {
-        #[doc(hidden)]
-        #[inline(always)]
-        pub fn new(sampler: &spirv_std::Sampler) -> Self {
-            Self(*sampler)
-        }
-    }
 }
 
 #[cfg(not(target_arch = "spirv"))]
 mod host {
-    use super::{Sampler, Texture2d, Texture2dMultisampled, Texture3d, UVec2, UVec3, Vec2, Vec4};
-    use crate::native::{self, Address, Filter, TextureRef};
-    use glam::Vec3;
+    use super::{
+        ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,
+        Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
+        TextureCubeArray, UVec2, UVec3, Vec2, Vec3, Vec4,
+    };
+    use crate::native::sampling::{self, Place};
+    use crate::native::{fragment, level_size};
+    use core::panic::Location;
 
-    impl<'a> Texture2d<'a> {
-        #[doc(hidden)]
-        #[must_use]
-        pub fn new(texture: TextureRef<'a>) -> Self {
-            Self(texture)
-        }
-        /// Width and height in texels.
-        #[inline]
-        #[must_use]
-        pub fn size(self) -> UVec2 {
-            UVec2::new(self.0.size[0], self.0.size[1])
-        }
-        /// The texel at `at`, which must lie inside. (Natively the nearest one is read otherwise;
-        /// on a GPU it is the bounds-check policy's choice.)
-        #[inline]
-        #[must_use]
-        pub fn load(self, at: UVec2) -> Vec4 {
-            texel(&self.0, UVec3::new(at.x, at.y, 0), 0)
-        }
-        /// A filtered value at `uv`, where (0, 0) is the first texel's outer corner and (1, 1) the
-        /// last one's. Hardware may round the interpolation weights to 8 bits.
-        #[inline]
-        #[must_use]
-        pub fn sample(self, sampler: Sampler, uv: Vec2) -> Vec4 {
-            filter(&self.0, sampler.0, Vec3::new(uv.x, uv.y, 0.5))
-        }
-        /// Channel `CHANNEL` (0 to 3) of the four texels that a linear filter reads at `uv`: lower
-        /// left, lower right, upper right, upper left, where the first row is the upper one. Which
-        /// four they are is rounded to 8 bits on hardware: stay away from the middle of texels.
-        #[inline]
-        #[must_use]
-        pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, uv: Vec2) -> Vec4 {
-            const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
-            let size = [self.0.size[0], self.0.size[1]];
-            let base = [0, 1].map(|d| (uv[d] * size[d] as f32 - 0.5).floor() as i64);
-            let tap = |dx: i64, dy: i64| {
-                let at = [base[0] + dx, base[1] + dy];
-                let at = [0, 1].map(|d| wrap(at[d], size[d], sampler.0.address));
-                texel(&self.0, UVec3::new(at[0], at[1], 0), 0)[CHANNEL as usize]
-            };
-            Vec4::new(tap(0, 1), tap(1, 1), tap(1, 0), tap(0, 0))
+    const fn flat(uv: Vec2, layer: u32) -> Place {
+        Place::Flat {
+            at: Vec3::new(uv.x, uv.y, 0.0),
+            dimensions: 2,
+            layer,
         }
     }
 
-    impl<'a> Texture2dMultisampled<'a> {
-        #[doc(hidden)]
-        #[must_use]
-        pub fn new(texture: TextureRef<'a>) -> Self {
-            Self(texture)
+    const fn volume(at: Vec3) -> Place {
+        Place::Flat {
+            at,
+            dimensions: 3,
+            layer: 0,
         }
+    }
+
+    const fn cube(direction: Vec3, cube: u32) -> Place {
+        Place::Cube {
+            direction,
+            first: 6 * cube,
+        }
+    }
+
+    /// What the derivatives of a place are those of.
+    const fn coordinates(place: Place) -> Vec3 {
+        match place {
+            Place::Flat { at, .. } => at,
+            Place::Cube { direction, .. } => direction,
+        }
+    }
+
+    /// The level of detail of a fragment, from its neighbours.
+    fn detail(
+        texture: &crate::native::TextureRef<'_>,
+        place: Place,
+        at: &'static Location<'static>,
+    ) -> f32 {
+        let (dx, dy) = fragment::gradients(coordinates(place), at);
+        sampling::detail(texture, place, dx, dy)
+    }
+
+    macro_rules! sizes {
+        ($($name:ident: $size:ty, $take:expr;)*) => { $(
+            impl $name<'_> {
+                /// Texels of level 0 along each axis; of an array, those of a layer.
+                #[inline]
+                #[must_use]
+                pub fn size(self) -> $size {
+                    self.level_size(0)
+                }
+                /// Texels of a level along each axis: half of those of the level before, rounded
+                /// down, but at least 1.
+                #[inline]
+                #[must_use]
+                pub fn level_size(self, level: u32) -> $size {
+                    $take(UVec3::from_array(level_size(self.0.size, level)))
+                }
+                /// Mip levels, 1 or more.
+                #[inline]
+                #[must_use]
+                pub fn levels(self) -> u32 {
+                    self.0.levels
+                }
+            }
+        )* };
+    }
+    sizes! {
+        Texture2d: UVec2, UVec3::truncate;
+        Texture2dArray: UVec2, UVec3::truncate;
+        Texture3d: UVec3, |size| size;
+        TextureCube: UVec2, UVec3::truncate;
+        TextureCubeArray: UVec2, UVec3::truncate;
+        DepthTexture2d: UVec2, UVec3::truncate;
+        DepthTexture2dArray: UVec2, UVec3::truncate;
+        DepthTextureCube: UVec2, UVec3::truncate;
+    }
+
+    macro_rules! loads {
+        ($($name:ident: $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $layer:expr, $take:expr;)*) => { $(
+            impl $name<'_> {
+                /// The texel at `at`, which must lie inside. (Natively the nearest one is read
+                /// otherwise; on a GPU it is the bounds-check policy's choice.)
+                #[inline]
+                #[must_use]
+                pub fn load(self, $($arg: $ty),*) -> $value {
+                    self.load_level($($arg,)* 0)
+                }
+                /// The same of a level, which must exist.
+                #[inline]
+                #[must_use]
+                pub fn load_level(self, $($arg: $ty,)* level: u32) -> $value {
+                    $take(sampling::load(&self.0, $at, $layer, level, 0))
+                }
+            }
+        )* };
+    }
+    loads! {
+        Texture2d: Vec4, (at: UVec2), [at.x, at.y, 0], 0, |texel| texel;
+        Texture2dArray: Vec4, (at: UVec2, layer: u32), [at.x, at.y, 0], layer, |texel| texel;
+        Texture3d: Vec4, (at: UVec3), at.to_array(), 0, |texel| texel;
+        DepthTexture2d: f32, (at: UVec2), [at.x, at.y, 0], 0, |texel: Vec4| texel.x;
+        DepthTexture2dArray: f32, (at: UVec2, layer: u32), [at.x, at.y, 0], layer, |texel: Vec4| texel.x;
+    }
+
+    macro_rules! samples {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $gradient:ty, $place:expr, $extend:expr;)*) => { $(
+            impl $name<'_> {
+                /// A filtered value, at the level of detail that follows from how the coordinates
+                /// differ between neighbouring fragments: in fragment kernels only, and in control
+                /// flow that is the same for a quad. Coordinates in a layer begin at the first
+                /// texel's outer corner and end, with 1, at the last one's; a cube is seen from
+                /// its middle, along a direction of any length. Hardware may round the weights to
+                /// 8 bits.
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    let detail = detail(&self.0, $place, Location::caller());
+                    sampling::sample(&self.0, &sampler.0, $place, detail)
+                }
+                /// The same with `bias` added to the level of detail, from -16 to 15.99.
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn sample_bias(self, sampler: Sampler, $($arg: $ty,)* bias: f32) -> Vec4 {
+                    let detail = detail(&self.0, $place, Location::caller());
+                    sampling::sample(&self.0, &sampler.0, $place, detail + bias)
+                }
+                /// A filtered value at a level of detail: 0 is the largest level, and between two
+                /// levels the sampler says what is taken.
+                #[inline]
+                #[must_use]
+                pub fn sample_level(self, sampler: Sampler, $($arg: $ty,)* level: f32) -> Vec4 {
+                    sampling::sample(&self.0, &sampler.0, $place, level)
+                }
+                /// A filtered value at the level of detail of given derivatives of the coordinates
+                /// along x and y of the target. An implementation may find a larger level of detail:
+                /// up to half a level where a gradient is along an axis, more where it is not.
+                #[inline]
+                #[must_use]
+                pub fn sample_gradient(
+                    self,
+                    sampler: Sampler,
+                    $($arg: $ty,)*
+                    dx: $gradient,
+                    dy: $gradient,
+                ) -> Vec4 {
+                    let detail = sampling::detail(&self.0, $place, $extend(dx), $extend(dy));
+                    sampling::sample(&self.0, &sampler.0, $place, detail)
+                }
+            }
+        )* };
+    }
+    samples! {
+        Texture2d: (uv: Vec2), Vec2, flat(uv, 0), |d: Vec2| d.extend(0.0);
+        Texture2dArray: (uv: Vec2, layer: u32), Vec2, flat(uv, layer), |d: Vec2| d.extend(0.0);
+        Texture3d: (uvw: Vec3), Vec3, volume(uvw), |d| d;
+        TextureCube: (direction: Vec3), Vec3, cube(direction, 0), |d| d;
+        TextureCubeArray: (direction: Vec3, cube_index: u32), Vec3, cube(direction, cube_index), |d| d;
+    }
+
+    macro_rules! gathers {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $name<'_> {
+                /// Channel `CHANNEL` (0 to 3) of the four texels of level 0 that a linear filter
+                /// reads: lower left, lower right, upper right, upper left, where the first row is
+                /// the upper one. Which four they are is rounded to 8 bits on hardware: stay away
+                /// from the middle of texels.
+                #[inline]
+                #[must_use]
+                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
+                    sampling::gather(&self.0, &sampler.0, $place, CHANNEL as usize)
+                }
+            }
+        )* };
+    }
+    gathers! {
+        Texture2d: (uv: Vec2), flat(uv, 0);
+        Texture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
+    }
+
+    macro_rules! comparisons {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $name<'_> {
+                /// Compares `reference` with the texels that the sampler reads, reference first,
+                /// and filters how many hold: from 0 to 1. At the level of detail of the fragment,
+                /// see [`Texture2d::sample`].
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn compare(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> f32 {
+                    let detail = detail(&self.0, $place, Location::caller());
+                    sampling::compare(&self.0, &sampler.0, $place, reference, detail)
+                }
+                /// The same at level 0, in every stage. (No language compares at other levels that
+                /// all of them have.)
+                #[inline]
+                #[must_use]
+                pub fn compare_level_zero(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> f32 {
+                    sampling::compare(&self.0, &sampler.0, $place, reference, 0.0)
+                }
+            }
+        )* };
+    }
+    comparisons! {
+        DepthTexture2d: (uv: Vec2), flat(uv, 0);
+        DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
+        DepthTextureCube: (direction: Vec3), cube(direction, 0);
+    }
+
+    macro_rules! compared_gathers {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $name<'_> {
+                /// Whether `reference` compares with each of the four texels of level 0 that a
+                /// linear filter reads, 1 or 0, in the order of [`Texture2d::gather`].
+                #[inline]
+                #[must_use]
+                pub fn gather_compare(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> Vec4 {
+                    sampling::gather_compare(&self.0, &sampler.0, $place, reference)
+                }
+            }
+        )* };
+    }
+    compared_gathers! {
+        DepthTexture2d: (uv: Vec2), flat(uv, 0);
+        DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
+    }
+
+    impl Texture1d<'_> {
+        /// Texels.
+        #[inline]
+        #[must_use]
+        pub fn size(self) -> u32 {
+            self.0.size[0]
+        }
+        /// The texel at `at`, which must lie inside; see [`Texture2d::load`].
+        #[inline]
+        #[must_use]
+        pub fn load(self, at: u32) -> Vec4 {
+            sampling::load(&self.0, [at, 0, 0], 0, 0, 0)
+        }
+        /// A filtered value; see [`Texture2d::sample`]. In fragment kernels only: not every language
+        /// samples a texture of one dimension at a level.
+        #[inline]
+        #[must_use]
+        #[track_caller]
+        pub fn sample(self, sampler: Sampler, u: f32) -> Vec4 {
+            let place = Place::Flat {
+                at: Vec3::new(u, 0.0, 0.0),
+                dimensions: 1,
+                layer: 0,
+            };
+            let detail = detail(&self.0, place, Location::caller());
+            sampling::sample(&self.0, &sampler.0, place, detail)
+        }
+    }
+
+    impl Texture2dMultisampled<'_> {
         /// Width and height in texels.
         #[inline]
         #[must_use]
         pub fn size(self) -> UVec2 {
-            UVec2::new(self.0.size[0], self.0.size[1])
+            UVec3::from_array(self.0.size).truncate()
         }
         /// One sample of the texel at `at`; both must exist.
         #[inline]
         #[must_use]
         pub fn load(self, at: UVec2, sample: u32) -> Vec4 {
-            texel(&self.0, UVec3::new(at.x, at.y, 0), sample)
+            sampling::load(&self.0, [at.x, at.y, 0], 0, 0, sample)
         }
-    }
-
-    impl<'a> Texture3d<'a> {
-        #[doc(hidden)]
-        #[must_use]
-        pub fn new(texture: TextureRef<'a>) -> Self {
-            Self(texture)
-        }
-        /// Width, height and depth in texels.
-        #[inline]
-        #[must_use]
-        pub fn size(self) -> UVec3 {
-            UVec3::from_array(self.0.size)
-        }
-        /// The texel at `at`, which must lie inside.
-        #[inline]
-        #[must_use]
-        pub fn load(self, at: UVec3) -> Vec4 {
-            texel(&self.0, at, 0)
-        }
-        /// A filtered value; see [`Texture2d::sample`].
-        #[inline]
-        #[must_use]
-        pub fn sample(self, sampler: Sampler, uvw: Vec3) -> Vec4 {
-            filter(&self.0, sampler.0, uvw)
-        }
-    }
-
-    impl Sampler {
-        #[doc(hidden)]
-        #[must_use]
-        pub fn new(sampler: native::Sampler) -> Self {
-            Self(sampler)
-        }
-    }
-
-    #[inline]
-    fn texel(t: &TextureRef<'_>, at: UVec3, sample: u32) -> Vec4 {
-        let size = UVec3::from_array(t.size);
-        let at = at.min(size - UVec3::ONE);
-        let sample = sample.min(t.samples - 1);
-        let index = ((at.z as usize * size.y as usize + at.y as usize) * size.x as usize
-            + at.x as usize)
-            * t.samples as usize
-            + sample as usize;
-        t.format.load(&t.bytes[index * t.format.bytes()..])
-    }
-
-    /// The coordinate of a texel that may lie beyond the edge.
-    #[inline]
-    fn wrap(i: i64, size: u32, address: Address) -> u32 {
-        let size = i64::from(size);
-        let i = match address {
-            Address::ClampToEdge => i.clamp(0, size - 1),
-            Address::Repeat => i.rem_euclid(size),
-        };
-        // In 0..size, which came from a u32.
-        i as u32
-    }
-
-    /// Linear or nearest filtering as the Vulkan specification defines it ("Texel Filtering").
-    fn filter(t: &TextureRef<'_>, sampler: native::Sampler, uvw: Vec3) -> Vec4 {
-        let size = t.size;
-        let at = uvw.to_array();
-        let mut base = [0_i64; 3];
-        let mut weight = [0.0_f32; 3];
-        for d in 0..3 {
-            let x = at[d] * size[d] as f32;
-            let x = if sampler.filter == Filter::Linear {
-                x - 0.5
-            } else {
-                x
-            };
-            let x = match sampler.deviation.offset[d] {
-                0 => x,
-                n => x + f32::from(n) / 1024.0,
-            };
-            let floor = x.floor();
-            base[d] = floor as i64;
-            weight[d] = if sampler.filter == Filter::Linear {
-                x - floor
-            } else {
-                0.0
-            };
-            if size[d] == 1 && d == 2 {
-                (base[d], weight[d]) = (0, 0.0);
-            }
-        }
-        let tap = |dx: i64, dy: i64, dz: i64| {
-            let at = UVec3::new(
-                wrap(base[0] + dx, size[0], sampler.address),
-                wrap(base[1] + dy, size[1], sampler.address),
-                wrap(base[2] + dz, size[2], sampler.address),
-            );
-            texel(t, at, 0)
-        };
-        if sampler.filter == Filter::Nearest {
-            return tap(0, 0, 0);
-        }
-        let rounded = |value: Vec4| {
-            let channels = sampler.deviation.channels;
-            if channels == [0; 4] {
-                return value;
-            }
-            let mut largest = Vec4::ZERO;
-            for corner in 0..8 {
-                let tap = tap(corner & 1, corner >> 1 & 1, corner >> 2);
-                largest = largest.max(tap.abs());
-            }
-            let steps = channels.map(|n| f32::from(n) / 16_777_216.0);
-            value + largest * Vec4::from_array(steps)
-        };
-        let slice = |dz: i64| {
-            let near = tap(0, 0, dz) * (1.0 - weight[0]) + tap(1, 0, dz) * weight[0];
-            let far = tap(0, 1, dz) * (1.0 - weight[0]) + tap(1, 1, dz) * weight[0];
-            near * (1.0 - weight[1]) + far * weight[1]
-        };
-        let front = slice(0);
-        rounded(if weight[2] == 0.0 {
-            front
-        } else {
-            front * (1.0 - weight[2]) + slice(1) * weight[2]
-        })
     }
 }
 

@@ -183,6 +183,8 @@ fn texels_are_clamped_to_the_edge_and_to_the_format() {
         args: vec![
             Arg::Texture(TextureRef {
                 size: [3, 2, 1],
+                levels: 1,
+                layers: 1,
                 samples: 1,
                 format: TexelFormat::Rgba32Float,
                 bytes: bytes(&source),
@@ -221,6 +223,8 @@ fn a_texture_of_another_format_is_refused() {
         args: vec![
             Arg::Texture(TextureRef {
                 size: [1, 1, 1],
+                levels: 1,
+                layers: 1,
                 samples: 1,
                 format: TexelFormat::R32Float,
                 bytes: &[0; 4],

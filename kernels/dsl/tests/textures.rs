@@ -4,7 +4,9 @@
 use hankel_dsl::format::R32Uint;
 use hankel_dsl::glam::{UVec2, Vec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::{Address, Arg, Call, CallError, Entry, Mode, TextureMut, TextureRef};
+use hankel_dsl::native::{
+    Address, Arg, Call, CallError, Entry, Filter, Mode, TextureMut, TextureRef,
+};
 use hankel_dsl::{Sampler, StorageTexture2d, Texture2d, kernel};
 
 /// Writes one texel, to where the uniform says.
@@ -77,11 +79,13 @@ fn four_texels_are_gathered_counterclockwise_from_the_lower_left() {
         let mut out = [Vec4::ZERO];
         let texture = TextureRef {
             size: [4, 3, 1],
+            levels: 1,
+            layers: 1,
             samples: 1,
             format: TexelFormat::R32Float,
             bytes: bytemuck::cast_slice(&texels),
         };
-        let sampler = hankel_dsl::native::Sampler::new(true, address == Address::Repeat);
+        let sampler = hankel_dsl::native::Sampler::new(Filter::Linear, address);
         run(
             "around",
             vec![

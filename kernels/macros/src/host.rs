@@ -5,8 +5,8 @@ use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 
 use crate::general::{Form, own};
-use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Texture, Variant};
-use crate::shader::{output_name, storage_texture_type, texture_type};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant};
+use crate::shader::{output_name, sampler_type, storage_texture_type};
 use crate::stage::{Passed, Returned};
 use crate::twin;
 
@@ -195,12 +195,7 @@ impl Kernel {
                         scalar: <#scalar as layout::AtomicScalar>::SCALAR,
                         unordered: #unordered,
                     }),
-                    Role::Texture(t) => {
-                        let kind = match t {
-                            Texture::Flat => quote!(Texture2d),
-                            Texture::Multisampled => quote!(Texture2dMultisampled),
-                            Texture::Volume => quote!(Texture3d),
-                        };
+                    Role::Texture(kind) => {
                         quote!(Texture { binding: #b, texture: describe::TextureKind::#kind })
                     }
                     Role::StorageTexture { dimensions, format } => quote!(StorageTexture {
@@ -208,7 +203,9 @@ impl Kernel {
                         format: <#format as ::hankel_dsl::Format>::FORMAT,
                         dimensions: #dimensions,
                     }),
-                    Role::Sampler => quote!(Sampler { binding: #b }),
+                    Role::Sampler { comparison } => {
+                        quote!(Sampler { binding: #b, comparison: #comparison })
+                    }
                     Role::Constant { id, default } => {
                         quote!(Constant { id: #id, default: #default })
                     }
@@ -316,9 +313,8 @@ impl Kernel {
                 Role::Atomic { scalar, .. } => quote! {
                     let #name = ::hankel_dsl::Atomics::<#scalar>::new(args.words(#text, 4)?);
                 },
-                Role::Texture(t) => {
-                    let (multisampled, flat) = (*t == Texture::Multisampled, *t != Texture::Volume);
-                    quote!(let #name = args.texture(#text, #multisampled, #flat)?;)
+                Role::Texture(kind) => {
+                    quote!(let #name = args.texture(#text, describe::TextureKind::#kind)?;)
                 }
                 Role::StorageTexture { dimensions, format } => {
                     let ty = storage_texture_type(*dimensions);
@@ -328,7 +324,9 @@ impl Kernel {
                         );
                     }
                 }
-                Role::Sampler => quote!(let #name = args.sampler(#text)?;),
+                Role::Sampler { comparison } => {
+                    quote!(let #name = args.sampler(#text, #comparison)?;)
+                }
                 Role::Constant { .. } => quote!(let #name = args.constant();),
                 Role::Index | Role::BuiltIn(_) | Role::Shared { .. } => TokenStream::new(),
             }
@@ -370,11 +368,11 @@ impl Kernel {
                 Role::StorageMut { .. } | Role::StorageTexture { .. } | Role::Atomic { .. } => {
                     quote!(#name)
                 }
-                Role::Texture(t) => {
-                    let ty = texture_type(*t);
+                Role::Texture(kind) => quote!(::hankel_dsl::#kind::new(#name)),
+                Role::Sampler { comparison } => {
+                    let ty = sampler_type(*comparison);
                     quote!(#ty::new(#name))
                 }
-                Role::Sampler => quote!(::hankel_dsl::Sampler::new(#name)),
                 Role::Index => match form {
                     Form::Cooperative => self.host_place(&quote!(__it.at)),
                     Form::General => self.host_place(&quote!(__at)),

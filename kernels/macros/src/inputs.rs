@@ -10,7 +10,7 @@ use syn::spanned::Spanned;
 use syn::{Attribute, BinOp, Expr, ExprLit, Lit, LitInt, LitStr, Meta, RangeLimits, Token};
 
 /// The attributes' names.
-const WORDS: [&str; 10] = [
+const WORDS: [&str; 16] = [
     "range",
     "magnitude",
     "values",
@@ -21,6 +21,31 @@ const WORDS: [&str; 10] = [
     "unit",
     "length",
     "size",
+    "levels",
+    "layers",
+    "filter",
+    "mip_filter",
+    "address",
+    "compare",
+];
+
+const FILTERS: [(&str, &str); 2] = [("nearest", "Nearest"), ("linear", "Linear")];
+
+const ADDRESSES: [(&str, &str); 3] = [
+    ("clamp_to_edge", "ClampToEdge"),
+    ("repeat", "Repeat"),
+    ("mirror_repeat", "MirrorRepeat"),
+];
+
+const COMPARISONS: [(&str, &str); 8] = [
+    ("never", "Never"),
+    ("less", "Less"),
+    ("equal", "Equal"),
+    ("less_equal", "LessEqual"),
+    ("greater", "Greater"),
+    ("not_equal", "NotEqual"),
+    ("greater_equal", "GreaterEqual"),
+    ("always", "Always"),
 ];
 
 /// What attributes say of a parameter or a field.
@@ -34,6 +59,15 @@ pub struct Inputs {
     length: Option<(Length, Span)>,
     /// Texels of a texture.
     size: Option<(Vec<u32>, Span)>,
+    /// Mip levels of a texture.
+    levels: Option<(u32, Span)>,
+    /// Layers or cubes of an array.
+    layers: Option<(u32, Span)>,
+    /// Variants of `native::Filter`, `native::Address` and `native::Compare`.
+    filter: Option<(Ident, Span)>,
+    mip_filter: Option<(Ident, Span)>,
+    address: Option<(Ident, Span)>,
+    compare: Option<(Ident, Span)>,
 }
 
 enum Domain {
@@ -58,12 +92,26 @@ pub enum Holder {
     /// A parameter that is a buffer of elements.
     Buffer,
     /// A parameter that is a texture.
-    Texture,
+    Texture {
+        /// Dimensions of a layer.
+        dimensions: usize,
+        /// It can have several mip levels.
+        levels: bool,
+        /// It has any number of layers.
+        array: bool,
+        /// Its layers are squares.
+        cube: bool,
+    },
+    /// A sampler.
+    Sampler {
+        /// It compares.
+        comparison: bool,
+    },
     /// Any other parameter with numbers.
     Value,
     /// A specialisation constant.
     Constant,
-    /// A parameter without numbers of the caller's: a sampler, an index, counters, shared memory.
+    /// A parameter without numbers of the caller's: an index, counters, shared memory.
     Nothing,
 }
 
@@ -159,6 +207,44 @@ impl Inputs {
                     Some(_) => twice(),
                 };
             }
+            "levels" | "layers" => {
+                let number = attribute.parse_args::<LitInt>()?.base10_parse()?;
+                let (slot, most) = if word == "levels" {
+                    (&mut self.levels, 13)
+                } else {
+                    (&mut self.layers, 256)
+                };
+                if !(1..=most).contains(&number) {
+                    return Err(syn::Error::new(
+                        span,
+                        format!("`{word}` is a number from 1 to {most}"),
+                    ));
+                }
+                return match slot.replace((number, span)) {
+                    None => Ok(()),
+                    Some(_) => twice(),
+                };
+            }
+            "filter" | "mip_filter" | "address" | "compare" => {
+                let (slot, known): (_, &[(&str, &str)]) = match word.as_str() {
+                    "filter" => (&mut self.filter, &FILTERS),
+                    "mip_filter" => (&mut self.mip_filter, &FILTERS),
+                    "address" => (&mut self.address, &ADDRESSES),
+                    _ => (&mut self.compare, &COMPARISONS),
+                };
+                let said: Ident = attribute.parse_args()?;
+                let Some((_, variant)) = known.iter().find(|(name, _)| said == name) else {
+                    let names: Vec<_> = known.iter().map(|(name, _)| *name).collect();
+                    return Err(syn::Error::new(
+                        said.span(),
+                        format!("`{word}` is one of {}", names.join(", ")),
+                    ));
+                };
+                return match slot.replace((Ident::new(variant, said.span()), span)) {
+                    None => Ok(()),
+                    Some(_) => twice(),
+                };
+            }
             _ => {
                 let parse = Punctuated::<LitInt, Token![,]>::parse_terminated;
                 let size = attribute
@@ -166,10 +252,10 @@ impl Inputs {
                     .iter()
                     .map(LitInt::base10_parse)
                     .collect::<syn::Result<Vec<u32>>>()?;
-                if !(2..=3).contains(&size.len()) || size.iter().any(|n| !(1..=4096).contains(n)) {
+                if !(1..=3).contains(&size.len()) || size.iter().any(|n| !(1..=4096).contains(n)) {
                     return Err(syn::Error::new(
                         span,
-                        "a texture's size is 2 or 3 numbers of texels, 1 to 4096 each: #[size(64, 32)]",
+                        "a texture's size is 1 to 3 numbers of texels, 1 to 4096 each: #[size(64, 32)]",
                     ));
                 }
                 return match self.size.replace((size, span)) {
@@ -210,24 +296,30 @@ impl Inputs {
         };
         if let Some((domain, span)) = &self.domain {
             match domain {
-                _ if holder == Holder::Nothing => {
+                _ if matches!(holder, Holder::Nothing | Holder::Sampler { .. }) => {
                     return error(
                         *span,
                         "this parameter has no numbers that inputs are made for",
                     );
                 }
-                Domain::UnitVector if matches!(holder, Holder::Texture | Holder::Constant) => {
+                Domain::UnitVector
+                    if matches!(holder, Holder::Texture { .. } | Holder::Constant) =>
+                {
                     return error(*span, "only vectors have a length");
                 }
-                Domain::CountOf(_) | Domain::IndexOf(_) if holder == Holder::Texture => {
+                Domain::CountOf(_) | Domain::IndexOf(_)
+                    if matches!(holder, Holder::Texture { .. }) =>
+                {
                     return error(*span, "a texture's channels are no counts");
                 }
                 Domain::CountOf(param) | Domain::IndexOf(param) => named(param)?,
                 _ => {}
             }
         }
-        if let (Some(default), Holder::Buffer | Holder::Texture | Holder::Nothing) =
-            (&self.default, holder)
+        if let (
+            Some(default),
+            Holder::Buffer | Holder::Texture { .. } | Holder::Sampler { .. } | Holder::Nothing,
+        ) = (&self.default, holder)
         {
             return error(default.span(), "only a uniform's numbers have a default");
         }
@@ -239,12 +331,69 @@ impl Inputs {
                 named(param)?;
             }
         }
-        match &self.size {
-            Some((_, span)) if holder != Holder::Texture => {
-                error(*span, "only a texture has a size in texels")
+        for (said, wanted) in [(&self.levels, "levels"), (&self.layers, "layers")] {
+            let has = matches!(
+                (holder, wanted),
+                (Holder::Texture { levels: true, .. }, "levels")
+                    | (Holder::Texture { array: true, .. }, "layers")
+            );
+            if let (Some((_, span)), false) = (said, has) {
+                return error(*span, &format!("this has no {wanted} to choose"));
             }
-            _ => Ok(()),
         }
+        for (said, compares) in [
+            (&self.filter, false),
+            (&self.mip_filter, false),
+            (&self.address, false),
+            (&self.compare, true),
+        ] {
+            let has = match holder {
+                Holder::Sampler { comparison } => comparison || !compares,
+                _ => false,
+            };
+            if let (Some((_, span)), false) = (said, has) {
+                let text = if compares {
+                    "only a `ComparisonSampler` compares"
+                } else {
+                    "only a sampler has filters and address modes"
+                };
+                return error(*span, text);
+            }
+        }
+        let Some((size, span)) = &self.size else {
+            return Ok(());
+        };
+        let Holder::Texture {
+            dimensions, cube, ..
+        } = holder
+        else {
+            return error(*span, "only a texture has a size in texels");
+        };
+        if size.len() != dimensions {
+            return error(
+                *span,
+                &format!(
+                    "its size has as many numbers as it has dimensions, {dimensions}; layers have an attribute of their own"
+                ),
+            );
+        }
+        if cube && size[0] != size[1] {
+            return error(*span, "the faces of a cube are squares");
+        }
+        let Some((levels, span)) = &self.levels else {
+            return Ok(());
+        };
+        let largest = size.iter().max().copied().unwrap_or(1);
+        if largest >> (levels - 1) == 0 {
+            return error(
+                *span,
+                &format!(
+                    "{largest} texels have {} levels at most",
+                    largest.ilog2() + 1
+                ),
+            );
+        }
+        Ok(())
     }
 
     /// The record of it, a `describe::Inputs`.
@@ -309,6 +458,22 @@ impl Inputs {
                 quote!(Some([#(#size),*]))
             }
         };
+        let number_of = |said: &Option<(u32, Span)>| match said {
+            None => quote!(None),
+            Some((number, _)) => quote!(Some(#number)),
+        };
+        let (levels, layers) = (number_of(&self.levels), number_of(&self.layers));
+        let variant = |of: &str, said: &Option<(Ident, Span)>| match said {
+            None => quote!(None),
+            Some((variant, _)) => {
+                let of = Ident::new(of, Span::call_site());
+                quote!(Some(::hankel_dsl::native::#of::#variant))
+            }
+        };
+        let filter = variant("Filter", &self.filter);
+        let mip_filter = variant("Filter", &self.mip_filter);
+        let address = variant("Address", &self.address);
+        let compare = variant("Compare", &self.compare);
         quote! {
             describe::Inputs {
                 domain: #domain,
@@ -316,6 +481,12 @@ impl Inputs {
                 unit: #unit,
                 length: #length,
                 size: #size,
+                levels: #levels,
+                layers: #layers,
+                filter: #filter,
+                mip_filter: #mip_filter,
+                address: #address,
+                compare: #compare,
             }
         }
     }

@@ -181,12 +181,15 @@ pub enum Role {
         scalar: Type,
         unordered: bool,
     },
-    Texture(Texture),
+    /// The type's name, which is also that of its kind and of its image.
+    Texture(Ident),
     StorageTexture {
         dimensions: u32,
         format: Type,
     },
-    Sampler,
+    Sampler {
+        comparison: bool,
+    },
     Constant {
         id: u32,
         default: u32,
@@ -249,12 +252,19 @@ impl BuiltIn {
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Texture {
-    Flat,
-    Multisampled,
-    Volume,
-}
+/// Types of textures that are read.
+const TEXTURES: [&str; 10] = [
+    "Texture1d",
+    "Texture2d",
+    "Texture2dArray",
+    "Texture2dMultisampled",
+    "Texture3d",
+    "TextureCube",
+    "TextureCubeArray",
+    "DepthTexture2d",
+    "DepthTexture2dArray",
+    "DepthTextureCube",
+];
 
 impl Role {
     /// What its numbers are, for attributes about them.
@@ -264,11 +274,22 @@ impl Role {
             Self::Element(_) | Self::ElementMut(_) | Self::Storage(_) | Self::StorageMut { .. } => {
                 Holder::Buffer
             }
-            Self::Texture(_) => Holder::Texture,
+            Self::Texture(kind) => Holder::Texture {
+                dimensions: match kind.to_string().as_str() {
+                    "Texture1d" => 1,
+                    "Texture3d" => 3,
+                    _ => 2,
+                },
+                levels: kind != "Texture1d" && kind != "Texture2dMultisampled",
+                array: kind.to_string().ends_with("Array"),
+                cube: kind.to_string().contains("Cube"),
+            },
+            Self::Sampler { comparison } => Holder::Sampler {
+                comparison: *comparison,
+            },
             Self::Constant { .. } => Holder::Constant,
             Self::Atomic { .. }
             | Self::StorageTexture { .. }
-            | Self::Sampler
             | Self::Index
             | Self::BuiltIn(_)
             | Self::Shared { .. } => Holder::Nothing,
@@ -287,7 +308,7 @@ impl Role {
                 | Self::Atomic { .. }
                 | Self::Texture(_)
                 | Self::StorageTexture { .. }
-                | Self::Sampler
+                | Self::Sampler { .. }
         )
     }
 }
@@ -411,7 +432,7 @@ impl Kernel {
         let sized: Vec<&Ident> = self
             .params
             .iter()
-            .filter(|p| matches!(p.role.holder(), Holder::Buffer | Holder::Texture))
+            .filter(|p| matches!(p.role.holder(), Holder::Buffer | Holder::Texture { .. }))
             .map(|p| &p.name)
             .collect();
         for p in &self.params {
@@ -719,20 +740,34 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
             dimensions: 3,
             format: argument(ty, "StorageTexture3d").unwrap_or_else(|| ty.clone()),
         },
-        "texture" => Role::Texture(
-            match last_segment(ty).map(|s| s.ident.to_string()).as_deref() {
-                Some("Texture2d") => Texture::Flat,
-                Some("Texture2dMultisampled") => Texture::Multisampled,
-                Some("Texture3d") => Texture::Volume,
-                _ => {
-                    return Err(syn::Error::new(
-                        ty.span(),
-                        "a texture is `Texture2d<'_>`, `Texture2dMultisampled<'_>` or `Texture3d<'_>`; one that is written is `StorageTexture2d<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
-                    ));
-                }
-            },
-        ),
-        "sampler" => Role::Sampler,
+        "texture" => match last_segment(ty) {
+            Some(it) if TEXTURES.iter().any(|name| it.ident == name) => {
+                Role::Texture(it.ident.clone())
+            }
+            _ => {
+                let names: Vec<_> = TEXTURES
+                    .iter()
+                    .map(|name| format!("`{name}<'_>`"))
+                    .collect();
+                return Err(syn::Error::new(
+                    ty.span(),
+                    format!(
+                        "a texture is one of {}; one that is written is `StorageTexture2d<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
+                        names.join(", ")
+                    ),
+                ));
+            }
+        },
+        "sampler" => match last_segment(ty).map(|s| s.ident.to_string()).as_deref() {
+            Some("Sampler") => Role::Sampler { comparison: false },
+            Some("ComparisonSampler") => Role::Sampler { comparison: true },
+            _ => {
+                return Err(syn::Error::new(
+                    ty.span(),
+                    "a sampler is `Sampler`, or `ComparisonSampler` for depths",
+                ));
+            }
+        },
         "constant" => {
             let (mut id, mut default) = (None, None);
             role.parse_nested_meta(|meta| {

@@ -43,9 +43,9 @@ use syn::parse_macro_input;
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
-/// | `#[texture] x: Texture2d<'_>` | also `Texture2dMultisampled`, `Texture3d` |
+/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube` |
 /// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of `format` |
-/// | `#[sampler] x: Sampler` | a sampler |
+/// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` for depths |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
 /// | `#[local_id]`, `#[group_id]`, `#[group_count]` | the invocation's place in its workgroup, its workgroup, how many workgroups the range needs: types as of the index |
@@ -79,6 +79,11 @@ use syn::parse_macro_input;
 /// | `#[unit = "m"]` | the unit |
 /// | `#[length(64)]`, `#[length(1..=64)]`, `#[length(PARAM * 3)]` | elements of a buffer: a number, any number between two, as many as another's |
 /// | `#[size(64, 32)]` | texels of a texture |
+/// | `#[levels(4)]` | mip levels of a texture; without it 1 |
+/// | `#[layers(5)]` | layers or cubes of an array; without it 3 |
+/// | `#[filter(nearest)]`, `#[mip_filter(nearest)]` | what a sampler does between texels, between levels: `nearest`, or `linear`, which is the default |
+/// | `#[address(mirror_repeat)]` | what a sampler does beyond the edge: `clamp_to_edge`, `repeat`, `mirror_repeat` |
+/// | `#[compare(less)]` | how a comparison sampler compares: `never`, `less`, `equal`, `less_equal` (the default), `greater`, `not_equal`, `greater_equal`, `always` |
 ///
 /// Without any, floats lie in \[-1, 1\], texels in \[0, 1\], and integers anywhere, 0, 1, -1 and the
 /// extremes among them.

@@ -4,7 +4,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use crate::general::{Form, own};
-use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Texture, Variant};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant};
 
 impl Kernel {
     pub fn expand_shader(&self) -> TokenStream {
@@ -126,13 +126,8 @@ impl Kernel {
                     let ty = self.concrete(ty, variant);
                     quote!(#[spirv(storage_buffer, descriptor_set = 0, binding = #here)] #name: &mut [#ty],)
                 }
-                Role::Texture(t) => {
-                    let ty = match t {
-                        Texture::Flat => quote!(Sampled2d),
-                        Texture::Multisampled => quote!(Sampled2dMultisampled),
-                        Texture::Volume => quote!(Sampled3d),
-                    };
-                    quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::image::#ty,)
+                Role::Texture(kind) => {
+                    quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::image::#kind,)
                 }
                 Role::StorageTexture { dimensions, format } => {
                     let shape = storage_shape(*dimensions);
@@ -141,7 +136,7 @@ impl Kernel {
                         #name: &<#format as ::hankel_dsl::Format>::#shape,
                     }
                 }
-                Role::Sampler => {
+                Role::Sampler { .. } => {
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::spirv_std::Sampler,)
                 }
                 Role::Constant { id, default } => {
@@ -224,15 +219,15 @@ impl Kernel {
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
                 Role::StorageMut { .. } => quote!(::hankel_dsl::StorageMut::new(&*#name)),
                 Role::Atomic { .. } => quote!(::hankel_dsl::Atomics::new(&*#name)),
-                Role::Texture(t) => {
-                    let ty = texture_type(*t);
-                    quote!(#ty::new(#name))
-                }
+                Role::Texture(kind) => quote!(::hankel_dsl::#kind::new(#name)),
                 Role::StorageTexture { dimensions, .. } => {
                     let ty = storage_texture_type(*dimensions);
                     quote!(#ty::new(#name))
                 }
-                Role::Sampler => quote!(::hankel_dsl::Sampler::new(#name)),
+                Role::Sampler { comparison } => {
+                    let ty = sampler_type(*comparison);
+                    quote!(#ty::new(#name))
+                }
                 Role::Index => self.of_dimensions(&quote!(invocation)),
                 Role::Shared { atomic: false, .. } => quote!(::hankel_dsl::Shared::new(&*#name)),
                 Role::Shared { atomic: true, .. } => {
@@ -317,12 +312,12 @@ pub fn output_name(stage: &Stage, i: usize) -> Ident {
     }
 }
 
-/// The DSL's type of a texture.
-pub fn texture_type(t: Texture) -> TokenStream {
-    match t {
-        Texture::Flat => quote!(::hankel_dsl::Texture2d),
-        Texture::Multisampled => quote!(::hankel_dsl::Texture2dMultisampled),
-        Texture::Volume => quote!(::hankel_dsl::Texture3d),
+/// The DSL's type of a sampler.
+pub fn sampler_type(comparison: bool) -> TokenStream {
+    if comparison {
+        quote!(::hankel_dsl::ComparisonSampler)
+    } else {
+        quote!(::hankel_dsl::Sampler)
     }
 }
 

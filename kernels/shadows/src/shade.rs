@@ -152,7 +152,10 @@ fn look_up(
     world: Vec3,
 ) -> (Moments4<f32>, f32) {
     let (uv, z) = receiver(light, world);
-    (decode(map.sample(sampler, uv), how), in_range(z, how))
+    (
+        decode(map.sample_level(sampler, uv, 0.0), how),
+        in_range(z, how),
+    )
 }
 
 /// Moments with the light's bias mixed in.

@@ -2,7 +2,7 @@
 
 use hankel_dsl::glam::{Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::{Sampler, TextureRef};
+use hankel_dsl::native::{Address, Filter, Sampler, TextureRef};
 use hankel_dsl::{Sampler as Sampled, Texture2d};
 use hankel_moments::variance_2;
 use hankel_shadows::shade::{Light, encoding, shade_variance};
@@ -16,11 +16,13 @@ fn the_bias_counts_once() {
     let bytes: Vec<u8> = texel.iter().flat_map(|x| x.to_ne_bytes()).collect();
     let map = Texture2d::new(TextureRef {
         size: [1, 1, 1],
+        levels: 1,
+        layers: 1,
         samples: 1,
         format: TexelFormat::Rgba32Float,
         bytes: &bytes,
     });
-    let sampler = Sampled::new(Sampler::new(true, false));
+    let sampler = Sampled::new(Sampler::new(Filter::Linear, Address::ClampToEdge));
     let light = Light {
         row_u: Vec4::W * 0.5,
         row_v: Vec4::W * 0.5,

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use glow::HasContext as _;
+use hankel_dsl::native::{self, Address, Compare, Filter, level_size};
 use khronos_egl as egl;
 
 use super::texels::Texel;
@@ -58,7 +59,61 @@ pub(super) struct Buffer {
     bytes: usize,
 }
 
-/// A texture of one level.
+/// How a texture is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum View {
+    /// Two dimensions.
+    Flat,
+    /// Layers of two dimensions.
+    Array,
+    /// Three dimensions.
+    Volume,
+    /// The faces of a cube.
+    Cube,
+    /// Cubes in an array.
+    Cubes,
+}
+
+impl View {
+    /// By WebGPU's name.
+    pub(super) fn named(name: &str) -> Result<Self, String> {
+        Ok(match name {
+            "2d" => Self::Flat,
+            "2d-array" => Self::Array,
+            "3d" => Self::Volume,
+            "cube" => Self::Cube,
+            "cube-array" => Self::Cubes,
+            _ => return Err(format!("GLSL ES 3.10 has no {name} textures")),
+        })
+    }
+}
+
+/// What a texture is to be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    /// How it is seen.
+    pub(super) view: View,
+    /// Texels of level 0 along each axis.
+    pub(super) size: [u32; 3],
+    /// Mip levels.
+    pub(super) levels: u32,
+    /// Layers.
+    pub(super) layers: u32,
+}
+
+impl Shape {
+    /// Two dimensions, one level, one layer.
+    pub(super) const fn flat(size: [u32; 3]) -> Self {
+        Self {
+            view: View::Flat,
+            size: [size[0], size[1], 1],
+            levels: 1,
+            layers: 1,
+        }
+    }
+}
+
+/// A texture.
 #[derive(Clone, Copy)]
 pub(super) struct Texture {
     raw: glow::Texture,
@@ -433,83 +488,65 @@ impl Context {
     pub(super) fn texture(
         &mut self,
         texel: Texel,
-        dimensions: u32,
-        size: [u32; 3],
+        shape: &Shape,
         bytes: Option<&[u8]>,
     ) -> Result<Texture, String> {
-        let target = match dimensions {
-            2 => glow::TEXTURE_2D,
-            3 => glow::TEXTURE_3D,
-            _ => return Err(format!("textures have no {dimensions} dimensions here")),
+        let &Shape {
+            view,
+            size,
+            levels,
+            layers,
+        } = shape;
+        let target = match view {
+            View::Flat => glow::TEXTURE_2D,
+            View::Array => glow::TEXTURE_2D_ARRAY,
+            View::Volume => glow::TEXTURE_3D,
+            View::Cube => glow::TEXTURE_CUBE_MAP,
+            View::Cubes => glow::TEXTURE_CUBE_MAP_ARRAY,
         };
-        let size = if dimensions == 2 {
-            [size[0], size[1], 1]
-        } else {
-            size
+        let of_level = |level: u32| {
+            let [width, height, depth] = level_size(size, level);
+            // One of them is 1.
+            [width, height, depth.saturating_mul(layers)]
         };
-        let expected = texels(size).saturating_mul(texel.bytes);
+        let expected = (0..levels).fold(0, |sum: usize, level| {
+            sum.saturating_add(texels(of_level(level)).saturating_mul(texel.bytes))
+        });
         if let Some(bytes) = bytes
             && bytes.len() != expected
         {
             return Err(format!(
-                "a texture of {size:?} texels has {expected} bytes, not {}",
+                "a texture of {shape:?} has {expected} bytes, not {}",
                 bytes.len()
             ));
         }
-        let [width, height, depth] = lengths(size)?;
+        let [width, height, depth] = lengths(of_level(0))?;
+        let count = length(levels as usize)?;
         let raw = gl!(self, create_texture())?;
         self.made.push(Made::Texture(raw));
         gl!(self, active_texture(glow::TEXTURE0 + MAKING));
         gl!(self, bind_texture(target, Some(raw)));
-        let pixels = || glow::PixelUnpackData::Slice(bytes);
-        if dimensions == 2 {
+        if matches!(view, View::Flat | View::Cube) {
             gl!(
                 self,
-                tex_storage_2d(target, 1, texel.internal, width, height)
+                tex_storage_2d(target, count, texel.internal, width, height)
             );
         } else {
             gl!(
                 self,
-                tex_storage_3d(target, 1, texel.internal, width, height, depth)
+                tex_storage_3d(target, count, texel.internal, width, height, depth)
             );
         }
         // Before any upload: that into a texture without storage has the same error again.
         self.check("making a texture")?;
-        if bytes.is_some() && dimensions == 2 {
-            gl!(
-                self,
-                tex_sub_image_2d(
-                    target,
-                    0,
-                    0,
-                    0,
-                    width,
-                    height,
-                    texel.format,
-                    texel.component,
-                    pixels()
-                )
-            );
-        } else if bytes.is_some() {
-            gl!(
-                self,
-                tex_sub_image_3d(
-                    target,
-                    0,
-                    0,
-                    0,
-                    0,
-                    width,
-                    height,
-                    depth,
-                    texel.format,
-                    texel.component,
-                    pixels()
-                )
-            );
+        let mut rest = bytes.unwrap_or_default();
+        for level in (0..levels).filter(|_| bytes.is_some()) {
+            let (own, after) = rest.split_at(texels(of_level(level)) * texel.bytes);
+            rest = after;
+            self.fill(target, texel, level, of_level(level), own)?;
         }
         for (what, value) in [
-            (glow::TEXTURE_MIN_FILTER, glow::NEAREST),
+            (glow::TEXTURE_MIN_FILTER, glow::NEAREST_MIPMAP_NEAREST),
             (glow::TEXTURE_MAG_FILTER, glow::NEAREST),
             (glow::TEXTURE_WRAP_S, glow::CLAMP_TO_EDGE),
             (glow::TEXTURE_WRAP_T, glow::CLAMP_TO_EDGE),
@@ -525,6 +562,60 @@ impl Context {
             texel,
             size,
         })
+    }
+
+    /// Fills a level of the texture that is bound to a target: layer by layer.
+    fn fill(
+        &self,
+        target: u32,
+        texel: Texel,
+        level: u32,
+        size: [u32; 3],
+        bytes: &[u8],
+    ) -> Result<(), String> {
+        let [width, height, depth] = lengths(size)?;
+        let level = length(level as usize)?;
+        if matches!(target, glow::TEXTURE_2D | glow::TEXTURE_CUBE_MAP) {
+            let layer = (bytes.len() / size[2].max(1) as usize).max(1);
+            for (face, bytes) in (0..).zip(bytes.chunks_exact(layer)) {
+                let target = match target {
+                    glow::TEXTURE_CUBE_MAP => glow::TEXTURE_CUBE_MAP_POSITIVE_X + face,
+                    flat => flat,
+                };
+                gl!(
+                    self,
+                    tex_sub_image_2d(
+                        target,
+                        level,
+                        0,
+                        0,
+                        width,
+                        height,
+                        texel.format,
+                        texel.component,
+                        glow::PixelUnpackData::Slice(Some(bytes))
+                    )
+                );
+            }
+            return Ok(());
+        }
+        gl!(
+            self,
+            tex_sub_image_3d(
+                target,
+                level,
+                0,
+                0,
+                0,
+                width,
+                height,
+                depth,
+                texel.format,
+                texel.component,
+                glow::PixelUnpackData::Slice(Some(bytes))
+            )
+        );
+        Ok(())
     }
 
     /// A depth buffer, to be drawn into and then read as a texture.
@@ -606,22 +697,49 @@ impl Context {
         );
     }
 
-    pub(super) fn sampler(&mut self, linear: bool, repeat: bool) -> Result<Sampler, String> {
+    pub(super) fn sampler(&mut self, sampler: &native::Sampler) -> Result<Sampler, String> {
+        if sampler.anisotropy != 1 {
+            return Err("OpenGL ES has no anisotropic filters".into());
+        }
         let raw = gl!(self, create_sampler())?;
         self.made.push(Made::Sampler(raw));
-        let filter = if linear { glow::LINEAR } else { glow::NEAREST };
-        let wrap = if repeat {
-            glow::REPEAT
-        } else {
-            glow::CLAMP_TO_EDGE
+        let magnify = match sampler.magnify {
+            Filter::Nearest => glow::NEAREST,
+            Filter::Linear => glow::LINEAR,
         };
-        for (what, value) in [
-            (glow::TEXTURE_MIN_FILTER, filter),
-            (glow::TEXTURE_MAG_FILTER, filter),
-            (glow::TEXTURE_WRAP_S, wrap),
-            (glow::TEXTURE_WRAP_T, wrap),
-            (glow::TEXTURE_WRAP_R, wrap),
-        ] {
+        let minify = match (sampler.minify, sampler.mip) {
+            (Filter::Nearest, Filter::Nearest) => glow::NEAREST_MIPMAP_NEAREST,
+            (Filter::Nearest, Filter::Linear) => glow::NEAREST_MIPMAP_LINEAR,
+            (Filter::Linear, Filter::Nearest) => glow::LINEAR_MIPMAP_NEAREST,
+            (Filter::Linear, Filter::Linear) => glow::LINEAR_MIPMAP_LINEAR,
+        };
+        let [u, v, w] = sampler.address.map(|it| match it {
+            Address::ClampToEdge => glow::CLAMP_TO_EDGE,
+            Address::Repeat => glow::REPEAT,
+            Address::MirrorRepeat => glow::MIRRORED_REPEAT,
+        });
+        let mut states = vec![
+            (glow::TEXTURE_MIN_FILTER, minify),
+            (glow::TEXTURE_MAG_FILTER, magnify),
+            (glow::TEXTURE_WRAP_S, u),
+            (glow::TEXTURE_WRAP_T, v),
+            (glow::TEXTURE_WRAP_R, w),
+        ];
+        if let Some(compare) = sampler.compare {
+            let how = match compare {
+                Compare::Never => glow::NEVER,
+                Compare::Less => glow::LESS,
+                Compare::Equal => glow::EQUAL,
+                Compare::LessEqual => glow::LEQUAL,
+                Compare::Greater => glow::GREATER,
+                Compare::NotEqual => glow::NOTEQUAL,
+                Compare::GreaterEqual => glow::GEQUAL,
+                Compare::Always => glow::ALWAYS,
+            };
+            states.push((glow::TEXTURE_COMPARE_MODE, glow::COMPARE_REF_TO_TEXTURE));
+            states.push((glow::TEXTURE_COMPARE_FUNC, how));
+        }
+        for (what, value) in states {
             gl!(self, sampler_parameter_i32(raw, what, value as i32));
         }
         self.check("making a sampler")?;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::job::{Arg, Case, Job, Place, Role, Scalar, Slot, Stage, Value};
 
-use super::context::{Attribute, Buffer, Context, Program, Texture};
+use super::context::{Attribute, Buffer, Context, Program, Shape, Texture, View};
 use super::texels::{self, Texel};
 use super::text::{self, Variable};
 
@@ -291,24 +291,40 @@ impl<'a> Run<'a> {
                 Some(Made::Buffer(self.context.buffer(bytes, 0)?))
             }
             (
-                Role::Texture { dimensions, .. } | Role::StorageTexture { dimensions, .. },
+                role @ (Role::Texture { .. } | Role::StorageTexture { .. }),
                 Arg::Texture {
                     format,
                     size,
+                    levels,
+                    layers,
                     samples,
                     ..
                 },
             ) => {
-                let texel = Texel::named(format)?;
+                let (view, texel) = match role {
+                    Role::Texture {
+                        view, depth: true, ..
+                    } => (view.clone(), Texel::DEPTH),
+                    Role::Texture { view, .. } => (view.clone(), Texel::named(format)?),
+                    Role::StorageTexture { dimensions, .. } => {
+                        (format!("{dimensions}d"), Texel::named(format)?)
+                    }
+                    _ => return Err(format!("{arg:?} is given for {role:?}")),
+                };
                 let bytes = self.bytes(arg)?;
                 Some(Made::Texture(if *samples == 1 {
-                    self.context
-                        .texture(texel, *dimensions, *size, Some(bytes))?
+                    let shape = Shape {
+                        view: View::named(&view)?,
+                        size: *size,
+                        levels: *levels,
+                        layers: *layers,
+                    };
+                    self.context.texture(texel, &shape, Some(bytes))?
                 } else {
                     self.spread(texel, *size, *samples, bytes)?
                 }))
             }
-            (Role::Sampler, Arg::Sampler { .. })
+            (Role::Sampler, Arg::Sampler(_))
             | (
                 Role::Attribute { .. }
                 | Role::Varying { .. }
@@ -331,7 +347,9 @@ impl<'a> Run<'a> {
         bytes: &[u8],
     ) -> Result<Texture, String> {
         let wide = [size[0].saturating_mul(samples), size[1], 1];
-        let flat = self.context.texture(texel, 2, wide, Some(bytes))?;
+        let flat = self
+            .context
+            .texture(texel, &Shape::flat(wide), Some(bytes))?;
         let into = self.context.multisampled(texel, size, samples)?;
         let program = self.context.program(
             &[
@@ -409,10 +427,10 @@ impl<'a> Run<'a> {
     /// Binds the samplers to the units of the textures that they have become one with.
     fn bind_samplers(&mut self, units: &[(Option<u32>, u32)]) -> Result<(), String> {
         for (slot, arg) in self.job.slots.iter().zip(&self.case.args) {
-            let (Some(place), &Arg::Sampler { linear, repeat }) = (&slot.place, arg) else {
+            let (Some(place), Arg::Sampler(sampler)) = (&slot.place, arg) else {
                 continue;
             };
-            let sampler = self.context.sampler(linear, repeat)?;
+            let sampler = self.context.sampler(sampler)?;
             for &texture in &place.combined_with {
                 let (_, unit) = units
                     .iter()
@@ -466,7 +484,7 @@ impl<'a> Run<'a> {
         } else {
             // Nothing is drawn, but OpenGL wants something to draw into.
             let texel = Texel::named("rgba8unorm")?;
-            let target = self.context.texture(texel, 2, [1; 3], None)?;
+            let target = self.context.texture(texel, &Shape::flat([1; 3]), None)?;
             self.context.draw_into(&[(0, target)], None, [1; 2])?;
             self.context
                 .capture(self.case.invocations, stride, &attributes)?
@@ -516,7 +534,9 @@ impl<'a> Run<'a> {
                 // What is discarded stays as it is.
                 let zeros = vec![0; (width * height * 16) as usize];
                 let size = [width, height, 1];
-                let target = self.context.texture(texel, 2, size, Some(&zeros))?;
+                let target = self
+                    .context
+                    .texture(texel, &Shape::flat(size), Some(&zeros))?;
                 targets.push((location, target));
                 slots.push((i, value.size as usize * 4));
             }
@@ -555,7 +575,7 @@ impl Run<'_> {
         let texel = Texel::named("rgba32float")?;
         let into = self
             .context
-            .texture(texel, 2, [size[0], size[1], 1], None)?;
+            .texture(texel, &Shape::flat([size[0], size[1], 1]), None)?;
         let stages = [
             (glow::VERTEX_SHADER, COVER),
             (glow::FRAGMENT_SHADER, SPREAD),

@@ -36,7 +36,18 @@ pub(super) fn in_text(name: &str) -> Result<&'static str, String> {
 }
 
 impl Texel {
-    /// The format of that name. Depth is one float: the kernels read it as a colour.
+    /// Depths that are compared.
+    pub(super) const DEPTH: Self = Self {
+        internal: glow::DEPTH_COMPONENT32F,
+        format: glow::DEPTH_COMPONENT,
+        component: glow::FLOAT,
+        bytes: 4,
+        read_format: glow::DEPTH_COMPONENT,
+        read_component: glow::FLOAT,
+        read_bytes: 4,
+    };
+
+    /// The format of that name. Depth is one float: kernels that do not compare read it as a colour.
     pub(super) fn named(name: &str) -> Result<Self, String> {
         let (internal, format, component, bytes) = match name {
             "r32float" | "depth32float" => (glow::R32F, glow::RED, glow::FLOAT, 4),

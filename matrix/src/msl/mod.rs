@@ -231,7 +231,7 @@ fn result_bytes(job: &Job) -> u64 {
             sum += match (stream(&slot.role), arg) {
                 (Some(value), _) => u64::from(case.invocations) * u64::from(value.size) * 4,
                 (None, Arg::Bytes { length, .. } | Arg::Texture { length, .. }) => *length,
-                (None, Arg::Sampler { .. }) => 0,
+                (None, Arg::Sampler(_)) => 0,
             };
         }
     }
@@ -339,24 +339,53 @@ fn plan(job: &Job) -> Result<String, Failure> {
 fn plan_arg(plan: &mut String, slot: &Slot, arg: &Arg) -> Result<(), Failure> {
     let stride = stream(&slot.role).map(|value| value.size * 4);
     let _ = match (&slot.role, arg) {
-        (Role::Sampler, Arg::Sampler { linear, repeat }) => {
+        (Role::Sampler, Arg::Sampler(sampler)) => {
+            if sampler.anisotropy != 1 {
+                return Err(Failure::refused(
+                    "which samples an anisotropic filter takes is not said",
+                ));
+            }
             // As runner.h numbers them.
-            writeln!(plan, "{}", u32::from(*linear) | u32::from(*repeat) << 1)
+            let [u, v, w] = sampler.address.map(|it| it as u32);
+            let compare = sampler.compare.map_or(0, |it| it as u32 + 1);
+            let flags = [
+                (sampler.magnify as u32, 0),
+                (sampler.minify as u32, 1),
+                (sampler.mip as u32 + 1, 2),
+                (u, 4),
+                (v, 6),
+                (w, 8),
+                (compare, 10),
+            ];
+            let flags = flags.iter().fold(0, |sum, (what, at)| sum | what << at);
+            writeln!(plan, "{flags}")
         }
         (
             Role::Texture { .. } | Role::StorageTexture { .. },
             Arg::Texture {
                 format,
                 size: [x, y, z],
+                levels,
+                layers,
                 samples,
                 offset,
                 length,
+                ..
             },
         ) => {
+            // Depths are floats.
+            let format = if format == "depth32float" {
+                "r32float"
+            } else {
+                format
+            };
             if !format.chars().all(|c| c.is_ascii_alphanumeric()) || format.is_empty() {
                 return Err(Failure::refused(format!("texture format `{format}`")));
             }
-            writeln!(plan, "{format} {x} {y} {z} {samples} {offset} {length}")
+            writeln!(
+                plan,
+                "{format} {x} {y} {z} {levels} {layers} {samples} {offset} {length}"
+            )
         }
         (Role::Position | Role::Passed { .. } | Role::Depth | Role::Target { .. }, _) => {
             writeln!(plan, "{}", stride.unwrap_or_default())

@@ -166,18 +166,32 @@ constexpr FormatOf formats[] = {
 struct msl_texture {
     Format format;
     unsigned texel_bytes;
+    // Of level 0.
     unsigned size[3];
+    unsigned levels;
+    unsigned layers;
     unsigned samples;
     unsigned char *texels;
 
     bool is_integer() const { return format == r32uint || format == rgba32uint; }
-    bool has(const unsigned *at, unsigned sample, unsigned lod) const {
-        return lod == 0 && at[0] < size[0] && at[1] < size[1] && at[2] < size[2] &&
-               sample < samples;
+    unsigned of_level(unsigned lod, int d) const {
+        return lod < 32 && size[d] >> lod > 0 ? size[d] >> lod : 1;
     }
-    unsigned char *texel(const unsigned *at, unsigned sample) const {
-        size_t i = (size_t(at[2]) * size[1] + at[1]) * size[0] + at[0];
-        return texels + (i * samples + sample) * texel_bytes;
+    // Texels of a layer of a level.
+    size_t texels_of(unsigned lod) const {
+        return size_t(of_level(lod, 0)) * of_level(lod, 1) * of_level(lod, 2);
+    }
+    bool has(const unsigned *at, unsigned layer, unsigned sample, unsigned lod) const {
+        return lod < levels && layer < layers && sample < samples && at[0] < of_level(lod, 0) &&
+               at[1] < of_level(lod, 1) && at[2] < of_level(lod, 2);
+    }
+    unsigned char *texel(const unsigned *at, unsigned layer, unsigned sample, unsigned lod) const {
+        size_t before = 0;
+        for (unsigned i = 0; i < lod; i++)
+            before += texels_of(i) * layers;
+        before += texels_of(lod) * layer;
+        size_t i = (size_t(at[2]) * of_level(lod, 1) + at[1]) * of_level(lod, 0) + at[0];
+        return texels + ((before + i) * samples + sample) * texel_bytes;
     }
 };
 
@@ -187,8 +201,9 @@ unsigned unorm(float x, float steps) {
     return x > 0 ? unsigned(rintf((x < 1 ? x : 1) * steps)) : 0;
 }
 
-void load(const msl_texture &t, const unsigned *at, unsigned sample, float *out) {
-    const unsigned char *texel = t.texel(at, sample);
+void load(const msl_texture &t, const unsigned *at, unsigned layer, unsigned sample, unsigned lod,
+          float *out) {
+    const unsigned char *texel = t.texel(at, layer, sample, lod);
     out[0] = out[1] = out[2] = 0;
     out[3] = 1;
     switch (t.format) {
@@ -226,32 +241,34 @@ void load(const msl_texture &t, const unsigned *at, unsigned sample, float *out)
 extern "C" {
 unsigned msl_texture_size(const msl_texture *t, int axis) { return t->size[axis]; }
 unsigned msl_texture_samples(const msl_texture *t) { return t->samples; }
+unsigned msl_texture_levels(const msl_texture *t) { return t->levels; }
+unsigned msl_texture_layers(const msl_texture *t) { return t->layers; }
 
-void msl_load_float(const msl_texture *t, const unsigned *at, unsigned sample, unsigned lod,
-                    float *out) {
-    if (t->has(at, sample, lod))
-        load(*t, at, sample, out);
+void msl_load_float(const msl_texture *t, const unsigned *at, unsigned layer, unsigned sample,
+                    unsigned lod, float *out) {
+    if (t->has(at, layer, sample, lod))
+        load(*t, at, layer, sample, lod, out);
     else
         out[0] = out[1] = out[2] = out[3] = 0;
 }
 
-void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned sample, unsigned lod,
-                   unsigned *out) {
+void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned layer, unsigned sample,
+                   unsigned lod, unsigned *out) {
     if (!t->is_integer())
         msl_fail("a texture of floats is read as one of integers");
     out[0] = out[1] = out[2] = out[3] = 0;
-    if (!t->has(at, sample, lod))
+    if (!t->has(at, layer, sample, lod))
         return;
     out[3] = 1;
-    memcpy(out, t->texel(at, sample), t->texel_bytes);
+    memcpy(out, t->texel(at, layer, sample, lod), t->texel_bytes);
 }
 
 void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const float *value) {
     if (t->is_integer())
         msl_fail("floats are written to a texture of integers");
-    if (!t->has(at, 0, lod))
+    if (!t->has(at, 0, 0, lod))
         return;
-    unsigned char *texel = t->texel(at, 0);
+    unsigned char *texel = t->texel(at, 0, 0, lod);
     for (unsigned i = 0; i < 4; i++) {
         switch (t->format) {
         case rgba16float: {
@@ -277,19 +294,15 @@ void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const flo
 void msl_store_uint(msl_texture *t, const unsigned *at, unsigned lod, const unsigned *value) {
     if (!t->is_integer())
         msl_fail("integers are written to a texture of floats");
-    if (t->has(at, 0, lod))
-        memcpy(t->texel(at, 0), value, t->texel_bytes);
+    if (t->has(at, 0, 0, lod))
+        memcpy(t->texel(at, 0, 0, lod), value, t->texel_bytes);
 }
 }
 
-// ---- sampling, with weights in full precision ----
+// ---- sampling, with weights in full precision, by the formulas of the Vulkan specification ----
 
 namespace {
-// The texels around a coordinate, and how much of the second in each direction.
-struct Taps {
-    int64_t base[3];
-    float weight[3];
-};
+unsigned bits(unsigned flags, int at, unsigned count) { return flags >> at & ((1u << count) - 1); }
 
 int64_t whole(float x) {
     if (!(x == x))
@@ -298,85 +311,247 @@ int64_t whole(float x) {
     return x >= limit ? int64_t(1) << 62 : x <= -limit ? -(int64_t(1) << 62) : int64_t(x);
 }
 
-Taps taps(const msl_texture &t, unsigned flags, const float *at, const int *offset) {
-    Taps r;
-    bool linear = (flags & msl_linear) != 0;
-    for (int d = 0; d < 3; d++) {
-        float x = (flags & msl_pixels) != 0 ? at[d] : at[d] * float(t.size[d]);
-        if (linear)
-            x = x - 0.5f;
-        float below = floorf(x);
-        r.base[d] = whole(below) + offset[d];
-        r.weight[d] = linear ? x - below : 0.0f;
-        // What has no depth is not filtered along it.
-        if (d == 2 && t.size[d] == 1) {
-            r.base[d] = 0;
-            r.weight[d] = 0;
-        }
-    }
-    return r;
-}
-
-unsigned wrap(int64_t i, unsigned size, unsigned flags) {
+unsigned wrap(int64_t i, unsigned size, unsigned mode) {
     auto n = int64_t(size);
-    if ((flags & msl_repeat) != 0)
+    if (mode == 1)
         return unsigned(((i % n) + n) % n);
+    if (mode == 2) {
+        i = ((i % (2 * n)) + 2 * n) % (2 * n);
+        return unsigned(i < n ? i : 2 * n - 1 - i);
+    }
     return unsigned(i < 0 ? 0 : i >= n ? n - 1 : i);
 }
 
-void tap(const msl_texture &t, const Taps &taps, unsigned flags, int dx, int dy, int dz,
-         float *out) {
-    if (t.samples != 1)
-        msl_fail("a texture with several samples is sampled");
-    const int step[3] = {dx, dy, dz};
-    unsigned at[3];
-    for (int d = 0; d < 3; d++)
-        at[d] = wrap(taps.base[d] + step[d], t.size[d], flags);
-    load(t, at, 0, out);
+// A face of a cube, and the direction's parts along it and across, by face: s, t, major.
+void parts(const float *v, unsigned face, float *out) {
+    switch (face) {
+    case 0: out[0] = -v[2]; out[1] = -v[1]; out[2] = v[0]; break;
+    case 1: out[0] = v[2]; out[1] = -v[1]; out[2] = -v[0]; break;
+    case 2: out[0] = v[0]; out[1] = v[2]; out[2] = v[1]; break;
+    case 3: out[0] = v[0]; out[1] = -v[2]; out[2] = -v[1]; break;
+    case 4: out[0] = v[0]; out[1] = -v[1]; out[2] = v[2]; break;
+    default: out[0] = -v[0]; out[1] = -v[1]; out[2] = -v[2];
+    }
 }
 
-void slice(const msl_texture &t, const Taps &taps, unsigned flags, int dz, float *out) {
-    float a[4], b[4], c[4], d[4];
-    tap(t, taps, flags, 0, 0, dz, a);
-    tap(t, taps, flags, 1, 0, dz, b);
-    tap(t, taps, flags, 0, 1, dz, c);
-    tap(t, taps, flags, 1, 1, dz, d);
-    float x = taps.weight[0], y = taps.weight[1];
-    for (int i = 0; i < 4; i++) {
-        float near = a[i] * (1.0f - x) + b[i] * x;
-        float far = c[i] * (1.0f - x) + d[i] * x;
-        out[i] = near * (1.0f - y) + far * y;
+unsigned face_of(const float *v) {
+    float x = fabsf(v[0]), y = fabsf(v[1]), z = fabsf(v[2]);
+    if (z >= x && z >= y)
+        return v[2] >= 0 ? 4 : 5;
+    if (y >= x)
+        return v[1] >= 0 ? 2 : 3;
+    return v[0] >= 0 ? 0 : 1;
+}
+
+void direction(unsigned face, float s, float t, float *out) {
+    const float all[6][3] = {{1, -t, -s}, {-1, -t, s}, {s, 1, t}, {s, -1, -t}, {s, -t, 1}, {-s, -t, -1}};
+    memcpy(out, all[face], sizeof all[face]);
+}
+
+// What is made of a texel.
+struct Reading {
+    const float *reference;
+    unsigned compare;
+    void operator()(const float *texel, float *out) const {
+        if (reference == nullptr) {
+            memcpy(out, texel, 4 * sizeof(float));
+            return;
+        }
+        float r = *reference, x = texel[0];
+        const bool all[8] = {false, r < x, r == x, r <= x, r > x, r != x, r >= x, true};
+        for (int i = 0; i < 4; i++)
+            out[i] = all[compare - 1] ? 1 : 0;
     }
+};
+
+// The texels of a level around a place, and how much of the second in each direction.
+struct Taps {
+    const msl_texture &t;
+    unsigned flags;
+    unsigned lod;
+    Reading reading;
+    bool cube;
+    unsigned face;
+    unsigned layer;
+    int64_t base[3];
+    float weight[3];
+
+    Taps(const msl_texture &texture, unsigned f, const msl_place &place, const float *reference,
+         unsigned level, bool linear)
+        : t(texture), flags(f), lod(level), reading{reference, bits(f, msl_compare, 4)},
+          cube(place.cube), face(0), layer(place.layer) {
+        if (t.samples != 1)
+            msl_fail("a texture with several samples is sampled");
+        if ((reference != nullptr) != (reading.compare != 0))
+            msl_fail("a sampler that compares is used without a reference, or the other way round");
+        float at[3] = {place.at[0], place.at[1], place.at[2]};
+        int dimensions = place.dimensions;
+        if (cube) {
+            float on[3];
+            face = face_of(place.at);
+            parts(place.at, face, on);
+            at[0] = on[0] / on[2] * 0.5f + 0.5f;
+            at[1] = on[1] / on[2] * 0.5f + 0.5f;
+            dimensions = 2;
+        }
+        unsigned layers = cube ? t.layers - 6 : t.layers - 1;
+        if (layer > layers)
+            layer = layers;
+        for (int d = 0; d < 3; d++) {
+            base[d] = 0;
+            weight[d] = 0;
+            unsigned size = t.of_level(lod, d);
+            if (d >= dimensions || (d == 2 && size == 1))
+                continue;
+            float x = bits(flags, msl_pixels, 1) != 0 ? at[d] : at[d] * float(size);
+            if (linear)
+                x = x - 0.5f;
+            float below = floorf(x);
+            base[d] = whole(below) + place.offset[d];
+            weight[d] = linear ? x - below : 0.0f;
+            if (cube && !linear && base[d] >= size)
+                base[d] = size - 1;
+        }
+    }
+
+    // Whether there is such a texel: not beyond a cube's corner.
+    bool tap(int dx, int dy, int dz, float *out) const {
+        const int64_t at[3] = {base[0] + dx, base[1] + dy, base[2] + dz};
+        unsigned place[3] = {0, 0, 0};
+        unsigned where = layer;
+        if (cube) {
+            int64_t n = t.of_level(lod, 0);
+            bool x = at[0] < 0 || at[0] >= n, y = at[1] < 0 || at[1] >= n;
+            if (x && y)
+                return false;
+            place[0] = unsigned(at[0]);
+            place[1] = unsigned(at[1]);
+            unsigned on = face;
+            if (x || y) {
+                // Its middle lies on this face's plane.
+                float to[3], there[3];
+                direction(face, float(2 * at[0] + 1) / float(n) - 1, float(2 * at[1] + 1) / float(n) - 1,
+                          to);
+                on = face_of(to);
+                parts(to, on, there);
+                for (int d = 0; d < 2; d++) {
+                    int64_t i = whole((there[d] / there[2] * 0.5f + 0.5f) * float(n));
+                    place[d] = unsigned(i < 0 ? 0 : i >= n ? n - 1 : i);
+                }
+            }
+            where += on;
+        } else {
+            for (int d = 0; d < 3; d++)
+                place[d] = wrap(at[d], t.of_level(lod, d), bits(flags, msl_address + 2 * d, 2));
+        }
+        float texel[4];
+        load(t, place, where, 0, lod, texel);
+        reading(texel, out);
+        return true;
+    }
+
+    // Of (0, 0), (1, 0), (0, 1), (1, 1).
+    void square(int dz, float (*out)[4]) const {
+        float sum[4] = {};
+        int missing = -1;
+        for (int i = 0; i < 4; i++) {
+            if (!tap(i & 1, i >> 1, dz, out[i])) {
+                missing = i;
+                continue;
+            }
+            for (int c = 0; c < 4; c++)
+                sum[c] += out[i][c];
+        }
+        for (int c = 0; c < 4 && missing >= 0; c++)
+            out[missing][c] = sum[c] / 3;
+    }
+
+    void slice(int dz, float *out) const {
+        float v[4][4];
+        square(dz, v);
+        float x = weight[0], y = weight[1];
+        for (int i = 0; i < 4; i++) {
+            float near = v[0][i] * (1.0f - x) + v[1][i] * x;
+            float far = v[2][i] * (1.0f - x) + v[3][i] * x;
+            out[i] = near * (1.0f - y) + far * y;
+        }
+    }
+};
+
+void sample_level(const msl_texture &t, unsigned flags, const msl_place &place,
+                  const float *reference, unsigned lod, bool linear, float *out) {
+    Taps taps(t, flags, place, reference, lod, linear);
+    if (!linear) {
+        if (!taps.tap(0, 0, 0, out))
+            msl_fail("the nearest texel of a cube is on no face");
+        return;
+    }
+    taps.slice(0, out);
+    float z = taps.weight[2];
+    if (z == 0)
+        return;
+    float back[4];
+    taps.slice(1, back);
+    for (int i = 0; i < 4; i++)
+        out[i] = out[i] * (1.0f - z) + back[i] * z;
 }
 } // namespace
 
 extern "C" {
-void msl_sample_float(const msl_texture *t, unsigned flags, const float *at, const int *offset,
-                      float *out) {
-    Taps around = taps(*t, flags, at, offset);
-    if ((flags & msl_linear) == 0) {
-        tap(*t, around, flags, 0, 0, 0, out);
+void msl_sample_float(const msl_texture *t, unsigned flags, const msl_place *place,
+                      const float *reference, float lod, float *out) {
+    bool linear = bits(flags, lod <= 0 ? msl_magnify : msl_minify, 1) != 0;
+    unsigned mip = bits(flags, msl_mip, 2);
+    auto most = float(t->levels - 1);
+    if (mip == 0 || !(lod > 0))
+        lod = 0;
+    if (lod > most)
+        lod = most;
+    if (mip != 2) {
+        sample_level(*t, flags, *place, reference, unsigned(ceilf(lod + 0.5f) - 1.0f), linear, out);
         return;
     }
-    slice(*t, around, flags, 0, out);
-    float z = around.weight[2];
-    if (z == 0)
+    auto fine = unsigned(lod);
+    float weight = lod - float(fine);
+    sample_level(*t, flags, *place, reference, fine, linear, out);
+    if (weight == 0)
         return;
-    float back[4];
-    slice(*t, around, flags, 1, back);
+    float coarse[4];
+    sample_level(*t, flags, *place, reference, fine + 1, linear, coarse);
     for (int i = 0; i < 4; i++)
-        out[i] = out[i] * (1.0f - z) + back[i] * z;
+        out[i] = out[i] * (1.0f - weight) + coarse[i] * weight;
 }
 
-void msl_gather_float(const msl_texture *t, unsigned flags, const float *at, const int *offset,
-                      unsigned channel, float *out) {
-    Taps around = taps(*t, flags | msl_linear, at, offset);
-    const int order[4][2] = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
-    for (int i = 0; i < 4; i++) {
-        float v[4];
-        tap(*t, around, flags, order[i][0], order[i][1], 0, v);
-        out[i] = v[channel];
+void msl_gather_float(const msl_texture *t, unsigned flags, const msl_place *place,
+                      const float *reference, unsigned channel, float *out) {
+    Taps around(*t, flags, *place, reference, 0, true);
+    float v[4][4];
+    around.square(0, v);
+    const int order[4] = {2, 3, 1, 0};
+    for (int i = 0; i < 4; i++)
+        out[i] = v[order[i]][channel];
+}
+
+float msl_lod(const msl_texture *t, const msl_place *place, const float *dx, const float *dy) {
+    float longest = 0;
+    const float *const both[2] = {dx, dy};
+    for (const float *d : both) {
+        float along[3] = {d[0], d[1], d[2]};
+        if (place->cube) {
+            float v[3], dv[3];
+            unsigned face = face_of(place->at);
+            parts(place->at, face, v);
+            parts(d, face, dv);
+            for (int i = 0; i < 2; i++)
+                along[i] = 0.5f * (v[2] * dv[i] - v[i] * dv[2]) / (v[2] * v[2]);
+            along[2] = 0;
+        }
+        float sum = 0;
+        for (int i = 0; i < 3; i++)
+            sum += along[i] * float(t->size[i]) * (along[i] * float(t->size[i]));
+        longest = sum > longest ? sum : longest;
     }
+    return log2f(sqrtf(longest));
 }
 }
 
@@ -384,6 +559,8 @@ void msl_gather_float(const msl_texture *t, unsigned flags, const float *at, con
 
 namespace {
 bool discarded = false;
+// The stage's invocations run in quads.
+bool in_quads = false;
 
 struct Fiber {
     ucontext_t context;
@@ -486,6 +663,7 @@ void msl_barrier(unsigned line) {
     me->waits_at = line;
     swapcontext(&me->context, &scheduler);
 }
+bool msl_in_quad() { return in_quads; }
 unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (*all)[4]) {
     if (running == nullptr)
         msl_fail("a derivative outside of a quad");
@@ -606,9 +784,14 @@ void prepare(Slot &s, unsigned index, unsigned invocations) {
             size = unsigned(number());
             texels *= size;
         }
+        s.texture.levels = unsigned(number());
+        s.texture.layers = unsigned(number());
         s.texture.samples = unsigned(number());
-        if (texels == 0 || s.texture.samples == 0)
+        if (texels == 0 || s.texture.levels == 0 || s.texture.layers == 0 || s.texture.samples == 0)
             msl_fail("a texture without texels");
+        texels = 0;
+        for (unsigned level = 0; level < s.texture.levels; level++)
+            texels += s.texture.texels_of(level) * s.texture.layers;
         uint64_t offset = number();
         s.bytes = number();
         if (s.bytes != texels * s.texture.samples * format->bytes)
@@ -756,6 +939,7 @@ int main(int argc, char **argv) {
             run_compute(call, threads, groups);
         } else {
             bool quads = strcmp(stage, "fragment") == 0 && msl_has_derivatives;
+            in_quads = quads;
             for (unsigned i = 0; i < invocations; i++) {
                 call.invocation[0] = i;
                 // For the words of a fault.

@@ -32,8 +32,26 @@ struct msl_memory {
     unsigned long align;
 };
 
-// Flags of a sampler.
-enum { msl_linear = 1, msl_repeat = 2, msl_pixels = 4 };
+// Flags of a sampler. Numbers of filters: 0 nearest, 1 linear; between levels 0 none, 1 nearest,
+// 2 linear; of address modes: 0 clamp to edge, 1 repeat, 2 mirrored repeat; of comparisons, 0 for none:
+// never, less, equal, less or equal, greater, not equal, greater or equal, always.
+enum {
+    msl_magnify = 0,
+    msl_minify = 1,
+    msl_mip = 2,
+    msl_address = 4, // Two bits for each of u, v, w.
+    msl_compare = 10,
+    msl_pixels = 14,
+};
+
+// Where a texture is sampled: coordinates in a layer, or a direction in a cube that begins at one.
+struct msl_place {
+    int dimensions;
+    bool cube;
+    float at[3];
+    unsigned layer;
+    int offset[3];
+};
 
 struct msl_texture;
 
@@ -50,21 +68,28 @@ void msl_invoke(const msl_call *call);
 // For the library.
 unsigned msl_texture_size(const msl_texture *texture, int axis);
 unsigned msl_texture_samples(const msl_texture *texture);
+unsigned msl_texture_levels(const msl_texture *texture);
+unsigned msl_texture_layers(const msl_texture *texture);
 // A texel; zero outside.
-void msl_load_float(const msl_texture *texture, const unsigned *at, unsigned sample, unsigned lod,
-                    float *out);
-void msl_load_uint(const msl_texture *texture, const unsigned *at, unsigned sample, unsigned lod,
-                   unsigned *out);
+void msl_load_float(const msl_texture *texture, const unsigned *at, unsigned layer, unsigned sample,
+                    unsigned lod, float *out);
+void msl_load_uint(const msl_texture *texture, const unsigned *at, unsigned layer, unsigned sample,
+                   unsigned lod, unsigned *out);
 // Does nothing outside.
 void msl_store_float(msl_texture *texture, const unsigned *at, unsigned lod, const float *value);
 void msl_store_uint(msl_texture *texture, const unsigned *at, unsigned lod, const unsigned *value);
-void msl_sample_float(const msl_texture *texture, unsigned flags, const float *at,
-                      const int *offset, float *out);
+// At a level of detail; with a reference, its comparison.
+void msl_sample_float(const msl_texture *texture, unsigned flags, const msl_place *place,
+                      const float *reference, float lod, float *out);
 // The four texels that a linear filter reads, in the order in which Metal gathers them.
-void msl_gather_float(const msl_texture *texture, unsigned flags, const float *at,
-                      const int *offset, unsigned channel, float *out);
+void msl_gather_float(const msl_texture *texture, unsigned flags, const msl_place *place,
+                      const float *reference, unsigned channel, float *out);
+// The level of detail of derivatives of the coordinates.
+float msl_lod(const msl_texture *texture, const msl_place *place, const float *dx, const float *dy);
 // Waits for the workgroup's other threads. `line` tells one barrier from another.
 __attribute__((convergent)) void msl_barrier(unsigned line);
+// Whether it runs in a quad: what samples without a level elsewhere takes level 0.
+bool msl_in_quad();
 // The value of each fragment of a quad, of up to four components; gives which of them this one is.
 unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (*all)[4]);
 // What this fragment returns is dropped.

@@ -12,7 +12,7 @@ pub struct Signature {
     pub returns: Option<Structure>,
     /// Whether the text has barriers.
     pub barriers: bool,
-    /// Whether the text has derivatives.
+    /// Whether the text has derivatives, or samples, which may take them.
     pub derivatives: bool,
 }
 
@@ -129,7 +129,7 @@ pub fn parse(text: &str, entry_point: &str) -> Result<Signature, String> {
         params,
         returns,
         barriers: tokens.iter().any(|t| t.ends_with("_barrier")),
-        derivatives: ["dfdx", "dfdy", "fwidth"]
+        derivatives: ["dfdx", "dfdy", "fwidth", "sample", "sample_compare"]
             .iter()
             .any(|name| tokens.iter().any(|t| t == name)),
     })

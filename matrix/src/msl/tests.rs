@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::*;
 use crate::job::{Case, Place};
 use crate::tools::{Tool, Tools};
+use hankel_dsl::native::{Address, Filter, Sampler};
 
 fn compiler() -> PathBuf {
     let status = Tools::of_cache(None).status(Tool::Clang);
@@ -66,7 +67,8 @@ fn texture(written: bool, n: u32, format: &'static str, size: [u32; 3], bytes: V
             }
         } else {
             Role::Texture {
-                dimensions: 2,
+                view: "2d".into(),
+                depth: false,
                 multisampled: false,
             }
         },
@@ -116,12 +118,27 @@ fn run_within(
         args.push(match (given.texture, given.sampler) {
             (Some((format, size, samples)), _) => Arg::Texture {
                 format: format.into(),
+                dimensions: 2,
                 size,
+                levels: 1,
+                layers: 1,
                 samples,
                 offset,
                 length,
             },
-            (None, Some((linear, repeat))) => Arg::Sampler { linear, repeat },
+            (None, Some((linear, repeat))) => {
+                let filter = if linear {
+                    Filter::Linear
+                } else {
+                    Filter::Nearest
+                };
+                let address = if repeat {
+                    Address::Repeat
+                } else {
+                    Address::ClampToEdge
+                };
+                Arg::Sampler(Sampler::new(filter, address))
+            }
             (None, None) => Arg::Bytes { offset, length },
         });
     }

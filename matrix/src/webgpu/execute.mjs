@@ -8,6 +8,17 @@ const TEXEL_BYTES = {
     rgba32uint: 16, depth32float: 4,
 };
 
+/** The levels of a texture's argument: texels along each axis, and where its bytes lie. */
+function levelsOf({ format, size, levels, layers, samples }) {
+    let offset = 0;
+    return Array.from({ length: levels }, (_, level) => {
+        const own = size.map((n) => Math.max(n >> level, 1));
+        const length = own[0] * own[1] * own[2] * layers * samples * TEXEL_BYTES[format];
+        offset += length;
+        return { size: own, offset: offset - length, length };
+    });
+}
+
 /** Rows of a texture begin at multiples of this in a buffer that they are copied to. */
 const ALIGNMENT = 256;
 
@@ -268,7 +279,8 @@ class Maker {
     /** The explicit layout of group 0, from the slots. */
     async layout(one) {
         const visibility = GPUShaderStage[this.job.stage.kind.toUpperCase()];
-        const isFiltered = one.args.some((a) => a.kind === "sampler" && a.linear);
+        const filtersTexels = (a) => [a.magnify, a.minify, a.mip].includes("linear");
+        const isFiltered = one.args.some((a) => a.kind === "sampler" && filtersTexels(a));
         const filters = (format) =>
             format.includes("32float") ? this.device.features.has("float32-filterable") : true;
         const entries = this.bound(one).map(({ slot: { name, role }, binding, arg }) => {
@@ -285,14 +297,17 @@ class Maker {
                     const isFloat = !arg.format.endsWith("uint");
                     const isFine = isFiltered && arg.samples === 1 && filters(arg.format) &&
                         arg.format !== "depth32float";
+                    const float = isFine ? "float" : "unfilterable-float";
                     return { ...entry, texture: {
-                        sampleType: isFloat ? (isFine ? "float" : "unfilterable-float") : "uint",
-                        viewDimension: `${role.dimensions}d`,
+                        sampleType: role.depth ? "depth" : isFloat ? float : "uint",
+                        viewDimension: role.view,
                         multisampled: role.multisampled,
                     } };
                 }
                 case "sampler":
-                    return { ...entry, sampler: { type: arg.linear ? "filtering" : "non-filtering" } };
+                    return { ...entry, sampler: {
+                        type: arg.compare ? "comparison" : filtersTexels(arg) ? "filtering" : "non-filtering",
+                    } };
                 case "storage_texture":
                     // Core WebGPU stores neither 16-bit normalised numbers nor small texels.
                     if (/16[su]norm$|^rg?(8|16)/.test(role.format) && !this.device.features.has(TIER)) {
@@ -317,28 +332,34 @@ class Maker {
 
     /** Fills a texture that nothing can be copied to: several samples, or depth. */
     async filler(arg) {
-        const { format, samples, size } = arg;
+        const { format, samples } = arg;
         const isDepth = format === "depth32float";
         const texel = TEXEL_BYTES[format];
         if (!texel) throw new Error(`format \`${format}\` is not known`);
         if (isDepth && new Float32Array(this.bytes(arg).slice().buffer).some((d) => !(d >= 0 && d <= 1))) {
             throw new Error("a depth texture cannot be given depths beyond 0 and 1");
         }
-        const module = await this.module(filling(format, size[0], samples, texel / 4));
-        return this.once(JSON.stringify([format, samples, size]), () =>
-            this.device.createRenderPipelineAsync({
-                layout: "auto",
-                vertex: { module, entryPoint: "hankel_cover" },
-                fragment: { module, entryPoint: "hankel_fill", targets: isDepth ? [] : [{ format }] },
-                depthStencil: isDepth
-                    ? { format, depthWriteEnabled: true, depthCompare: "always" }
-                    : undefined,
-                multisample: { count: samples },
-            }));
+        // One for each level: its width is part of the text.
+        return Promise.all(levelsOf(arg).map(async ({ size }) => {
+            const module = await this.module(filling(format, size[0], samples, texel / 4));
+            return this.once(JSON.stringify([format, samples, size[0]]), () =>
+                this.device.createRenderPipelineAsync({
+                    layout: "auto",
+                    vertex: { module, entryPoint: "hankel_cover" },
+                    fragment: { module, entryPoint: "hankel_fill", targets: isDepth ? [] : [{ format }] },
+                    depthStencil: isDepth
+                        ? { format, depthWriteEnabled: true, depthCompare: "always" }
+                        : undefined,
+                    multisample: { count: samples },
+                }));
+        }));
     }
 
-    fill(encoder, texture, pipeline, bytes) {
-        const view = texture.createView();
+    /** Fills a layer of a level. */
+    fill(encoder, texture, pipeline, bytes, baseMipLevel, baseArrayLayer) {
+        const view = texture.createView({
+            dimension: "2d", baseMipLevel, baseArrayLayer, mipLevelCount: 1, arrayLayerCount: 1,
+        });
         const isDepth = texture.format === "depth32float";
         const pass = encoder.beginRenderPass({
             colorAttachments: isDepth ? [] : [{ view, loadOp: "clear", storeOp: "store" }],
@@ -371,16 +392,17 @@ class Maker {
         const reads = new Map();
         const entries = this.bound(one).map(({ slot: { role }, binding, arg, i }) => {
             if (role.kind === "sampler") {
-                const filter = arg.linear ? "linear" : "nearest";
-                const mode = arg.repeat ? "repeat" : "clamp-to-edge";
+                const [addressModeU, addressModeV, addressModeW] = arg.address;
                 return { binding, resource: this.device.createSampler({
-                    magFilter: filter, minFilter: filter,
-                    addressModeU: mode, addressModeV: mode, addressModeW: mode,
+                    magFilter: arg.magnify, minFilter: arg.minify, mipmapFilter: arg.mip,
+                    addressModeU, addressModeV, addressModeW,
+                    maxAnisotropy: arg.anisotropy,
+                    ...(arg.compare ? { compare: arg.compare } : {}),
                 }) };
             }
             const bytes = this.bytes(arg);
             if (role.kind === "texture" || role.kind === "storage_texture") {
-                const { format, size, samples } = arg;
+                const { format, dimensions, size, samples, levels, layers } = arg;
                 const texel = TEXEL_BYTES[format];
                 if (!texel) throw new Error(`format \`${format}\` is not known`);
                 const isWritten = role.kind === "storage_texture";
@@ -389,17 +411,26 @@ class Maker {
                     ? GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC
                     : GPUTextureUsage.TEXTURE_BINDING) |
                     (filler ? GPUTextureUsage.RENDER_ATTACHMENT : GPUTextureUsage.COPY_DST);
-                const texture = this.texture(format, size, usage, {
-                    dimension: `${role.dimensions}d`, sampleCount: samples,
+                const texture = this.texture(format, [size[0], size[1], size[2] * layers], usage, {
+                    dimension: `${dimensions}d`, sampleCount: samples, mipLevelCount: levels,
                 });
-                if (filler) {
-                    this.fill(encoder, texture, filler, bytes);
-                } else {
-                    const rows = { bytesPerRow: size[0] * texel, rowsPerImage: size[1] };
-                    this.device.queue.writeTexture({ texture }, bytes, rows, size);
-                }
+                levelsOf(arg).forEach(({ size: [width, height, depth], offset, length }, mipLevel) => {
+                    const own = bytes.subarray(offset, offset + length);
+                    if (!filler) {
+                        const rows = { bytesPerRow: width * texel, rowsPerImage: height };
+                        const all = [width, height, depth * layers];
+                        this.device.queue.writeTexture({ texture, mipLevel }, own, rows, all);
+                        return;
+                    }
+                    const each = length / layers;
+                    for (let layer = 0; layer < layers; layer += 1) {
+                        const of = own.subarray(layer * each, (layer + 1) * each);
+                        this.fill(encoder, texture, filler[mipLevel], of, mipLevel, layer);
+                    }
+                });
                 if (isWritten) reads.set(i, readTexture(texture, arg.length));
-                return { binding, resource: texture.createView() };
+                const dimension = isWritten ? `${role.dimensions}d` : role.view;
+                return { binding, resource: texture.createView({ dimension }) };
             }
             const isUniform = role.kind === "uniform";
             const usage = isUniform ? GPUBufferUsage.UNIFORM : GPUBufferUsage.STORAGE;

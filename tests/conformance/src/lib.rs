@@ -11,7 +11,10 @@ use hankel_dsl::{
 };
 
 pub mod general;
+pub mod layers;
 pub mod math;
+pub mod sampling;
+pub mod shadow;
 pub mod stage;
 pub mod texture;
 pub mod workgroup;
@@ -61,6 +64,25 @@ hankel_dsl::kernels![
     texture::spread,
     texture::corners,
     texture::gathered,
+    sampling::levels,
+    sampling::level_count,
+    sampling::trilinear,
+    sampling::volume_levels,
+    sampling::mirrored,
+    sampling::by_gradients,
+    sampling::receding,
+    shadow::lit,
+    shadow::soft,
+    shadow::four_lit,
+    shadow::layers_lit,
+    shadow::deepest,
+    shadow::hidden,
+    layers::stacked,
+    layers::between,
+    layers::around,
+    layers::surroundings,
+    layers::along,
+    layers::ramp,
     math::angles,
     math::angles_free,
     math::arcs,
@@ -265,7 +287,7 @@ pub fn filtered(
     #[texture] source: Texture2d<'_>,
     #[sampler] sampler: Sampler,
 ) -> f32 {
-    source.sample(sampler, uv).x
+    source.sample_level(sampler, uv, 0.0).x
 }
 
 /// Texels of a volume.

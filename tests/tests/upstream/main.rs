@@ -229,7 +229,10 @@ fn result(
         None => output,
         Some(format) => Arg::Texture {
             format: format!("{format:?}").to_lowercase(),
+            dimensions: 2,
             size: [1; 3],
+            levels: 1,
+            layers: 1,
             samples: 1,
             offset: values.len() as u64,
             length: written as u64,

@@ -344,7 +344,7 @@ impl Device for VulkanDevice {
             shape.bytes(),
             true,
         )?;
-        if shape.samples > 1 {
+        if shape.samples > 1 || shape.format == super::Format::Depth32 {
             self.upload_samples(texture, bytes)
         } else {
             self.upload_texels(self.image(texture)?, bytes)

@@ -4,9 +4,8 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use hankel_dsl::native::Filter;
 use hankel_dsl::native::describe::{
-    Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage, TextureKind, Type,
+    Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage, Type,
 };
 
 use super::super::error::{DeviceError, Result};
@@ -409,20 +408,24 @@ impl VulkanDevice {
                     return Err(refuse("it must be a texture"));
                 };
                 let texture = self.image(*id)?;
-                let view_dimension = match kind {
-                    TextureKind::Texture3d => wgpu::TextureViewDimension::D3,
-                    TextureKind::Texture2d | TextureKind::Texture2dMultisampled => {
-                        wgpu::TextureViewDimension::D2
+                let view_dimension = resources::view_dimension(kind);
+                let sample_type = if kind.is_depth() {
+                    wgpu::TextureSampleType::Depth
+                } else {
+                    wgpu::TextureSampleType::Float {
+                        filterable: texture.filterable,
                     }
                 };
                 let ty = wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float {
-                        filterable: texture.filterable,
-                    },
+                    sample_type,
                     view_dimension,
-                    multisampled: kind == TextureKind::Texture2dMultisampled,
+                    multisampled: kind.is_multisampled(),
                 };
-                (ty, Resource::View(texture.view.clone()))
+                let view = texture.texture.create_view(&wgpu::TextureViewDescriptor {
+                    dimension: Some(view_dimension),
+                    ..Default::default()
+                });
+                (ty, Resource::View(view))
             }
             Use::StorageTexture { format, .. } => {
                 let Bind::Texture(id) = bind else {
@@ -444,13 +447,16 @@ impl VulkanDevice {
                 };
                 (ty, Resource::View(texture.view.clone()))
             }
-            Use::Sampler => {
+            Use::Sampler { .. } => {
                 let Bind::Sampler(sampler) = bind else {
                     return Err(refuse("it must be a sampler"));
                 };
-                let ty = match sampler.filter {
-                    Filter::Nearest => wgpu::SamplerBindingType::NonFiltering,
-                    Filter::Linear => wgpu::SamplerBindingType::Filtering,
+                let ty = if sampler.compare.is_some() {
+                    wgpu::SamplerBindingType::Comparison
+                } else if sampler.is_filtering() {
+                    wgpu::SamplerBindingType::Filtering
+                } else {
+                    wgpu::SamplerBindingType::NonFiltering
                 };
                 (
                     wgpu::BindingType::Sampler(ty),

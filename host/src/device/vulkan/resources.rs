@@ -1,7 +1,7 @@
 //! Buffers and textures of the Vulkan device, and what goes to and from them.
 
-use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::{Address, Filter, Sampler};
+use hankel_dsl::native::describe::{TexelFormat, TextureKind};
+use hankel_dsl::native::{Address, Compare, Filter, Sampler};
 
 use super::super::error::{DeviceError, Result};
 use super::super::{Format, TextureId, TextureShape};
@@ -35,6 +35,7 @@ impl Memory {
 #[derive(Debug)]
 pub struct Texture {
     pub texture: wgpu::Texture,
+    /// The first layer of level 0: what is drawn into and written.
     pub view: wgpu::TextureView,
     pub shape: TextureShape,
     /// What the adapter lets it be used for.
@@ -69,12 +70,53 @@ pub fn format(format: Format) -> wgpu::TextureFormat {
     }
 }
 
-fn extent(size: [u32; 3]) -> wgpu::Extent3d {
-    wgpu::Extent3d {
-        width: size[0],
-        height: size[1],
-        depth_or_array_layers: size[2],
+/// How a kernel sees a texture.
+pub fn view_dimension(kind: TextureKind) -> wgpu::TextureViewDimension {
+    match kind {
+        TextureKind::Texture1d => wgpu::TextureViewDimension::D1,
+        TextureKind::Texture2d
+        | TextureKind::Texture2dMultisampled
+        | TextureKind::DepthTexture2d => wgpu::TextureViewDimension::D2,
+        TextureKind::Texture2dArray | TextureKind::DepthTexture2dArray => {
+            wgpu::TextureViewDimension::D2Array
+        }
+        TextureKind::Texture3d => wgpu::TextureViewDimension::D3,
+        TextureKind::TextureCube | TextureKind::DepthTextureCube => {
+            wgpu::TextureViewDimension::Cube
+        }
+        TextureKind::TextureCubeArray => wgpu::TextureViewDimension::CubeArray,
     }
+}
+
+/// A level's texels and layers.
+fn extent(shape: &TextureShape, level: u32) -> wgpu::Extent3d {
+    let [width, height, depth] = shape.level_size(level);
+    wgpu::Extent3d {
+        width,
+        height,
+        // One of them is 1.
+        depth_or_array_layers: depth * shape.layers,
+    }
+}
+
+/// A level, to be copied.
+fn level_of(texture: &wgpu::Texture, mip_level: u32) -> wgpu::TexelCopyTextureInfo<'_> {
+    wgpu::TexelCopyTextureInfo {
+        mip_level,
+        ..texture.as_image_copy()
+    }
+}
+
+/// A view of one layer of a level.
+fn layer_of(texture: &wgpu::Texture, level: u32, layer: u32) -> wgpu::TextureView {
+    let layers = texture.dimension() == wgpu::TextureDimension::D2;
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        base_mip_level: level,
+        mip_level_count: Some(1),
+        base_array_layer: layer,
+        array_layer_count: layers.then_some(1),
+        ..Default::default()
+    })
 }
 
 impl VulkanDevice {
@@ -168,11 +210,16 @@ impl VulkanDevice {
 
     pub(super) fn make_texture(&self, label: &str, shape: &TextureShape) -> Result<Texture> {
         super::super::check_shape(label, shape)?;
-        let limit = if shape.dimensions == 3 {
-            self.limits.max_texture_dimension_3d
-        } else {
-            self.limits.max_texture_dimension_2d
+        let limit = match shape.dimensions {
+            1 => self.limits.max_texture_dimension_1d,
+            2 => self.limits.max_texture_dimension_2d,
+            _ => self.limits.max_texture_dimension_3d,
         };
+        self.limit(
+            format!("the layers of texture `{label}`"),
+            shape.layers.into(),
+            self.limits.max_texture_array_layers.into(),
+        )?;
         for (axis, n) in ["width", "height", "depth"].into_iter().zip(shape.size) {
             self.limit(
                 format!("the {axis} of texture `{label}`"),
@@ -204,7 +251,7 @@ impl VulkanDevice {
                 | wgpu::TextureUsages::COPY_DST
                 | wgpu::TextureUsages::STORAGE_BINDING;
         }
-        if shape.dimensions == 3 {
+        if shape.dimensions != 2 {
             usage -= wgpu::TextureUsages::RENDER_ATTACHMENT;
         }
         usage &= can.allowed_usages;
@@ -218,19 +265,19 @@ impl VulkanDevice {
         let (texture, view) = self.guarded(&during, |device| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: extent(shape.size),
-                mip_level_count: 1,
+                size: extent(shape, 0),
+                mip_level_count: shape.levels,
                 sample_count: shape.samples,
-                dimension: if shape.dimensions == 3 {
-                    wgpu::TextureDimension::D3
-                } else {
-                    wgpu::TextureDimension::D2
+                dimension: match shape.dimensions {
+                    1 => wgpu::TextureDimension::D1,
+                    2 => wgpu::TextureDimension::D2,
+                    _ => wgpu::TextureDimension::D3,
                 },
                 format,
                 usage,
                 view_formats: &[],
             });
-            let view = texture.create_view(&Default::default());
+            let view = layer_of(&texture, 0, 0);
             (texture, view)
         })?;
         let float = wgpu::TextureSampleType::Float { filterable: true };
@@ -247,58 +294,75 @@ impl VulkanDevice {
     }
 
     pub(super) fn upload_texels(&self, texture: &Texture, bytes: &[u8]) -> Result<()> {
-        if texture.shape.format == Format::Depth32 {
-            return Err(DeviceError::Transfer {
-                what: texture.what(),
-                problem: "a depth buffer takes only what is drawn into it; use r32float".into(),
-            });
-        }
-        let size = texture.shape.size;
-        let row = size[0] * texture.shape.format.texel().bytes() as u32;
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(row),
-            rows_per_image: Some(size[1]),
-        };
+        let shape = &texture.shape;
         self.guarded(&|| format!("writing {}", texture.what()), |_| {
-            self.queue
-                .write_texture(texture.texture.as_image_copy(), bytes, layout, extent(size));
+            for level in 0..shape.levels {
+                let [width, height, _] = shape.level_size(level);
+                let layout = wgpu::TexelCopyBufferLayout {
+                    offset: shape.bytes_before(level) as u64,
+                    bytes_per_row: Some(width * shape.format.texel().bytes() as u32),
+                    rows_per_image: Some(height),
+                };
+                self.queue.write_texture(
+                    level_of(&texture.texture, level),
+                    bytes,
+                    layout,
+                    extent(shape, level),
+                );
+            }
         })
     }
 
     pub(super) fn download_texels(&self, texture: &Texture) -> Result<Vec<u8>> {
-        let size = texture.shape.size;
-        let row = size[0] as usize * texture.shape.format.texel().bytes();
-        let pitch = row.next_multiple_of(ROW);
-        let rows = size[1] as usize * size[2] as usize;
+        let shape = &texture.shape;
+        // Of each level: where it begins in the staging buffer, bytes of a row, there and padded.
+        let mut size = 0;
+        let levels: Vec<(usize, usize, usize)> = (0..shape.levels)
+            .map(|level| {
+                let [width, height, depth] = shape.level_size(level).map(|n| n as usize);
+                let row = width * shape.format.texel().bytes();
+                let pitch = row.next_multiple_of(ROW);
+                let start = size;
+                size += pitch * height * depth * shape.layers as usize;
+                (start, row, pitch)
+            })
+            .collect();
         let during = || format!("reading {}", texture.what());
         let staging = self.guarded(&during, |device| {
             let staging = device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("read"),
-                size: (pitch * rows) as u64,
+                size: size as u64,
                 usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
                 mapped_at_creation: false,
             });
             let mut encoder = device.create_command_encoder(&Default::default());
-            encoder.copy_texture_to_buffer(
-                texture.texture.as_image_copy(),
-                wgpu::TexelCopyBufferInfo {
-                    buffer: &staging,
-                    layout: wgpu::TexelCopyBufferLayout {
-                        offset: 0,
-                        bytes_per_row: Some(pitch as u32),
-                        rows_per_image: Some(size[1]),
+            for (level, &(start, _, pitch)) in (0..).zip(&levels) {
+                encoder.copy_texture_to_buffer(
+                    level_of(&texture.texture, level),
+                    wgpu::TexelCopyBufferInfo {
+                        buffer: &staging,
+                        layout: wgpu::TexelCopyBufferLayout {
+                            offset: start as u64,
+                            bytes_per_row: Some(pitch as u32),
+                            rows_per_image: Some(shape.level_size(level)[1]),
+                        },
                     },
-                },
-                extent(size),
-            );
+                    extent(shape, level),
+                );
+            }
             self.queue.submit([encoder.finish()]);
             staging
         })?;
         let padded = self.map(&staging, &during)?;
-        Ok(padded
-            .chunks_exact(pitch)
-            .flat_map(|r| &r[..row])
+        let ends = levels.iter().skip(1).map(|it| it.0).chain([padded.len()]);
+        Ok(levels
+            .iter()
+            .zip(ends)
+            .flat_map(|(&(start, row, pitch), end)| {
+                padded[start..end]
+                    .chunks_exact(pitch)
+                    .flat_map(move |r| &r[..row])
+            })
             .copied()
             .collect())
     }
@@ -307,23 +371,38 @@ impl VulkanDevice {
         if let Some(made) = self.samplers.get(&sampler) {
             return Ok(made.clone());
         }
-        let (filter, mipmap) = match sampler.filter {
-            Filter::Nearest => (wgpu::FilterMode::Nearest, wgpu::MipmapFilterMode::Nearest),
-            Filter::Linear => (wgpu::FilterMode::Linear, wgpu::MipmapFilterMode::Nearest),
+        let filter = |it: Filter| match it {
+            Filter::Nearest => wgpu::FilterMode::Nearest,
+            Filter::Linear => wgpu::FilterMode::Linear,
         };
-        let address = match sampler.address {
+        let [u, v, w] = sampler.address.map(|it| match it {
             Address::ClampToEdge => wgpu::AddressMode::ClampToEdge,
             Address::Repeat => wgpu::AddressMode::Repeat,
-        };
+            Address::MirrorRepeat => wgpu::AddressMode::MirrorRepeat,
+        });
         let made = self.guarded(&|| "making a sampler".into(), |device| {
             device.create_sampler(&wgpu::SamplerDescriptor {
                 label: None,
-                address_mode_u: address,
-                address_mode_v: address,
-                address_mode_w: address,
-                mag_filter: filter,
-                min_filter: filter,
-                mipmap_filter: mipmap,
+                address_mode_u: u,
+                address_mode_v: v,
+                address_mode_w: w,
+                mag_filter: filter(sampler.magnify),
+                min_filter: filter(sampler.minify),
+                mipmap_filter: match sampler.mip {
+                    Filter::Nearest => wgpu::MipmapFilterMode::Nearest,
+                    Filter::Linear => wgpu::MipmapFilterMode::Linear,
+                },
+                compare: sampler.compare.map(|it| match it {
+                    Compare::Never => wgpu::CompareFunction::Never,
+                    Compare::Less => wgpu::CompareFunction::Less,
+                    Compare::Equal => wgpu::CompareFunction::Equal,
+                    Compare::LessEqual => wgpu::CompareFunction::LessEqual,
+                    Compare::Greater => wgpu::CompareFunction::Greater,
+                    Compare::NotEqual => wgpu::CompareFunction::NotEqual,
+                    Compare::GreaterEqual => wgpu::CompareFunction::GreaterEqual,
+                    Compare::Always => wgpu::CompareFunction::Always,
+                }),
+                anisotropy_clamp: sampler.anisotropy.max(1),
                 ..Default::default()
             })
         })?;
@@ -331,9 +410,9 @@ impl VulkanDevice {
         Ok(made)
     }
 
-    /// Draws the samples of a multisampled texture from a buffer: copies do not reach them.
+    /// Draws texels from a buffer where copies do not reach: several samples, and depths.
     pub(super) fn upload_samples(&mut self, texture: TextureId, bytes: &[u8]) -> Result<()> {
-        let (view, shape, what) = {
+        let (texture, shape, what) = {
             let t = self.image(texture)?;
             if !t.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
                 return Err(DeviceError::Missing {
@@ -342,8 +421,40 @@ impl VulkanDevice {
                     what: t.what(),
                 });
             }
-            (t.view.clone(), t.shape, t.what())
+            (t.texture.clone(), t.shape, t.what())
         };
+        let depths = || bytes.chunks_exact(4).map(|d| [d[0], d[1], d[2], d[3]]);
+        if shape.format == Format::Depth32
+            && depths().any(|d| !(0.0..=1.0).contains(&f32::from_le_bytes(d)))
+        {
+            return Err(DeviceError::Transfer {
+                what,
+                problem: "depths lie between 0 and 1".into(),
+            });
+        }
+        for level in 0..shape.levels {
+            let one = TextureShape {
+                size: shape.level_size(level),
+                levels: 1,
+                layers: 1,
+                ..shape
+            };
+            let level_bytes = &bytes[shape.bytes_before(level)..];
+            for (layer, bytes) in (0..shape.layers).zip(level_bytes.chunks_exact(one.bytes())) {
+                let view = layer_of(&texture, level, layer);
+                self.draw_samples(&view, &one, &what, bytes)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_samples(
+        &self,
+        view: &wgpu::TextureView,
+        shape: &TextureShape,
+        what: &str,
+        bytes: &[u8],
+    ) -> Result<()> {
         let values = to_vec4(shape.format, bytes);
         let memory = self.make_buffer("samples", values.len())?;
         self.upload(&memory, &values)?;
@@ -424,7 +535,7 @@ impl VulkanDevice {
             let mut encoder = device.create_command_encoder(&Default::default());
             {
                 let colour = [Some(wgpu::RenderPassColorAttachment {
-                    view: &view,
+                    view,
                     depth_slice: None,
                     resolve_target: None,
                     ops: wgpu::Operations {
@@ -437,7 +548,7 @@ impl VulkanDevice {
                     color_attachments: if depth { &[] } else { &colour },
                     depth_stencil_attachment: depth.then_some(
                         wgpu::RenderPassDepthStencilAttachment {
-                            view: &view,
+                            view,
                             depth_ops: Some(wgpu::Operations {
                                 load: wgpu::LoadOp::Clear(0.0),
                                 store: wgpu::StoreOp::Store,

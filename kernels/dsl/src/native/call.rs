@@ -4,6 +4,8 @@
 use std::string::String;
 use std::vec::Vec;
 
+use serde::{Deserialize, Serialize};
+
 use super::describe::TexelFormat;
 
 /// An argument: first those of the parameters that are bound to something, in their order
@@ -24,21 +26,52 @@ pub enum Arg<'a> {
     Sampler(Sampler),
 }
 
-/// A texture in memory: texels row by row, slice by slice, each texel's samples together; no
-/// padding.
+/// A texture in memory: level after level, in each layer after layer, in each slice after slice and
+/// row after row, each texel's samples together; no padding.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureRef<'a> {
-    /// Width, height, depth in texels; 1 for a dimension that is not there.
+    /// Width, height, depth of level 0 in texels; 1 for a dimension that is not there.
     pub size: [u32; 3],
+    /// Mip levels, 1 or more. Each has half the size of the one before, rounded down, but at
+    /// least 1.
+    pub levels: u32,
+    /// Layers of an array, 1 for what is none. The faces of a cube are six layers: +x, -x, +y, -y,
+    /// +z, -z.
+    pub layers: u32,
     /// Samples of a texel, 1 unless multisampled.
     pub samples: u32,
-    /// Format of the texels.
+    /// Format of the texels; a depth is [`TexelFormat::R32Float`].
     pub format: TexelFormat,
-    /// `size[0] * size[1] * size[2] * samples * format.bytes()` bytes.
+    /// As many as [`texture_bytes`] says.
     pub bytes: &'a [u8],
 }
 
-/// As [`TextureRef`], to be written; one sample.
+/// Texels along each axis of a mip level.
+#[must_use]
+pub fn level_size(size: [u32; 3], level: u32) -> [u32; 3] {
+    size.map(|n| n.checked_shr(level).unwrap_or(0).max(1))
+}
+
+/// Bytes of a texture's levels before `levels`, which are all of them where it is their number. The
+/// largest number there is, if they are more.
+#[must_use]
+pub fn texture_bytes(
+    size: [u32; 3],
+    levels: u32,
+    layers: u32,
+    samples: u32,
+    format: TexelFormat,
+) -> usize {
+    (0..levels).fold(0, |sum: usize, level| {
+        let level = level_size(size, level)
+            .into_iter()
+            .chain([layers, samples])
+            .fold(format.bytes(), |n, s| n.saturating_mul(s as usize));
+        sum.saturating_add(level)
+    })
+}
+
+/// As [`TextureRef`], to be written; one level, one layer, one sample.
 #[derive(Debug)]
 pub struct TextureMut<'a> {
     /// Width, height, depth in texels.
@@ -49,43 +82,57 @@ pub struct TextureMut<'a> {
     pub bytes: &'a mut [u8],
 }
 
-/// A sampler.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// A sampler. There are no border colours: WebGPU has none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sampler {
-    /// Between texels.
-    pub filter: Filter,
-    /// Beyond the edge.
-    pub address: Address,
+    /// Between texels, where the level of detail is 0 or less.
+    pub magnify: Filter,
+    /// Between texels, where it is more.
+    pub minify: Filter,
+    /// Between mip levels.
+    pub mip: Filter,
+    /// Beyond the edge along u, v, w.
+    pub address: [Address; 3],
+    /// How a comparison sampler compares.
+    pub compare: Option<Compare>,
+    /// Most samples along the longer axis of a pixel's footprint, 1 to 16. A hint: WebGPU and Vulkan
+    /// leave it to the implementation which samples it takes, and more than 1 goes with linear
+    /// filters only. The native device takes one.
+    pub anisotropy: u16,
     /// Natively: how it departs from what the specification computes. Other devices ignore it.
     pub deviation: Deviation,
 }
 
 impl Sampler {
-    /// One that is linear between texels or takes the nearest, and repeats the texture beyond its edge
-    /// or the edge.
+    /// The same filter between texels and between levels, the same address mode in all directions,
+    /// no comparison.
     #[must_use]
-    pub const fn new(linear: bool, repeat: bool) -> Self {
+    pub const fn new(filter: Filter, address: Address) -> Self {
         Self {
-            filter: if linear {
-                Filter::Linear
-            } else {
-                Filter::Nearest
-            },
-            address: if repeat {
-                Address::Repeat
-            } else {
-                Address::ClampToEdge
-            },
+            magnify: filter,
+            minify: filter,
+            mip: filter,
+            address: [address; 3],
+            compare: None,
+            anisotropy: 1,
             deviation: Deviation::NONE,
         }
+    }
+
+    /// Whether any filter interpolates.
+    #[must_use]
+    pub fn is_filtering(&self) -> bool {
+        [self.magnify, self.minify, self.mip].contains(&Filter::Linear)
     }
 }
 
 /// What a device may do with the numbers of a sampler, to find out natively what follows from it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Deviation {
     /// How far a coordinate is moved along each axis, in 1/1024 of a texel: rounding of the weights.
     pub offset: [i16; 3],
+    /// How far the level of detail is moved, in 1/1024 of a level: rounding of its fraction.
+    pub level: i16,
     /// What is added to each channel, in 2^-24 of the largest magnitude that is read: rounding of
     /// the filter's sums.
     pub channels: [i8; 4],
@@ -95,28 +142,97 @@ impl Deviation {
     /// As the specification computes.
     pub const NONE: Self = Self {
         offset: [0; 3],
+        level: 0,
         channels: [0; 4],
     };
 }
 
-/// What a sampler does between texels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// What a sampler does between texels or levels. Names are WebGPU's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[repr(u32)]
 pub enum Filter {
-    /// The nearest texel.
+    /// The nearest one.
     Nearest,
-    /// Linear interpolation of the nearest texels.
+    /// Linear interpolation of the nearest ones.
     Linear,
 }
 
-/// What a sampler does beyond the texture's edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// What a sampler does beyond the texture's edge. Names are WebGPU's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[repr(u32)]
 pub enum Address {
     /// The texel at the edge.
     ClampToEdge,
     /// The texture again.
     Repeat,
+    /// The texture again, every other time mirrored.
+    MirrorRepeat,
+}
+
+/// How a comparison sampler compares the reference, which stands first, with a texel. Names are
+/// WebGPU's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u32)]
+pub enum Compare {
+    /// Never true.
+    Never,
+    /// `<`
+    Less,
+    /// `==`
+    Equal,
+    /// `<=`
+    LessEqual,
+    /// `>`
+    Greater,
+    /// `!=`
+    NotEqual,
+    /// `>=`
+    GreaterEqual,
+    /// Always true.
+    Always,
+}
+
+impl Filter {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Nearest, Self::Linear];
+}
+
+impl Address {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::ClampToEdge, Self::Repeat, Self::MirrorRepeat];
+}
+
+impl Compare {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Never,
+        Self::Less,
+        Self::Equal,
+        Self::LessEqual,
+        Self::Greater,
+        Self::NotEqual,
+        Self::GreaterEqual,
+        Self::Always,
+    ];
+
+    /// Whether it holds.
+    #[inline]
+    #[must_use]
+    pub fn holds(self, reference: f32, texel: f32) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Less => reference < texel,
+            Self::Equal => reference == texel,
+            Self::LessEqual => reference <= texel,
+            Self::Greater => reference > texel,
+            Self::NotEqual => reference != texel,
+            Self::GreaterEqual => reference >= texel,
+            Self::Always => true,
+        }
+    }
 }
 
 /// How a call is run.

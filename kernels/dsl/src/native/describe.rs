@@ -8,6 +8,8 @@ use std::vec::Vec;
 
 use serde::{Deserialize, Serialize};
 
+use super::call::{Address, Compare, Filter};
+
 /// One entry point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kernel {
@@ -146,6 +148,24 @@ pub struct Inputs {
     /// How many texels a texture has along each axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 3]>,
+    /// How many mip levels it has; without it 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levels: Option<u32>,
+    /// How many layers or cubes an array has; without it 3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers: Option<u32>,
+    /// What a sampler does between texels; without it it interpolates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<Filter>,
+    /// What a sampler does between levels; without it it interpolates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mip_filter: Option<Filter>,
+    /// What a sampler does beyond the edge; without it it clamps, and repeats for inputs at the edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub address: Option<Address>,
+    /// How a comparison sampler compares; without it `less-equal`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compare: Option<Compare>,
 }
 
 impl Inputs {
@@ -162,8 +182,7 @@ impl Inputs {
             domain: self.domain.clone().or_else(|| outer.domain.clone()),
             default: self.default.or(outer.default),
             unit: self.unit.clone().or_else(|| outer.unit.clone()),
-            length: None,
-            size: None,
+            ..Self::default()
         }
     }
 }
@@ -301,6 +320,9 @@ pub enum Role {
     Sampler {
         /// Number in set 0.
         binding: u32,
+        /// It compares depths with a reference.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        comparison: bool,
     },
     /// A specialisation constant (`u32`).
     Constant {
@@ -368,16 +390,145 @@ pub enum BuiltIn {
     SampleIndex,
 }
 
-/// Shape of a sampled texture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Shape of a texture that is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TextureKind {
+    /// One dimension.
+    Texture1d,
     /// Two dimensions, filterable.
     Texture2d,
+    /// Layers of two dimensions.
+    Texture2dArray,
     /// Two dimensions with several samples in each texel; read sample by sample.
     Texture2dMultisampled,
     /// Three dimensions, filterable.
     Texture3d,
+    /// The six faces of a cube, filterable.
+    TextureCube,
+    /// Cubes in an array.
+    TextureCubeArray,
+    /// Depths in two dimensions, which a sampler compares with a reference.
+    DepthTexture2d,
+    /// Layers of such depths.
+    DepthTexture2dArray,
+    /// Such depths on the faces of a cube.
+    DepthTextureCube,
+}
+
+impl TextureKind {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Texture1d,
+        Self::Texture2d,
+        Self::Texture2dArray,
+        Self::Texture2dMultisampled,
+        Self::Texture3d,
+        Self::TextureCube,
+        Self::TextureCubeArray,
+        Self::DepthTexture2d,
+        Self::DepthTexture2dArray,
+        Self::DepthTextureCube,
+    ];
+
+    /// The type's name in Rust.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Texture1d => "Texture1d",
+            Self::Texture2d => "Texture2d",
+            Self::Texture2dArray => "Texture2dArray",
+            Self::Texture2dMultisampled => "Texture2dMultisampled",
+            Self::Texture3d => "Texture3d",
+            Self::TextureCube => "TextureCube",
+            Self::TextureCubeArray => "TextureCubeArray",
+            Self::DepthTexture2d => "DepthTexture2d",
+            Self::DepthTexture2dArray => "DepthTexture2dArray",
+            Self::DepthTextureCube => "DepthTextureCube",
+        }
+    }
+
+    /// How it is seen, in WebGPU's words: `1d`, `2d`, `2d-array`, `3d`, `cube`, `cube-array`.
+    #[must_use]
+    pub const fn view(self) -> &'static str {
+        match self {
+            Self::Texture1d => "1d",
+            Self::Texture2d | Self::Texture2dMultisampled | Self::DepthTexture2d => "2d",
+            Self::Texture2dArray | Self::DepthTexture2dArray => "2d-array",
+            Self::Texture3d => "3d",
+            Self::TextureCube | Self::DepthTextureCube => "cube",
+            Self::TextureCubeArray => "cube-array",
+        }
+    }
+
+    /// Dimensions of a texel's place within a layer: 1, 2 or 3.
+    #[must_use]
+    pub const fn dimensions(self) -> u32 {
+        match self {
+            Self::Texture1d => 1,
+            Self::Texture3d => 3,
+            _ => 2,
+        }
+    }
+
+    /// Whether it has any number of layers or cubes.
+    #[must_use]
+    pub const fn is_array(self) -> bool {
+        matches!(
+            self,
+            Self::Texture2dArray | Self::TextureCubeArray | Self::DepthTexture2dArray
+        )
+    }
+
+    /// Whether its layers are faces of cubes.
+    #[must_use]
+    pub const fn is_cube(self) -> bool {
+        matches!(
+            self,
+            Self::TextureCube | Self::TextureCubeArray | Self::DepthTextureCube
+        )
+    }
+
+    /// Whether it holds depths.
+    #[must_use]
+    pub const fn is_depth(self) -> bool {
+        matches!(
+            self,
+            Self::DepthTexture2d | Self::DepthTexture2dArray | Self::DepthTextureCube
+        )
+    }
+
+    /// Whether its texels have several samples.
+    #[must_use]
+    pub const fn is_multisampled(self) -> bool {
+        matches!(self, Self::Texture2dMultisampled)
+    }
+
+    /// Whether it can have several mip levels.
+    #[must_use]
+    pub const fn has_levels(self) -> bool {
+        !matches!(self, Self::Texture1d | Self::Texture2dMultisampled)
+    }
+
+    /// Why a texture of so many layers does not fit, if it does not.
+    #[must_use]
+    pub fn misfit(self, layers: u32) -> Option<String> {
+        let faces = if self.is_cube() { 6 } else { 1 };
+        let fits = if self.is_array() {
+            layers > 0 && layers.is_multiple_of(faces)
+        } else {
+            layers == faces
+        };
+        (!fits).then(|| {
+            let wanted = match (self.is_array(), self.is_cube()) {
+                (false, false) => "1",
+                (false, true) => "the 6 of a cube",
+                (true, false) => "at least 1",
+                (true, true) => "6 for each cube",
+            };
+            std::format!("it has {layers} layers, not {wanted}")
+        })
+    }
 }
 
 /// What a kernel writes.

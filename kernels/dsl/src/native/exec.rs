@@ -12,8 +12,8 @@ use fearless_simd::Simd;
 use glam::{UVec2, UVec3, UVec4, Vec4};
 use rayon::prelude::*;
 
-use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef};
-use super::describe::TexelFormat;
+use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef, texture_bytes};
+use super::describe::{TexelFormat, TextureKind};
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
 use crate::math::Elementary;
@@ -139,8 +139,7 @@ impl<'a> Args<'a> {
     pub fn texture(
         &mut self,
         name: &'static str,
-        multisampled: bool,
-        flat: bool,
+        kind: TextureKind,
     ) -> Result<TextureRef<'a>, CallError> {
         let Some(Arg::Texture(t)) = self.args.next() else {
             return Err(CallError::Kind {
@@ -148,14 +147,32 @@ impl<'a> Args<'a> {
                 expected: "a texture",
             });
         };
-        if multisampled != (t.samples > 1) || t.samples == 0 || (flat && t.size[2] != 1) {
+        let beyond = &t.size[kind.dimensions() as usize..];
+        if kind.is_multisampled() != (t.samples > 1)
+            || t.samples == 0
+            || beyond.iter().any(|n| *n != 1)
+        {
             let problem = format!(
                 "{}x{}x{} texels with {} samples are of the wrong shape",
                 t.size[0], t.size[1], t.size[2], t.samples
             );
             return Err(CallError::Texture { name, problem });
         }
-        check_size(name, t.size, t.samples, t.format, t.bytes.len())?;
+        if let Some(problem) = kind.misfit(t.layers) {
+            return Err(CallError::Texture { name, problem });
+        }
+        if !kind.has_levels() && t.levels != 1 {
+            let problem = format!("it has {} mip levels, not 1", t.levels);
+            return Err(CallError::Texture { name, problem });
+        }
+        let expected = texture_bytes(t.size, t.levels, t.layers, t.samples, t.format);
+        if expected == 0 || expected != t.bytes.len() {
+            let problem = format!(
+                "{} bytes were given, its size and format need {expected}",
+                t.bytes.len()
+            );
+            return Err(CallError::Texture { name, problem });
+        }
         Ok(t)
     }
 
@@ -179,17 +196,21 @@ impl<'a> Args<'a> {
             );
             return Err(CallError::Texture { name, problem });
         }
-        check_size(name, t.size, 1, t.format, t.bytes.len())?;
+        check_size(name, t.size, t.format, t.bytes.len())?;
         Ok(t)
     }
 
     /// A sampler.
-    pub fn sampler(&mut self, name: &'static str) -> Result<Sampler, CallError> {
+    pub fn sampler(&mut self, name: &'static str, comparison: bool) -> Result<Sampler, CallError> {
         match self.args.next() {
-            Some(Arg::Sampler(s)) => Ok(s),
+            Some(Arg::Sampler(s)) if s.compare.is_some() == comparison => Ok(s),
             _ => Err(CallError::Kind {
                 name,
-                expected: "a sampler",
+                expected: if comparison {
+                    "a sampler that compares"
+                } else {
+                    "a sampler that does not compare"
+                },
             }),
         }
     }
@@ -253,13 +274,11 @@ fn cast<'a, T: Pod>(name: &'static str, bytes: &'a [u8]) -> Result<&'a [T], Call
 fn check_size(
     name: &'static str,
     size: [u32; 3],
-    samples: u32,
     format: TexelFormat,
     bytes: usize,
 ) -> Result<(), CallError> {
-    let texels = size.iter().map(|s| u128::from(*s)).product::<u128>() * u128::from(samples);
-    let expected = texels * format.bytes() as u128;
-    if texels == 0 || expected != bytes as u128 {
+    let expected = texture_bytes(size, 1, 1, 1, format);
+    if expected == 0 || expected != bytes {
         let problem = format!("{bytes} bytes were given, its size and format need {expected}");
         return Err(CallError::Texture { name, problem });
     }

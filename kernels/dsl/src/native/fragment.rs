@@ -139,6 +139,15 @@ pub fn derivative(
     values[first | step] - values[first]
 }
 
+/// How coordinates differ between the fragment and its neighbours, along x and along y: one place
+/// for both.
+#[must_use]
+pub fn gradients(at: Vec3, place: &'static Location<'static>) -> (Vec3, Vec3) {
+    let (values, lane) = exchange(at.extend(0.0), place);
+    let along = |step: usize| (values[lane | step] - values[lane & !step]).truncate();
+    (along(1), along(2))
+}
+
 /// What stands for [`fwidth`](crate::fwidth) and the like.
 #[must_use]
 pub fn width(value: Vec4, grain: Grain, place: &'static Location<'static>) -> Vec4 {

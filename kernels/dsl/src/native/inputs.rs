@@ -23,7 +23,7 @@ use std::vec::Vec;
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
 
-use super::call::{Address, Filter, Sampler};
+use super::call::Sampler;
 use super::describe::TexelFormat;
 use crate::Real;
 
@@ -65,22 +65,32 @@ pub enum Value {
     Bytes(Vec<u8>),
     /// A texture.
     Texture {
-        /// Width, height, depth in texels.
+        /// Width, height, depth of level 0 in texels.
         size: [u32; 3],
+        /// Mip levels.
+        levels: u32,
+        /// Layers, of a cube its 6 faces.
+        layers: u32,
         /// Samples of a texel, 1 or 4.
         samples: u32,
-        /// The format.
+        /// The format; of a depth [`TexelFormat::R32Float`].
         format: TexelFormat,
-        /// Texels row by row, slice by slice, each texel's samples together.
+        /// Texels as in a [`TextureRef`](super::TextureRef).
         bytes: Vec<u8>,
     },
     /// A sampler.
-    Sampler {
-        /// Linear, else nearest.
-        linear: bool,
-        /// Repeats, else clamps to the edge.
-        repeat: bool,
-    },
+    Sampler(Sampler),
+}
+
+/// Texels as they lie in memory.
+fn stored(format: TexelFormat, texels: impl IntoIterator<Item = glam::Vec4>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for texel in texels {
+        let at = bytes.len();
+        bytes.resize(at + format.bytes(), 0);
+        format.store(&mut bytes[at..], texel);
+    }
+    bytes
 }
 
 impl Given {
@@ -122,20 +132,40 @@ impl Given {
         format: TexelFormat,
         texels: impl IntoIterator<Item = glam::Vec4>,
     ) -> Self {
-        let mut bytes = Vec::new();
-        for texel in texels {
-            let at = bytes.len();
-            bytes.resize(at + format.bytes(), 0);
-            format.store(&mut bytes[at..], texel);
-        }
-        let size = [width, height, 1];
+        self.with(
+            name,
+            Value::Texture {
+                size: [width, height, 1],
+                levels: 1,
+                layers: 1,
+                samples,
+                format,
+                bytes: stored(format, texels),
+            },
+        )
+    }
+
+    /// Gives a texture of any shape its texels: level after level, in each layer after layer, slice
+    /// after slice, row after row.
+    #[must_use]
+    pub fn levels(
+        self,
+        name: &str,
+        size: [u32; 3],
+        levels: u32,
+        layers: u32,
+        format: TexelFormat,
+        texels: impl IntoIterator<Item = glam::Vec4>,
+    ) -> Self {
         self.with(
             name,
             Value::Texture {
                 size,
-                samples,
+                levels,
+                layers,
+                samples: 1,
                 format,
-                bytes,
+                bytes: stored(format, texels),
             },
         )
     }
@@ -143,11 +173,7 @@ impl Given {
     /// Says how a texture is sampled.
     #[must_use]
     pub fn sampler(self, name: &str, sampler: Sampler) -> Self {
-        let value = Value::Sampler {
-            linear: sampler.filter == Filter::Linear,
-            repeat: sampler.address == Address::Repeat,
-        };
-        self.with(name, value)
+        self.with(name, Value::Sampler(sampler))
     }
 }
 

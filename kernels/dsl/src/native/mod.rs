@@ -13,13 +13,15 @@ pub mod inputs;
 pub mod lanes;
 pub mod layout;
 pub mod plugin;
+pub(crate) mod sampling;
 pub mod texel;
 mod transpose;
 #[doc(hidden)]
 pub mod workgroup;
 
 pub use call::{
-    Address, Arg, Call, CallError, Deviation, Filter, Mode, Run, Sampler, TextureMut, TextureRef,
+    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Run, Sampler, TextureMut,
+    TextureRef, level_size, texture_bytes,
 };
 
 /// An entry point: what it is, and its native code.

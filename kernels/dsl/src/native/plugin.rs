@@ -16,14 +16,15 @@ use std::{format, slice};
 
 use super::Entry;
 use super::call::{
-    Address, Arg, Call, CallError, Deviation, Filter, Mode, Sampler, TextureMut, TextureRef,
+    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Sampler, TextureMut,
+    TextureRef,
 };
 use super::describe::Kernel;
 use super::inputs::{Given, Make, Request};
 use super::texel::FORMATS;
 
 /// Version of what crosses the border.
-pub const ABI: u32 = 3;
+pub const ABI: u32 = 4;
 
 /// The exported function's name.
 pub const SYMBOL: &str = "hankel_plugin";
@@ -69,13 +70,66 @@ struct RawArg {
     kind: u32,
     format: u32,
     size: [u32; 3],
-    /// Samples of a texture; of a sampler, its filter. A sampler's deviation is in `size` and
-    /// `format`.
+    levels: u32,
+    layers: u32,
     samples: u32,
-    /// Of a sampler, what it does beyond the edge.
-    address: u32,
+    sampler: RawSampler,
     data: *mut u8,
     len: usize,
+}
+
+/// A sampler as it crosses the border: numbers of the variants, of a comparison one more, so that 0
+/// is none; its [`Deviation`].
+#[derive(Default)]
+#[repr(C)]
+struct RawSampler {
+    magnify: u32,
+    minify: u32,
+    mip: u32,
+    address: [u32; 3],
+    compare: u32,
+    anisotropy: u32,
+    offset: [i16; 3],
+    level: i16,
+    channels: [i8; 4],
+}
+
+impl RawSampler {
+    fn new(sampler: &Sampler) -> Self {
+        Self {
+            magnify: sampler.magnify as u32,
+            minify: sampler.minify as u32,
+            mip: sampler.mip as u32,
+            address: sampler.address.map(|it| it as u32),
+            compare: sampler.compare.map_or(0, |it| it as u32 + 1),
+            anisotropy: sampler.anisotropy.into(),
+            offset: sampler.deviation.offset,
+            level: sampler.deviation.level,
+            channels: sampler.deviation.channels,
+        }
+    }
+
+    fn sampler(&self) -> Option<Sampler> {
+        let filter = |n: u32| Filter::ALL.get(n as usize).copied();
+        let address = |n: u32| Address::ALL.get(n as usize).copied();
+        let [u, v, w] = self.address;
+        Some(Sampler {
+            magnify: filter(self.magnify)?,
+            minify: filter(self.minify)?,
+            mip: filter(self.mip)?,
+            address: [address(u)?, address(v)?, address(w)?],
+            compare: match self.compare {
+                0 => None,
+                n => Some(*Compare::ALL.get(n as usize - 1)?),
+            },
+            anisotropy: u16::try_from(self.anisotropy).ok()?,
+            deviation: Deviation {
+                offset: self.offset,
+                level: self.level,
+                channels: self.channels,
+            },
+        })
+    }
 }
 
 const BYTES: u32 = 0;
@@ -90,8 +144,10 @@ impl RawArg {
             kind: BYTES,
             format: 0,
             size: [0; 3],
+            levels: 1,
+            layers: 1,
             samples: 0,
-            address: 0,
+            sampler: RawSampler::default(),
             data: core::ptr::null_mut(),
             len: 0,
         };
@@ -104,6 +160,7 @@ impl RawArg {
             Arg::Texture(t) => {
                 raw.kind = TEXTURE;
                 (raw.size, raw.samples, raw.format) = (t.size, t.samples, t.format as u32);
+                (raw.levels, raw.layers) = (t.levels, t.layers);
                 (t.bytes.as_ptr().cast_mut(), t.bytes.len())
             }
             Arg::TextureMut(t) => {
@@ -113,9 +170,7 @@ impl RawArg {
             }
             Arg::Sampler(s) => {
                 raw.kind = SAMPLER;
-                (raw.samples, raw.address) = (s.filter as u32, s.address as u32);
-                raw.size = s.deviation.offset.map(|n| i32::from(n) as u32);
-                raw.format = u32::from_le_bytes(s.deviation.channels.map(|n| n as u8));
+                raw.sampler = RawSampler::new(s);
                 (core::ptr::null_mut(), 0)
             }
         };
@@ -135,6 +190,8 @@ impl RawArg {
             BYTES_MUT => Arg::BytesMut(bytes_mut()),
             TEXTURE => Arg::Texture(TextureRef {
                 size: self.size,
+                levels: self.levels,
+                layers: self.layers,
                 samples: self.samples,
                 format: *FORMATS.get(self.format as usize)?,
                 bytes: bytes(),
@@ -144,22 +201,7 @@ impl RawArg {
                 format: *FORMATS.get(self.format as usize)?,
                 bytes: bytes_mut(),
             }),
-            SAMPLER => Arg::Sampler(Sampler {
-                filter: if self.samples == 0 {
-                    Filter::Nearest
-                } else {
-                    Filter::Linear
-                },
-                address: if self.address == 0 {
-                    Address::ClampToEdge
-                } else {
-                    Address::Repeat
-                },
-                deviation: Deviation {
-                    offset: self.size.map(|n| n as i32 as i16),
-                    channels: self.format.to_le_bytes().map(|n| n as i8),
-                },
-            }),
+            SAMPLER => Arg::Sampler(self.sampler.sampler()?),
             _ => return None,
         })
     }

@@ -38,7 +38,7 @@ pub fn nothing(
     #[range(0..=1)]
     sampler: Sampler,
 ) -> f32 {
-    source.sample(sampler, uv).x
+    source.sample_level(sampler, uv, 0.0).x
 }
 
 /// A default of what is read for each invocation.

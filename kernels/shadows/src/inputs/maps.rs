@@ -5,9 +5,9 @@
 use std::vec::Vec;
 
 use hankel_dsl::glam::{IVec2, Vec3, Vec4};
-use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
+use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_moments::bias::{Bias, CLAMPED_4_16, SYMMETRIC_4_16, SYMMETRIC_4_32};
 use hankel_moments::{Moments4, from_unorm, quantize_symmetric_4, quantize_unit_4, to_unorm};
 
@@ -204,7 +204,10 @@ pub fn shaded(request: &Request) -> Vec<Given> {
                 TexelFormat::Rgba32Float,
                 map.iter().copied(),
             )
-            .sampler("sampler", Sampler::new(true, false))
+            .sampler(
+                "sampler",
+                Sampler::new(Filter::Linear, Address::ClampToEdge),
+            )
     })
     .collect()
 }

@@ -1,0 +1,108 @@
+//! Layers, cubes, and textures of one dimension. Levels are as in [`super::sampling`].
+
+use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::{Sampler, Texture1d, Texture2dArray, TextureCube, TextureCubeArray, kernel};
+
+/// Texels of all levels of all layers.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn stacked(
+    #[index] at: UVec2,
+    #[texture]
+    #[levels(2)]
+    #[layers(5)]
+    source: Texture2dArray<'_>,
+) -> Vec4 {
+    let level = at.y % 2;
+    let size = source.level_size(level);
+    let place = UVec2::new(at.x % size.x, at.y % size.y);
+    source.load_level(place, (at.x + at.y) % 5, level)
+}
+
+/// Layers between texels and levels, and four texels of one around a corner.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn between(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(32, 16)]
+    #[levels(4)]
+    source: Texture2dArray<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    let layer = (at.x + at.y) % 3;
+    let uv = Vec2::new(at.x as f32 / 37.0, at.y as f32 / 21.0);
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    let filtered = source.sample_level(sampler, uv, layer, (at.y % 13) as f32 * 0.25);
+    let four = source.gather::<2>(sampler, corner, layer);
+    Vec4::new(filtered.x, filtered.y, four.x, four.w)
+}
+
+/// A direction through a face of a cube, away from its edges: SwiftShader reads beyond them what nobody
+/// wrote. (`super::shadow::hidden` crosses them.)
+fn through_a_face(i: u32, on: Vec2) -> Vec3 {
+    let group = i / 64;
+    let major = if group & 1 == 0 { 1.0 } else { -1.0 };
+    let (s, t) = (on.x, on.y * 0.5);
+    if group % 3 == 0 {
+        Vec3::new(major, t, s)
+    } else if group % 3 == 1 {
+        Vec3::new(s, major, t)
+    } else {
+        Vec3::new(t, s, major)
+    }
+}
+
+/// A cube through all of its faces, between levels.
+#[kernel(compute, threads(64))]
+pub fn around(
+    #[index] i: u32,
+    #[element]
+    #[range(-0.7..=0.7)]
+    on: Vec2,
+    #[texture]
+    #[size(16, 16)]
+    #[levels(3)]
+    source: TextureCube<'_>,
+    #[sampler] sampler: Sampler,
+) -> f32 {
+    let level = (i / 384 % 9) as f32 * 0.25;
+    source.sample_level(sampler, through_a_face(i, on), level).x
+}
+
+/// One of several cubes.
+#[kernel(compute, threads(64))]
+pub fn surroundings(
+    #[index] i: u32,
+    #[element]
+    #[range(-0.7..=0.7)]
+    on: Vec2,
+    #[texture]
+    #[layers(2)]
+    source: TextureCubeArray<'_>,
+    #[sampler] sampler: Sampler,
+) -> f32 {
+    let direction = through_a_face(i, on);
+    source.sample_level(sampler, direction, i / 7 % 2, 0.0).y
+}
+
+/// Texels in a row.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn along(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(100)]
+    source: Texture1d<'_>,
+) -> Vec4 {
+    source.load((at.x + at.y * 3) % source.size())
+}
+
+/// A row of texels between them.
+#[kernel(fragment)]
+pub fn ramp(
+    #[frag_coord] at: Vec3,
+    #[texture]
+    #[size(32)]
+    source: Texture1d<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    source.sample(sampler, at.x / 64.0)
+}

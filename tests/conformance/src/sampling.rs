@@ -1,0 +1,147 @@
+//! Mip levels, and what samplers do with them.
+//!
+//! The level is the same along a row, or in a workgroup: llvmpipe 22.3.6 reads for eight invocations
+//! beside each other the level of the first one.
+
+use hankel_dsl::glam::{UVec2, UVec3, Vec2, Vec3, Vec4};
+use hankel_dsl::{Sampler, Texture2d, Texture3d, kernel};
+
+/// Texels of all levels, and how large their level is.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn levels(
+    #[index] at: UVec2,
+    #[texture]
+    #[levels(4)]
+    source: Texture2d<'_>,
+) -> Vec4 {
+    let level = at.y % 4;
+    let size = source.level_size(level);
+    let texel = source.load_level(UVec2::new(at.x % size.x, at.y % size.y), level);
+    Vec4::new(texel.x, texel.y, size.x as f32, size.y as f32)
+}
+
+/// Texels of the last level of a volume, and which level that is.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn level_count(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(21, 10, 6)]
+    #[levels(3)]
+    source: Texture3d<'_>,
+) -> Vec4 {
+    let last = source.levels() - 1;
+    let size = source.level_size(last);
+    let place = UVec3::new(at.x % size.x, at.y % size.y, (at.x + at.y) % size.z);
+    let texel = source.load_level(place, last);
+    Vec4::new(texel.x, texel.y, last as f32, size.z as f32)
+}
+
+/// A texture between texels and between levels, before the first of them and after the last.
+#[kernel(compute, threads(64))]
+pub fn trilinear(
+    #[index] i: u32,
+    #[element]
+    #[range(-0.5..=1.5)]
+    uv: Vec2,
+    #[texture]
+    #[size(64, 32)]
+    #[levels(6)]
+    source: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+) -> f32 {
+    source
+        .sample_level(sampler, uv, (i % 29) as f32 * 0.25 - 0.5)
+        .x
+}
+
+/// A volume between texels and between levels.
+#[kernel(compute, threads(64))]
+pub fn volume_levels(
+    #[index] i: u32,
+    #[element]
+    #[range(-0.5..=1.5)]
+    place: Vec4,
+    #[texture]
+    #[size(16, 8, 8)]
+    #[levels(3)]
+    source: Texture3d<'_>,
+    #[sampler]
+    #[address(mirror_repeat)]
+    sampler: Sampler,
+) -> f32 {
+    source
+        .sample_level(sampler, place.truncate(), (i % 9) as f32 * 0.25)
+        .x
+}
+
+/// The texels of a level, mirrored to both sides, each at its middle.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn mirrored(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(16, 8)]
+    #[levels(3)]
+    source: Texture2d<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    #[mip_filter(nearest)]
+    #[address(mirror_repeat)]
+    sampler: Sampler,
+) -> Vec4 {
+    let level = at.y % 3;
+    let size = source.level_size(level);
+    // Before, within and beyond the texture.
+    let place = |i: u32, n: u32| ((i * 7) % (5 * n)) as f32 + 0.5 - 2.0 * n as f32;
+    let u = place(at.x, size.x) / size.x as f32;
+    let v = place(at.y, size.y) / size.y as f32;
+    source.sample_level(sampler, Vec2::new(u, v), level as f32 + 0.25)
+}
+
+/// Texels of the level that gradients ask for: a quarter of a level below it, since an implementation
+/// may find up to half a level more.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn by_gradients(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(64, 32)]
+    #[levels(4)]
+    source: Texture2d<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    #[mip_filter(nearest)]
+    #[address(repeat)]
+    sampler: Sampler,
+) -> Vec4 {
+    let level = at.y % 4;
+    let (size, whole) = (source.level_size(level), source.size());
+    let middle = Vec2::new(at.x as f32 + 0.5, at.y as f32 + 0.5);
+    let uv = middle / Vec2::new(size.x as f32, size.y as f32);
+    // 2 to the power of -1/4, in texels.
+    let step = 0.840_896_4 * (1_u32 << level) as f32;
+    let dx = Vec2::new(step / whole.x as f32, 0.0);
+    let dy = Vec2::new(0.0, 0.5 * step / whole.y as f32);
+    source.sample_gradient(sampler, uv, dx, dy)
+}
+
+/// A texture by the level that neighbouring fragments make, and by the next one.
+#[kernel(fragment)]
+pub fn receding(
+    #[frag_coord] at: Vec3,
+    #[texture]
+    #[size(64, 32)]
+    #[levels(4)]
+    source: Texture2d<'_>,
+    #[sampler]
+    #[mip_filter(nearest)]
+    #[address(mirror_repeat)]
+    sampler: Sampler,
+) -> Vec4 {
+    let size = source.size();
+    // 2 to the power of 3/4 texels from fragment to fragment along x: level 1.
+    let u = at.x * 1.681_792_8 / size.x as f32;
+    let v = at.y * 0.75 / size.y as f32;
+    let uv = Vec2::new(u, v);
+    let near = source.sample(sampler, uv);
+    let far = source.sample_bias(sampler, uv, 1.0);
+    Vec4::new(near.x, near.y, far.x, far.y)
+}

@@ -1,0 +1,141 @@
+//! Depths, and samplers that compare with them.
+
+use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::{
+    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, kernel,
+};
+
+/// Which texels are behind the reference.
+#[kernel(
+    compute,
+    threads(64),
+    parity(
+        ulp = 0,
+        absolute = 1e-3,
+        why = "0 or 1, but drivers may take subnormal depths for 0"
+    )
+)]
+pub fn lit(
+    #[index] i: u32,
+    #[element]
+    #[range(0.0..=1.0)]
+    reference: f32,
+    #[texture]
+    #[size(64, 32)]
+    depths: DepthTexture2d<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    #[address(repeat)]
+    sampler: ComparisonSampler,
+) -> f32 {
+    let middle = Vec2::new((i % 64) as f32 + 0.5, (i / 64) as f32 + 0.5);
+    depths.compare_level_zero(
+        sampler,
+        middle * Vec2::new(1.0 / 64.0, 1.0 / 32.0),
+        reference,
+    )
+}
+
+/// How much of the four nearest texels is in front of the reference.
+#[kernel(compute, threads(64))]
+pub fn soft(
+    #[element]
+    #[range(0.0..=1.0)]
+    at: Vec4,
+    #[texture] depths: DepthTexture2d<'_>,
+    #[sampler]
+    #[compare(greater)]
+    sampler: ComparisonSampler,
+) -> f32 {
+    depths.compare_level_zero(sampler, Vec2::new(at.x, at.y), at.z)
+}
+
+/// Which of the four texels around a corner are behind the middle depth.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn four_lit(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(32, 16)]
+    depths: DepthTexture2d<'_>,
+    #[sampler]
+    #[compare(less)]
+    #[address(repeat)]
+    sampler: ComparisonSampler,
+) -> Vec4 {
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    depths.gather_compare(sampler, corner, 0.5)
+}
+
+/// The same in each layer in turn, and one layer filtered.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn layers_lit(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(32, 16)]
+    depths: DepthTexture2dArray<'_>,
+    #[sampler]
+    #[compare(greater_equal)]
+    #[address(repeat)]
+    sampler: ComparisonSampler,
+) -> Vec4 {
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    let four = depths.gather_compare(sampler, corner, at.x % 3, 0.5);
+    let place = Vec2::new(at.x as f32 / 37.0, at.y as f32 / 21.0);
+    let lit = depths.compare_level_zero(sampler, place, at.x % 3, 0.25);
+    Vec4::new(four.x, four.y + four.z, four.w, lit)
+}
+
+/// Depths as they are, of a level and of a layer: the larger of two.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(r32float),
+    parity(
+        ulp = 0,
+        absolute = 1e-30,
+        why = "drivers may take subnormal depths for 0 where they are drawn"
+    )
+)]
+pub fn deepest(
+    #[index] at: UVec2,
+    #[texture]
+    #[levels(3)]
+    depths: DepthTexture2d<'_>,
+    #[texture]
+    #[size(16, 8)]
+    layers: DepthTexture2dArray<'_>,
+) -> f32 {
+    let level = at.y % 3;
+    let (size, own) = (depths.level_size(level), layers.size());
+    let near = depths.load_level(UVec2::new(at.x % size.x, at.y % size.y), level);
+    let far = layers.load(UVec2::new(at.x % own.x, at.y % own.y), level);
+    if near > far { near } else { far }
+}
+
+/// Which texels around a light hide what lies in their direction, by the level that neighbouring
+/// fragments make of a layer, too.
+#[kernel(fragment)]
+pub fn hidden(
+    #[frag_coord] at: Vec3,
+    #[texture]
+    #[size(8, 8)]
+    around: DepthTextureCube<'_>,
+    #[texture]
+    #[size(32, 32)]
+    #[levels(3)]
+    layers: DepthTexture2dArray<'_>,
+    #[sampler]
+    #[mip_filter(nearest)]
+    #[address(mirror_repeat)]
+    sampler: ComparisonSampler,
+) -> Vec4 {
+    // Across edges of the cube, but not its corners: what lies beyond those is left open.
+    let to = Vec3::new(at.x - 31.75, (at.y - 8.0) * 0.25, 5.0);
+    let uv = Vec2::new(at.x * 1.681_792_8 / 32.0, at.y / 32.0);
+    Vec4::new(
+        around.compare_level_zero(sampler, to, 0.5),
+        layers.compare(sampler, uv, 1, 0.5),
+        0.0,
+        1.0,
+    )
+}
