@@ -75,8 +75,16 @@ fn centroids_stay() {
 
 #[test]
 fn layers_are_fetched() {
-    let source = include_str!("../../tests/upstream/naga-arrayed-fetch/case.spvasm");
-    let text = text(source, &kernel(Stage::Fragment), Language::Wgsl);
+    let source = include_str!("../../tests/upstream/naga-arrayed-fetch/case.spvasm")
+        .replace("%main \"main\"", "%main \"main\" %image");
+    let kernel = kernel(Stage::Fragment);
+    let finished = finish(&support::assemble(&source), &kernel).unwrap_or_else(|e| panic!("{e}"));
+    let ir = Ir::read(&finished.spirv, &kernel).unwrap_or_else(|e| panic!("{e}"));
+    let written = ir.write(Language::Wgsl, &kernel, &Options::default());
+    let text = match written.unwrap_or_else(|e| panic!("{e}")) {
+        Written::Text(Text { source, .. }) => source,
+        other => panic!("{other:?}"),
+    };
     assert!(text.contains("textureLoad("), "{text}");
 }
 

@@ -82,7 +82,7 @@ fn a_kernel_crate_is_built_loaded_and_run() {
          if x == 55.0 { deep(1 << 20) as f32 } else { x }\n}\n\
          /// All are fine alone.\n#[kernel(compute, threads(64))]\n\
          pub fn slow(#[element] x: f32) -> f32 {\n\
-         let mut y = x;\nfor _ in 0..20_000_000 { y = core::hint::black_box(y * 0.5); }\ny\n}\n\
+         let mut y = x;\nfor _ in 0..8_000_000 { y = core::hint::black_box(y * 0.5); }\ny\n}\n\
          hankel_dsl::kernels![parabola, beyond, endless, bottomless, slow];\n",
     );
     let mut lines = Vec::new();

@@ -136,7 +136,7 @@ mod tests {
     fn unwinding_ends_the_program() {
         let folder = scratch("process");
         let (log, file) = (folder.join("log"), folder.join("too-late"));
-        let mut script = shell("echo now; sleep 0.3; echo late > \"$0\"");
+        let mut script = shell("echo now; sleep 1; echo late > \"$0\"");
         script.arg(&file);
         let stopped = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             run(&mut script, "the script", &log, |_| {
@@ -144,7 +144,7 @@ mod tests {
             })
         }));
         assert!(stopped.is_err());
-        std::thread::sleep(Duration::from_millis(500));
+        std::thread::sleep(Duration::from_millis(1300));
         assert!(!file.exists());
         std::fs::remove_dir_all(folder).unwrap();
     }
