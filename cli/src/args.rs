@@ -43,6 +43,9 @@ pub enum Command {
     New(New),
     /// Run every kernel on every backend and compare.
     Parity(Parity),
+    /// Run kernels natively with every access looked at, in several orders: data races, memory that is
+    /// read before it is written, results that depend on order, overflow, what is out of range.
+    Sanitize(Sanitize),
     /// Run a kernel on the rows of a table.
     Eval(Eval),
     /// Render a scene with shadows.
@@ -256,6 +259,35 @@ pub struct Parity {
     pub matrix: bool,
     #[command(flatten)]
     pub of_matrix: OfMatrix,
+}
+
+/// What a sanitized run looks for.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel sanitize
+  hankel sanitize --manifest-path my-kernels/Cargo.toml --kernel 'sort_*'
+
+Kernels run natively on the inputs of `hankel parity`, their invocations in ascending, descending and
+shuffled order. A fault is named with the line of the kernel's source and the invocations that took
+part. Integers that overflow, and shifts by too many bits, are found in crates that are given by
+--manifest-path: those are built with the checks.")]
+pub struct Sanitize {
+    #[command(flatten)]
+    pub source: Source,
+    /// Only this kernel; `*` stands for any letters; may be repeated.
+    #[arg(long = "kernel", value_name = "NAME")]
+    pub kernels: Vec<String>,
+    /// Seed of the generated inputs.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub seed: u64,
+    /// Seconds that a kernel of another crate may run.
+    #[arg(long, value_name = "SECONDS", default_value_t = 120,
+          value_parser = clap::value_parser!(u64).range(1..=3600))]
+    pub limit: u64,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
 }
 
 /// Choices for the matrix.

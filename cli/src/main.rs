@@ -37,6 +37,7 @@ fn main() -> ExitCode {
         Command::List(a) => commands::list::run(&a, quiet),
         Command::New(a) => commands::new::run(&a, quiet),
         Command::Parity(a) => commands::parity::run(&a, quiet),
+        Command::Sanitize(a) => commands::sanitize::run(&a, quiet),
         Command::Eval(a) => commands::eval::run(&a, quiet),
         #[cfg(feature = "frames")]
         Command::Render(a) => commands::render::run(&a, quiet),

@@ -148,11 +148,38 @@ impl Session {
         } else {
             Native::Of(&names)
         };
+        self.build(manifest, native, names.len(), limit)
+    }
+
+    /// The crate at `manifest` with the native code of the entry points called `names`, of whose
+    /// integers none may overflow; the built-in kernels as they are linked into this program where
+    /// no manifest is given.
+    pub fn checked(
+        &self,
+        manifest: Option<&Path>,
+        names: &[String],
+        limit: Duration,
+    ) -> Result<KernelCrate> {
+        match &self.manifest {
+            Some(found) if manifest.is_some() || !self.linked => {
+                self.build(found, Native::Checked(names), names.len(), limit)
+            }
+            _ => Ok(self.krate.clone()),
+        }
+    }
+
+    /// Builds native code of `count` kernels.
+    fn build(
+        &self,
+        manifest: &Path,
+        native: Native<'_>,
+        count: usize,
+        limit: Duration,
+    ) -> Result<KernelCrate> {
         let progress = Progress::new(self.quiet);
         progress.begin(&format!(
             "Building {} kernels of {} for this machine",
-            names.len(),
-            self.krate.name
+            count, self.krate.name
         ));
         let worker = worker(limit)?;
         let mut said = |line: &str| progress.detail(line);

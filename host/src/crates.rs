@@ -34,6 +34,9 @@ pub enum Native<'a> {
     Descriptions,
     /// Those with these names.
     Of(&'a [String]),
+    /// Those with these names; an integer of the crate that overflows, and a shift by too many bits,
+    /// ends the call.
+    Checked(&'a [String]),
     /// All.
     All,
 }
@@ -50,6 +53,10 @@ impl Native<'_> {
                 &[]
             }
             Native::Of(names) => names,
+            Native::Checked(names) => {
+                flags.push("-Coverflow-checks=on".into());
+                names
+            }
         };
         flags.extend(["--cfg".into(), "hankel_select".into()]);
         for name in names {

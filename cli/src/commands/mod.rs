@@ -11,4 +11,5 @@ pub mod new;
 pub mod parity;
 #[cfg(feature = "frames")]
 pub mod render;
+pub mod sanitize;
 pub mod toolchain;

@@ -1,4 +1,4 @@
-//! Kernels that do not come back.
+//! Kernels that do not come back, or do what no shader may.
 
 use std::fs;
 use std::path::Path;
@@ -28,9 +28,8 @@ pub fn bottomless(#[element] x: f32) -> f32 {
 hankel_dsl::kernels![endless, bottomless];
 "#;
 
-/// Both in one test: the crate is built once.
-#[test]
-fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
+/// A folder with the crate `bad`, with these sources.
+fn bad(sources: &str) -> Desk {
     let desk = Desk::new();
     desk.write(
         "bad/Cargo.toml",
@@ -40,7 +39,7 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
             root().join("kernels/dsl")
         ),
     );
-    desk.write("bad/src/lib.rs", KERNELS);
+    desk.write("bad/src/lib.rs", sources);
     // What it depends on is built once for all tests of this kind.
     let shared = Path::new(env!("CARGO_TARGET_TMPDIR")).join("crates/parabola/target");
     desk.write(
@@ -48,6 +47,13 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
         format!("[build]\ntarget-dir = {shared:?}\n"),
     );
     fs::copy(root().join("Cargo.lock"), desk.path("bad/Cargo.lock")).expect("a copy");
+    desk
+}
+
+/// Both in one test: the crate is built once.
+#[test]
+fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
+    let desk = bad(KERNELS);
     desk.write("rows.csv", "x\n1\n2\n3\n");
     for (kernel, words) in [
         ("endless", ["row 3", "x = 3", "was ended after 1 s"]),
@@ -61,4 +67,116 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
         run.fails(1, &[kernel, "rows.csv"]);
         assert!(!desk.path("out.csv").exists());
     }
+}
+
+const FAULTS: &str = r#"//! Test.
+#![no_std]
+use hankel_dsl::{Atomics, Shared, StorageMut, barrier, kernel};
+/// Right: its numbers do not meet.
+#[kernel(compute, threads(64))]
+pub fn fine(#[element] x: u32, #[storage(unordered)] all: StorageMut<'_, u32>, #[atomic] n: Atomics<'_>) {
+    let i = n.add(0, 1);
+    if i < all.len() {
+        all.set(i, x);
+    }
+}
+/// A race in a buffer.
+#[kernel(compute, threads(64))]
+pub fn race(#[index] i: u32, #[element] x: u32, #[storage] all: StorageMut<'_, u32>) {
+    all.set(0, x + i % 2);
+}
+/// A barrier in a branch.
+#[kernel(compute, threads(64))]
+pub fn branch(#[local_index] me: u32, #[element] x: Option<u32>) -> u32 {
+    if me < 5 {
+        barrier();
+    }
+    x.unwrap_or(0)
+}
+/// Reads what nobody wrote.
+#[kernel(compute, threads(64))]
+pub fn unwritten(#[shared] tile: Shared<'_, u32, 4>, #[element] x: Option<u32>) -> u32 {
+    tile.get(1) & x.unwrap_or(0)
+}
+/// The order shows.
+#[kernel(compute, threads(64))]
+pub fn order(#[element] x: u32, #[atomic] n: Atomics<'_>) -> u32 {
+    n.add(0, 1) + (x & 0)
+}
+/// Wraps for large numbers.
+#[kernel(compute, threads(64))]
+pub fn wraps(#[element] x: u32) -> u32 {
+    x + 17
+}
+/// Shifts by up to 255.
+#[kernel(compute, threads(64))]
+pub fn shift(#[element] x: u32) -> u32 {
+    1 << (x & 255)
+}
+/// Divides by zero.
+#[kernel(compute, threads(64))]
+pub fn divides(#[element] x: u32) -> u32 {
+    7 / x
+}
+/// Reads beyond the end.
+#[kernel(compute, threads(64))]
+pub fn beyond(#[index] i: u32, #[element] x: u32, #[storage] table: &[u32]) -> u32 {
+    table[(i * 1000) as usize] & x
+}
+/// Does not end for 0.
+#[kernel(compute, threads(64))]
+pub fn endless(#[element] x: u32) -> u32 {
+    while x == 0 {
+        core::hint::black_box(x);
+    }
+    x
+}
+hankel_dsl::kernels![fine, race, branch, unwritten, order, wraps, shift, divides, beyond, endless];
+"#;
+
+#[test]
+fn what_no_shader_may_do_is_named_with_its_line() {
+    let desk = bad(FAULTS);
+    let run = desk.hankel("sanitize --manifest-path bad/Cargo.toml --limit 2");
+    let said = run.code(1).out();
+    let says = |words: &[&str]| {
+        let found = said.split("\n").collect::<Vec<_>>();
+        let of = found.iter().position(|line| *line == words[0]);
+        let fault = found[of.unwrap_or_else(|| panic!("no {} in {said}", words[0])) + 1];
+        for word in words {
+            assert!(
+                fault.contains(word) || *word == words[0],
+                "no `{word}` in: {fault}"
+            );
+        }
+    };
+    let line = |text: &str| {
+        let at = FAULTS.lines().position(|line| line.contains(text));
+        format!("lib.rs:{}:", at.expect("it is there") + 1)
+    };
+    for (source, words) in [
+        ("all.set(0, x", ["race", "data race", "element 0 of `all`"]),
+        ("        barrier();", ["branch", "not uniform", "has ended"]),
+        (
+            "tile.get(1)",
+            ["unwritten", "of `tile`", "before anything was written"],
+        ),
+        ("x + 17", ["wraps", "attempt to add with overflow", "src/"]),
+        (
+            "1 << (x & 255)",
+            ["shift", "attempt to shift left with overflow", "src/"],
+        ),
+        ("7 / x", ["divides", "attempt to divide by zero", "src/"]),
+        ("table[(i", ["beyond", "out of", "src/"]),
+    ] {
+        says(&words);
+        says(&[words[0], &line(source)]);
+    }
+    says(&[
+        "order",
+        "depends on the order of the invocations",
+        "unordered",
+    ]);
+    says(&["endless", "was ended after 2 s"]);
+    assert!(said.contains("10 kernels: 9 with faults"), "{said}");
 }

@@ -16,4 +16,5 @@ pub mod execute;
 pub mod intervals;
 pub mod numbers;
 pub mod panics;
+pub mod sanitize;
 pub mod translate;

@@ -4,6 +4,7 @@ use std::io::{self, Read, Write};
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::inputs;
+use hankel_dsl::native::sanitize::Order;
 use hankel_dsl::native::{Arg, Call, Mode, Sampler, TextureMut, TextureRef};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,7 @@ pub(super) struct Request {
     pub kernel: usize,
     lanes: bool,
     parallel: bool,
+    sanitize: Option<Order>,
     constants: Vec<u32>,
     shapes: Vec<Shape>,
 }
@@ -127,6 +129,7 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         kernel,
         lanes: call.mode.lanes,
         parallel: call.mode.parallel,
+        sanitize: call.mode.sanitize,
         constants: call.constants.clone(),
         shapes: shapes.collect(),
     };
@@ -213,6 +216,7 @@ impl Arrived {
             mode: Mode {
                 lanes: self.request.lanes,
                 parallel: self.request.parallel,
+                sanitize: self.request.sanitize,
             },
         }
     }

@@ -8,7 +8,7 @@ use core::sync::atomic::AtomicU32;
 /// A buffer of integers (`u32`, or `i32`) on which only atomic operations work. Each operation
 /// returns the value that was there before.
 ///
-/// The order in which invocations come is nobody's to know. A sum, a minimum or a set of bits does
+/// The order of invocations is undefined. A sum, a minimum or a set of bits does
 /// not depend on it; the values returned on the way do, and so does `exchange`. Where they decide
 /// *where* something is written, say so of that buffer: `#[storage(unordered)]`.
 ///
@@ -143,9 +143,11 @@ mod spirv {
 #[cfg(not(target_arch = "spirv"))]
 mod host {
     use core::marker::PhantomData;
+    use core::panic::Location;
     use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
     use super::Atomics;
+    use crate::native::sanitize::{self, Access, Space};
 
     /// An integer with atomic operations: `u32` and `i32`.
     #[diagnostic::on_unimplemented(
@@ -202,6 +204,7 @@ mod host {
         ($($(#[$doc:meta])* $name:ident = $function:ident;)*) => {$(
             $(#[$doc])*
             #[inline]
+            #[track_caller]
             pub fn $name(self, i: u32, value: T) -> T {
                 T::from_bits(self.slot(i).$function(value.to_bits(), Relaxed))
             }
@@ -226,14 +229,20 @@ mod host {
         }
 
         #[inline]
+        #[track_caller]
         fn slot(self, i: u32) -> &'a AtomicU32 {
             match self.0.get(i as usize) {
-                Some(slot) => slot,
+                Some(slot) => {
+                    let words = core::slice::from_ref(slot);
+                    sanitize::look(Space::Storage, Access::Atomic, words, Location::caller());
+                    slot
+                }
                 None => crate::storage::out_of_range(i, self.0.len()),
             }
         }
 
         #[inline]
+        #[track_caller]
         fn update(self, i: u32, new: impl Fn(T) -> T) -> T {
             let slot = self.slot(i);
             let mut old = slot.load(Relaxed);
@@ -263,17 +272,20 @@ mod host {
 
         /// Lowers integer `i` to `value` if it is larger. Returns what was there.
         #[inline]
+        #[track_caller]
         pub fn min(self, i: u32, value: T) -> T {
             self.update(i, |old| old.least(value))
         }
         /// Raises integer `i` to `value` if it is smaller. Returns what was there.
         #[inline]
+        #[track_caller]
         pub fn max(self, i: u32, value: T) -> T {
             self.update(i, |old| old.most(value))
         }
         /// Puts `value` in the place of integer `i` if that is `expected`. Returns what was there:
         /// `expected`, if the exchange took place.
         #[inline]
+        #[track_caller]
         pub fn compare_exchange(self, i: u32, expected: T, value: T) -> T {
             let (expected, value) = (expected.to_bits(), value.to_bits());
             let result = self
@@ -283,12 +295,14 @@ mod host {
         }
         /// Integer `i` as it is now.
         #[inline]
+        #[track_caller]
         #[must_use]
         pub fn load(self, i: u32) -> T {
             T::from_bits(self.slot(i).load(Relaxed))
         }
         /// Overwrites integer `i`.
         #[inline]
+        #[track_caller]
         pub fn store(self, i: u32, value: T) {
             self.slot(i).store(value.to_bits(), Relaxed);
         }

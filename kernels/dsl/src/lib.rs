@@ -49,7 +49,7 @@
 //! # fn main() {}
 //! ```
 //! A kernel with a `StorageMut` or `Atomics` writes where it
-//! likes; that its invocations do not race is the author's to see to.
+//! likes; its invocations must not race, which `hankel sanitize` checks.
 //! ```
 //! use hankel_dsl::{Atomics, StorageMut, kernel};
 //!

@@ -3,7 +3,12 @@
 #[cfg(not(target_arch = "spirv"))]
 use core::marker::PhantomData;
 #[cfg(not(target_arch = "spirv"))]
+use core::panic::Location;
+#[cfg(not(target_arch = "spirv"))]
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+#[cfg(not(target_arch = "spirv"))]
+use crate::native::sanitize::{self, Access, Space};
 
 /// What memory that is written can hold: any [`Element`](macro@crate::Element), number or vector.
 #[cfg(target_arch = "spirv")]
@@ -20,7 +25,7 @@ impl<T: bytemuck::Pod> Stored for T {}
 /// A buffer that every invocation may read and write anywhere.
 ///
 /// What one invocation writes, no other invocation of the same dispatch may read or write, unless
-/// a barrier lies between the two: who comes first is nobody's to know. Integers that several
+/// a barrier lies between the two: which comes first is undefined. Integers that several
 /// invocations change belong in [`Atomics`](crate::Atomics).
 ///
 /// `i` must be less than [`StorageMut::len`]. A shader does not test that, unless it was exported
@@ -105,21 +110,26 @@ impl<'a, T: Stored> StorageMut<'a, T> {
     }
 
     #[inline(always)]
-    fn slots(self, i: u32) -> &'a [AtomicU32] {
+    #[track_caller]
+    fn slots(self, i: u32, access: Access) -> &'a [AtomicU32] {
         let start = i as usize * Self::WORDS;
         match self.0.get(start..start + Self::WORDS) {
-            Some(slots) => slots,
+            Some(slots) => {
+                sanitize::look(Space::Storage, access, slots, Location::caller());
+                slots
+            }
             None => out_of_range(i, self.0.len() / Self::WORDS),
         }
     }
 
     /// Element `i`.
     #[inline(always)]
+    #[track_caller]
     #[must_use]
     pub fn get(self, i: u32) -> T {
         let mut value = T::zeroed();
         let words: &mut [u32] = bytemuck::cast_slice_mut(bytemuck::bytes_of_mut(&mut value));
-        for (word, slot) in words.iter_mut().zip(self.slots(i)) {
+        for (word, slot) in words.iter_mut().zip(self.slots(i, Access::Read)) {
             *word = slot.load(Relaxed);
         }
         value
@@ -127,9 +137,10 @@ impl<'a, T: Stored> StorageMut<'a, T> {
 
     /// Overwrites element `i`.
     #[inline(always)]
+    #[track_caller]
     pub fn set(self, i: u32, value: T) {
         let words: &[u32] = bytemuck::cast_slice(bytemuck::bytes_of(&value));
-        for (word, slot) in words.iter().zip(self.slots(i)) {
+        for (word, slot) in words.iter().zip(self.slots(i, Access::Write)) {
             slot.store(*word, Relaxed);
         }
     }
@@ -139,6 +150,7 @@ impl<'a, T: Stored> StorageMut<'a, T> {
 #[cfg(not(target_arch = "spirv"))]
 #[cold]
 #[inline(never)]
+#[track_caller]
 pub(crate) fn out_of_range(i: u32, len: usize) -> ! {
     panic!("index {i} is out of range: the memory has {len} elements")
 }

@@ -126,8 +126,9 @@ macro_rules! textures {
             }
             /// Writes the texel at `at`, which must lie inside. A shader does not test that, unless
             /// it was exported with bounds checks; the native device does, and reports the kernel.
-            /// What several invocations write to one texel is whose comes last.
+            /// No two invocations write the same texel: which comes last is undefined.
             #[inline]
+            #[track_caller]
             pub fn store(self, at: $at, value: F::Value)
             where
                 F::Value: Texel<Channels: crate::native::exec::Channels>,

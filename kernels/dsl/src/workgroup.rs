@@ -90,8 +90,10 @@ mod spirv {
 mod host {
     use core::cell::Cell;
     use core::marker::PhantomData;
+    use core::panic::Location;
 
     use super::{AtomicInteger, Shared, SharedAtomics, Stored};
+    use crate::native::sanitize::{self, Access, Space};
     use crate::storage::out_of_range;
 
     /// Waits until all invocations of the workgroup are here; what they wrote to [`Shared`] memory
@@ -130,24 +132,31 @@ mod host {
         }
 
         #[inline(always)]
-        fn slot(self, i: u32) -> &'a Cell<T> {
+        #[track_caller]
+        fn slot(self, i: u32, access: Access) -> &'a Cell<T> {
             match self.0.get(i as usize) {
-                Some(slot) => slot,
+                Some(slot) => {
+                    let words = core::slice::from_ref(slot);
+                    sanitize::look(Space::Workgroup, access, words, Location::caller());
+                    slot
+                }
                 None => out_of_range(i, N),
             }
         }
 
         /// Element `i`.
         #[inline(always)]
+        #[track_caller]
         #[must_use]
         pub fn get(self, i: u32) -> T {
-            self.slot(i).get()
+            self.slot(i, Access::Read).get()
         }
 
         /// Overwrites element `i`.
         #[inline(always)]
+        #[track_caller]
         pub fn set(self, i: u32, value: T) {
-            self.slot(i).set(value);
+            self.slot(i, Access::Write).set(value);
         }
     }
 
@@ -155,8 +164,9 @@ mod host {
         ($($(#[$doc:meta])* $name:ident = |$old:ident, $value:ident| $new:expr;)*) => {$(
             $(#[$doc])*
             #[inline]
+            #[track_caller]
             pub fn $name(self, i: u32, value: T) -> T {
-                self.update(i, |$old| {
+                self.update(i, Access::Atomic, |$old| {
                     let $value = value.to_bits();
                     $new
                 })
@@ -172,10 +182,13 @@ mod host {
         }
 
         #[inline]
-        fn update(self, i: u32, new: impl Fn(u32) -> u32) -> T {
+        #[track_caller]
+        fn update(self, i: u32, access: Access, new: impl Fn(u32) -> u32) -> T {
             let Some(slot) = self.0.get(i as usize) else {
                 out_of_range(i, N)
             };
+            let words = core::slice::from_ref(slot);
+            sanitize::look(Space::Workgroup, access, words, Location::caller());
             let old = slot.get();
             slot.set(new(old));
             T::from_bits(old)
@@ -202,8 +215,9 @@ mod host {
 
         /// Puts `value` in the place of integer `i` if that is `expected`. Returns what was there.
         #[inline]
+        #[track_caller]
         pub fn compare_exchange(self, i: u32, expected: T, value: T) -> T {
-            self.update(i, |old| {
+            self.update(i, Access::Atomic, |old| {
                 if old == expected.to_bits() {
                     value.to_bits()
                 } else {
@@ -213,14 +227,16 @@ mod host {
         }
         /// Integer `i` as it is now.
         #[inline]
+        #[track_caller]
         #[must_use]
         pub fn load(self, i: u32) -> T {
-            self.update(i, |old| old)
+            self.update(i, Access::Atomic, |old| old)
         }
         /// Overwrites integer `i`.
         #[inline]
+        #[track_caller]
         pub fn store(self, i: u32, value: T) {
-            self.update(i, |_| value.to_bits());
+            self.update(i, Access::AtomicStore, |_| value.to_bits());
         }
     }
 }

@@ -179,13 +179,14 @@ impl Kernel {
             .filter_map(|p| match &p.role {
                 Role::Shared { ty, length, atomic } => {
                     let (name, memory) = (&p.name, memory(p));
+                    let text = name.to_string();
                     let (word, handle) = if *atomic {
                         (quote!(u32), quote!(SharedAtomics))
                     } else {
                         (quote!(#ty), quote!(Shared))
                     };
                     Some((
-                        quote!(let #memory = workgroup::memory::<#word, #length>();),
+                        quote!(let #memory = workgroup::memory::<#word, #length>(#text);),
                         quote! {
                             let #name = ::hankel_dsl::#handle::<#ty, #length>::new(&#memory);
                         },

@@ -337,7 +337,7 @@ impl Kernel {
         };
         quote! {
             fn run(call: &mut native::Call<'_>) -> Result<(), native::CallError> {
-                let mode = call.mode;
+                let (mode, _session) = native::sanitize::begin(call.mode);
                 let mut args = exec::Args::take(call, #count, #constants)?;
                 #(#takes)*
                 #body

@@ -182,7 +182,11 @@ fn times(entry: &Entry, rows: usize) -> Times {
             let mut call = Call {
                 args,
                 constants: Vec::new(),
-                mode: Mode { lanes, parallel },
+                mode: Mode {
+                    lanes,
+                    parallel,
+                    ..Mode::REFERENCE
+                },
             };
             let start = Instant::now();
             (entry.run)(&mut call).expect("the arguments fit");

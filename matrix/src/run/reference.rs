@@ -11,7 +11,7 @@ use hankel_host::device::{DeviceError, NativeDevice};
 use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
 use hankel_host::parity::intervals::Intervals;
-use hankel_host::parity::panics;
+use hankel_host::parity::{panics, sanitize};
 use rayon::prelude::*;
 
 use super::Request;
@@ -88,7 +88,16 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
             .map(|case| run(mode, case).map_err(|e| explained(case, e)))
             .collect()
     };
-    let reference = natively(Mode::REFERENCE);
+    // Where invocations can meet, the reference is a sanitized run, in three orders.
+    let reference = if sanitize::meets(kernel) && problem.is_none() {
+        let checked = prepared.cases.iter().map(|case| {
+            sanitize::check(kernel, case, run)
+                .map_err(|fault| format!("{}: {fault}", case.called()))
+        });
+        checked.collect()
+    } else {
+        natively(Mode::REFERENCE)
+    };
     let flushed = request
         .columns
         .iter()

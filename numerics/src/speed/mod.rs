@@ -462,7 +462,14 @@ impl Run<'_> {
                     if !parallel || (lanes && threads > 1) {
                         contestants.push((
                             Timing::new::<T>(*solver, n, path, threads),
-                            Contestant::Here(i, Mode { lanes, parallel }),
+                            Contestant::Here(
+                                i,
+                                Mode {
+                                    lanes,
+                                    parallel,
+                                    ..Mode::REFERENCE
+                                },
+                            ),
                         ));
                     }
                 }

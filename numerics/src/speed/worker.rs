@@ -91,7 +91,7 @@ fn answer(request: Request, kernels: &mut Vec<Native>) -> Result<Answer, SpeedEr
         Request::Time(index) => match kernels.get_mut(index) {
             Some(kernel) => Ok(Answer::Seconds(kernel.time(Mode {
                 lanes: true,
-                parallel: false,
+                ..Mode::REFERENCE
             })?)),
             None => Ok(Answer::Failed(format!("there is no kernel {index}"))),
         },

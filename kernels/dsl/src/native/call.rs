@@ -7,6 +7,7 @@ use std::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::describe::TexelFormat;
+use super::sanitize::Order;
 
 /// An argument: first those of the parameters that are bound to something, in their order
 /// (constants, built-ins and workgroup memory take none), then one for each output.
@@ -243,6 +244,9 @@ pub struct Mode {
     pub lanes: bool,
     /// Use all cores (rayon's global pool).
     pub parallel: bool,
+    /// Look at every access to memory that is written, with the invocations in this order
+    /// ([`sanitize`](super::sanitize)): one thread, no lanes, whatever else is said.
+    pub sanitize: Option<Order>,
 }
 
 impl Default for Mode {
@@ -250,6 +254,7 @@ impl Default for Mode {
         Self {
             lanes: true,
             parallel: true,
+            sanitize: None,
         }
     }
 }
@@ -259,7 +264,17 @@ impl Mode {
     pub const REFERENCE: Self = Self {
         lanes: false,
         parallel: false,
+        sanitize: None,
     };
+
+    /// One thread, with every access looked at.
+    #[must_use]
+    pub const fn sanitized(order: Order) -> Self {
+        Self {
+            sanitize: Some(order),
+            ..Self::REFERENCE
+        }
+    }
 }
 
 /// A call.

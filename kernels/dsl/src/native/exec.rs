@@ -2,6 +2,7 @@
 //! invocations.
 
 use core::any::Any;
+use core::panic::Location;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::string::{String, ToString};
@@ -16,6 +17,7 @@ use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef, t
 use super::describe::{TexelFormat, TextureKind};
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
+use super::sanitize::{self, Access, Space};
 use crate::math::Elementary;
 use crate::{Real, Texel};
 
@@ -107,6 +109,7 @@ impl<'a> Args<'a> {
             }
         };
         if size_of_val(words).is_multiple_of(size) {
+            sanitize::name(name, words, size);
             Ok(words)
         } else {
             Err(CallError::Size {
@@ -128,10 +131,12 @@ impl<'a> Args<'a> {
             format,
             bytes,
         } = self.texture_mut(name, format)?;
+        let words = shared_words(name, bytes, format.bytes())?;
+        sanitize::name(name, words, format.bytes());
         Ok(Texels {
             size,
             format,
-            words: shared_words(name, bytes, format.bytes())?,
+            words,
         })
     }
 
@@ -249,6 +254,7 @@ impl Texels<'_> {
 
     /// Writes the texel at `at`, which lies inside.
     #[inline]
+    #[track_caller]
     pub fn store<T: Texel<Channels: Channels>>(self, at: UVec3, texel: T) {
         let [width, height, _] = self.size.map(|n| n as usize);
         let i = (at.z as usize * height + at.y as usize) * width + at.x as usize;
@@ -257,7 +263,9 @@ impl Texels<'_> {
         texel
             .channels()
             .store(self.format, bytemuck::cast_slice_mut(&mut texel_words));
-        for (word, slot) in texel_words.iter().zip(&self.words[i * count..][..count]) {
+        let slots = &self.words[i * count..][..count];
+        sanitize::look(Space::Storage, Access::Write, slots, Location::caller());
+        for (word, slot) in texel_words.iter().zip(slots) {
             slot.store(*word, Relaxed);
         }
     }
@@ -318,8 +326,14 @@ pub fn count(extent: [u32; 3]) -> Result<usize, CallError> {
 
 /// Runs the loops; a kernel's panic becomes an error.
 pub(super) fn guard(f: impl FnOnce()) -> Result<(), CallError> {
-    catch_unwind(AssertUnwindSafe(f)).map_err(|payload| CallError::Panic {
-        message: message(payload.as_ref()),
+    catch_unwind(AssertUnwindSafe(f)).map_err(|payload| {
+        let message = message(payload.as_ref());
+        CallError::Panic {
+            message: match sanitize::panicked_at() {
+                Some(place) => format!("{message}, at {place}"),
+                None => message,
+            },
+        }
     })
 }
 
@@ -381,7 +395,14 @@ pub fn for_each(
         }
     };
     guard(|| {
-        if mode.parallel {
+        if let Some(order) = sanitize::order(count) {
+            for j in order {
+                let (line, x) = (j / row as u32, j % row as u32);
+                let at = UVec3::new(x, line % height as u32, line / height as u32);
+                sanitize::enter_alone(at, j);
+                chunk(j as usize, j as usize + 1);
+            }
+        } else if mode.parallel {
             (0..count.div_ceil(CHUNK))
                 .into_par_iter()
                 .for_each(|i| chunk(i * CHUNK, count.min((i + 1) * CHUNK)));

@@ -8,13 +8,14 @@ use core::cell::RefCell;
 use core::panic::Location;
 use std::boxed::Box;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::thread_local;
 use std::vec::Vec;
+use std::{format, thread_local};
 
 use glam::{Vec3, Vec4};
 
 use super::call::{CallError, Mode};
 use super::exec::{Slices, guard, some_of_range};
+use super::sanitize::refuse;
 
 /// Columns of the target that invocations are laid out in.
 pub const COLUMNS: u32 = 64;
@@ -98,15 +99,18 @@ pub fn discard() -> ! {
 fn exchange(value: Vec4, place: &'static Location<'static>) -> ([Vec4; 4], usize) {
     let known = QUAD.with_borrow_mut(|quad| {
         let Some(lane) = quad.lane else {
-            panic!("a derivative outside of a fragment kernel, at {place}");
+            refuse(format!(
+                "a derivative outside of a fragment kernel, at {place}"
+            ));
         };
         match quad.taken.get(quad.next) {
             Some(taken) => {
-                assert!(
-                    taken.place == place,
-                    "derivatives in control flow that is not the same for a quad: one fragment comes to {}, another to {place}",
-                    taken.place
-                );
+                if taken.place != place {
+                    refuse(format!(
+                        "derivatives in control flow that is not the same for a quad: one fragment comes to {}, another to {place}",
+                        taken.place
+                    ));
+                }
                 quad.next += 1;
                 Some((taken.values, lane))
             }
@@ -187,8 +191,9 @@ fn begin<T>(lane: usize, call: impl FnOnce() -> T) -> Ended<T> {
 
 #[cold]
 fn diverged() -> ! {
-    panic!(
+    refuse(
         "a derivative in control flow that is not the same for a quad: one of its fragments takes it, another ends or is discarded before"
+            .into(),
     )
 }
 

@@ -14,6 +14,7 @@ pub mod lanes;
 pub mod layout;
 pub mod plugin;
 pub(crate) mod sampling;
+pub mod sanitize;
 pub mod texel;
 mod transpose;
 #[doc(hidden)]

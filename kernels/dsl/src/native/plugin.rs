@@ -21,6 +21,7 @@ use super::call::{
 };
 use super::describe::Kernel;
 use super::inputs::{Given, Make, Request};
+use super::sanitize::Order;
 use super::texel::FORMATS;
 
 /// Version of what crosses the border.
@@ -58,6 +59,8 @@ pub struct RawCall {
     kernel: u32,
     lanes: u32,
     parallel: u32,
+    /// [`Order::code`] of a sanitized run, else 0.
+    sanitize: u32,
     args: *const RawArg,
     arg_count: usize,
     constants: *const u32,
@@ -247,6 +250,7 @@ pub unsafe fn run(
             mode: Mode {
                 lanes: call.lanes != 0,
                 parallel: call.parallel != 0,
+                sanitize: Order::of_code(call.sanitize),
             },
         })
         .map_err(|e| e.to_string()),
@@ -415,6 +419,7 @@ impl Plugin {
             kernel: u32::try_from(index).unwrap_or(u32::MAX),
             lanes: call.mode.lanes.into(),
             parallel: call.mode.parallel.into(),
+            sanitize: call.mode.sanitize.map_or(0, Order::code),
             args: args.as_ptr(),
             arg_count: args.len(),
             constants: call.constants.as_ptr(),

@@ -17,13 +17,15 @@ use rayon::prelude::*;
 
 use super::call::{CallError, Mode};
 use super::exec::guard;
+use super::sanitize::{self, Space};
 use crate::Stored;
 
 /// Workgroup memory, filled with what nobody expects: it is to be written before it is read.
-pub fn memory<T: Stored, const N: usize>() -> Box<[Cell<T>; N]> {
+pub fn memory<T: Stored, const N: usize>(name: &'static str) -> Box<[Cell<T>; N]> {
     let mut value = T::zeroed();
     bytemuck::bytes_of_mut(&mut value).fill(0xa5);
     let slots: Box<[Cell<T>]> = (0..N).map(|_| Cell::new(value)).collect();
+    sanitize::name(name, &slots, size_of::<T>());
     match slots.try_into() {
         Ok(slots) => slots,
         Err(_) => unreachable!("it has N slots"),
@@ -112,7 +114,12 @@ pub fn for_each_group(
         });
     };
     guard(|| {
-        if mode.parallel {
+        if let Some(order) = sanitize::order(all) {
+            for number in order {
+                sanitize::begin_group(number);
+                one(number as usize);
+            }
+        } else if mode.parallel {
             (0..all).into_par_iter().for_each(one);
         } else {
             (0..all).for_each(one);
@@ -124,51 +131,66 @@ impl Workgroup {
     /// Runs its invocations, each the future that `make` gives, from barrier to barrier.
     pub fn run<F: Future<Output = ()>>(&self, make: impl Fn(Invocation) -> F) {
         let [width, height, depth] = self.threads.to_array();
-        let mut futures = Vec::with_capacity((width * height * depth) as usize);
+        let count = (width * height * depth) as usize;
+        let mut futures = Vec::with_capacity(count);
+        let order = sanitize::order(count);
+        let mut places = Vec::new();
         for z in 0..depth {
             for y in 0..height {
                 for x in 0..width {
                     let local = UVec3::new(x, y, z);
                     let it = Invocation::of(self.id, local, self.extent, self.threads);
+                    if order.is_some() {
+                        places.push(it.at);
+                    }
                     futures.push(make(it));
                 }
             }
         }
         let mut context = Context::from_waker(Waker::noop());
         loop {
-            let mut first = None;
-            for (i, future) in futures.iter_mut().enumerate() {
+            let mut first = (0, None);
+            for turn in 0..count {
+                let i = order.as_ref().map_or(turn, |order| order[turn] as usize);
+                if let Some(at) = places.get(i) {
+                    sanitize::enter(*at);
+                }
                 WAITS.set(None);
                 // SAFETY: the futures stay where they are until all of them are dropped: the vector
                 // is neither grown nor moved from here on.
-                let future = unsafe { Pin::new_unchecked(future) };
+                let future = unsafe { Pin::new_unchecked(&mut futures[i]) };
                 let waits = match future.poll(&mut context) {
                     Poll::Ready(()) => None,
                     Poll::Pending => WAITS.get(),
                 };
-                if i == 0 {
-                    first = waits;
-                } else if !same(first, waits) {
-                    self.diverged(i as u32, first, waits);
+                if turn == 0 {
+                    first = (i, waits);
+                } else if !same(first.1, waits) {
+                    self.diverged(first, (i, waits));
                 }
             }
-            if first.is_none() {
-                return;
+            match first.1 {
+                None => return,
+                Some(wait) => sanitize::passed(wait.orders),
             }
         }
     }
 
     #[cold]
-    fn diverged(&self, i: u32, first: Place, other: Place) -> ! {
+    fn diverged(&self, first: (usize, Option<Wait>), other: (usize, Option<Wait>)) -> ! {
         let (x, y) = (self.threads.x, self.threads.y);
-        let local = UVec3::new(i % x, i / x % y, i / (x * y));
-        panic!(
-            "a barrier in control flow that is not uniform: in workgroup {}, invocation (0, 0, 0) {}, but invocation {} {}",
+        let local = |i: usize| {
+            let i = i as u32;
+            triple(UVec3::new(i % x, i / x % y, i / (x * y)))
+        };
+        sanitize::refuse(format!(
+            "a barrier in control flow that is not uniform: in workgroup {}, invocation {} {}, but invocation {} {}",
             triple(self.id),
-            state(first),
-            triple(local),
-            state(other)
-        )
+            local(first.0),
+            state(first.1),
+            local(other.0),
+            state(other.1)
+        ))
     }
 }
 
@@ -176,33 +198,37 @@ fn triple(at: UVec3) -> String {
     format!("({}, {}, {})", at.x, at.y, at.z)
 }
 
-fn state(place: Place) -> String {
-    match place {
-        Some(place) => format!("waits at {place}"),
+fn state(wait: Option<Wait>) -> String {
+    match wait {
+        Some(wait) => format!("waits at {}", wait.place),
         None => "has ended".into(),
     }
 }
 
-/// Where an invocation waits; none if it has ended.
-type Place = Option<&'static Location<'static>>;
+/// Where an invocation waits.
+#[derive(Clone, Copy, Debug)]
+struct Wait {
+    place: &'static Location<'static>,
+    orders: Space,
+}
 
-fn same(a: Place, b: Place) -> bool {
+fn same(a: Option<Wait>, b: Option<Wait>) -> bool {
     match (a, b) {
-        (Some(a), Some(b)) => core::ptr::eq(a, b) || a == b,
+        (Some(a), Some(b)) => core::ptr::eq(a.place, b.place) || a.place == b.place,
         (None, None) => true,
         _ => false,
     }
 }
 
 thread_local! {
-    /// The barrier at which the invocation that just yielded waits.
-    static WAITS: Cell<Place> = const { Cell::new(None) };
+    /// The barrier at which the invocation that just yielded waits; none if it has ended.
+    static WAITS: Cell<Option<Wait>> = const { Cell::new(None) };
 }
 
 /// A barrier in the twin of a kernel.
 #[derive(Debug)]
 pub struct Barrier {
-    place: &'static Location<'static>,
+    wait: Wait,
     passed: bool,
 }
 
@@ -215,7 +241,7 @@ impl Future for Barrier {
             return Poll::Ready(());
         }
         self.passed = true;
-        WAITS.set(Some(self.place));
+        WAITS.set(Some(self.wait));
         Poll::Pending
     }
 }
@@ -225,10 +251,7 @@ impl Future for Barrier {
 #[track_caller]
 #[must_use]
 pub fn barrier() -> Barrier {
-    Barrier {
-        place: Location::caller(),
-        passed: false,
-    }
+    waiting(Space::Workgroup, Location::caller())
 }
 
 /// What stands for [`storage_barrier`](crate::storage_barrier) in the twin.
@@ -236,5 +259,12 @@ pub fn barrier() -> Barrier {
 #[track_caller]
 #[must_use]
 pub fn storage_barrier() -> Barrier {
-    barrier()
+    waiting(Space::Storage, Location::caller())
+}
+
+const fn waiting(orders: Space, place: &'static Location<'static>) -> Barrier {
+    Barrier {
+        wait: Wait { place, orders },
+        passed: false,
+    }
 }

@@ -1,0 +1,284 @@
+//! The sanitizer: a planted fault of each kind is found, with the lines and the invocations, and
+//! what is right is left alone.
+
+use hankel_dsl::format::R32Uint;
+use hankel_dsl::glam::UVec2;
+use hankel_dsl::native::sanitize::Order;
+use hankel_dsl::native::{Arg, Call, CallError, Mode, TextureMut};
+use hankel_dsl::{
+    Atomics, Shared, SharedAtomics, StorageMut, StorageTexture2d, barrier, kernel, storage_barrier,
+};
+
+/// Reads what its neighbour writes.
+#[kernel(compute, threads(8), range(8))]
+fn neighbour(#[index] i: u32, #[storage] sums: StorageMut<'_, u32>) {
+    sums.set(i, i);
+    sums.set(i, sums.get((i + 1) % 8));
+}
+
+/// Two invocations write one element.
+#[kernel(compute, threads(8), range(8))]
+fn both(#[index] i: u32, #[storage] sums: StorageMut<'_, UVec2>) {
+    sums.set(i / 2, UVec2::new(i, i));
+}
+
+/// The same, counted by atomic operations.
+#[kernel(compute, threads(8), range(8))]
+fn counted(#[index] i: u32, #[atomic] sums: Atomics<'_>) {
+    sums.add(i / 2, i);
+}
+
+/// Reads its neighbour's element without a barrier.
+#[kernel(compute, threads(8), range(16))]
+fn no_barrier(#[local_index] me: u32, #[shared] tile: Shared<'_, u32, 8>) -> u32 {
+    tile.set(me, me);
+    tile.get(me ^ 1)
+}
+
+/// With one, but overwrites it before the neighbour has read it.
+#[kernel(compute, threads(8), range(16))]
+fn one_barrier(#[local_index] me: u32, #[shared] tile: Shared<'_, u32, 8>) -> u32 {
+    tile.set(me, me);
+    barrier();
+    let other = tile.get(me ^ 1);
+    tile.set(me, other);
+    other
+}
+
+/// As it should be.
+#[kernel(compute, threads(8), range(16))]
+fn two_barriers(#[local_index] me: u32, #[shared] tile: Shared<'_, u32, 8>) -> u32 {
+    tile.set(me, me);
+    barrier();
+    let other = tile.get(me ^ 1);
+    barrier();
+    tile.set(me, other);
+    barrier();
+    tile.get(7 - me)
+}
+
+/// A barrier of the wrong kind: it orders workgroup memory, not the buffer.
+#[kernel(compute, threads(8), range(8))]
+fn wrong_barrier(#[local_index] me: u32, #[storage] all: StorageMut<'_, u32>) -> u32 {
+    all.set(me, me);
+    barrier();
+    all.get(7 - me)
+}
+
+/// The right one.
+#[kernel(compute, threads(8), range(8))]
+fn right_barrier(#[local_index] me: u32, #[storage] all: StorageMut<'_, u32>) -> u32 {
+    all.set(me, me);
+    storage_barrier();
+    all.get(7 - me)
+}
+
+/// The right one, but the other element is another workgroup's.
+#[kernel(compute, threads(8), range(16))]
+fn other_group(#[index] i: u32, #[storage] all: StorageMut<'_, u32>) -> u32 {
+    all.set(i, i);
+    storage_barrier();
+    all.get(15 - i)
+}
+
+/// Reads workgroup memory that nobody wrote.
+#[kernel(compute, threads(8), range(8))]
+fn unwritten(#[local_index] me: u32, #[shared] tile: Shared<'_, u32, 8>) -> u32 {
+    if me > 2 {
+        tile.set(me, me);
+    }
+    barrier();
+    tile.get(me)
+}
+
+/// Counts in workgroup memory that one invocation writes at the start, which nothing orders.
+#[kernel(compute, threads(8), range(8))]
+fn not_yet(#[local_index] me: u32, #[shared] count: SharedAtomics<'_, u32, 1>) -> u32 {
+    if me == 0 {
+        count.store(0, 0);
+    }
+    count.add(0, 1);
+    barrier();
+    count.load(0)
+}
+
+/// Two invocations write one texel.
+#[kernel(compute, threads(8), range(8))]
+fn texel(#[index] i: u32, #[texture] marks: StorageTexture2d<'_, R32Uint>) {
+    marks.store(UVec2::new(i / 2, 1), i);
+}
+
+/// Writes beyond the end.
+#[kernel(compute, threads(8), range(8))]
+fn beyond(#[index] i: u32, #[storage] all: StorageMut<'_, u32>) {
+    all.set(i * 3, i);
+}
+
+hankel_dsl::kernels![
+    neighbour,
+    both,
+    counted,
+    no_barrier,
+    one_barrier,
+    two_barriers,
+    wrong_barrier,
+    right_barrier,
+    other_group,
+    unwritten,
+    not_yet,
+    texel,
+    beyond
+];
+
+/// Runs a kernel with `counts` words for each thing that it writes.
+fn run<const N: usize>(
+    name: &str,
+    counts: [usize; N],
+    order: Order,
+) -> Result<[Vec<u32>; N], String> {
+    let entry = entries().into_iter().find(|e| e.kernel.name == name);
+    let mut written = counts.map(|n| vec![0_u32; n]);
+    let result = (entry.unwrap().run)(&mut Call {
+        args: written
+            .iter_mut()
+            .map(|it| Arg::BytesMut(bytemuck::cast_slice_mut(it)))
+            .collect(),
+        constants: vec![],
+        mode: Mode::sanitized(order),
+    });
+    match result {
+        Ok(()) => Ok(written),
+        Err(CallError::Panic { message }) => Err(message),
+        Err(other) => panic!("{other}"),
+    }
+}
+
+/// What is found whatever the order.
+fn fault<const N: usize>(name: &str, counts: [usize; N]) -> String {
+    for order in [Order::Descending, Order::Shuffled(3)] {
+        run(name, counts, order).unwrap_err();
+    }
+    run(name, counts, Order::Ascending).unwrap_err()
+}
+
+/// The line of this file that holds a text, counted from 1.
+fn line(text: &str) -> usize {
+    let all = include_str!("sanitize.rs");
+    all.lines().position(|line| line.contains(text)).unwrap() + 1
+}
+
+#[test]
+fn races_in_buffers_are_named_with_both_lines() {
+    let message = fault("neighbour", [8]);
+    let (write, read) = (line("sums.set(i, i);"), line("sums.get((i + 1) % 8)"));
+    for part in [
+        "data race: invocation (0, 0, 0) reads element 1 of `sums`",
+        &format!("sanitize.rs:{read}:"),
+        "and invocation (1, 0, 0) writes it",
+        &format!("sanitize.rs:{write}:"),
+        "Atomics",
+    ] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    let message = fault("both", [8]);
+    assert!(
+        message.contains("(0, 0, 0) writes element 0 of `sums`")
+            && message.contains("(1, 0, 0) writes it"),
+        "{message}"
+    );
+    assert_eq!(
+        run("counted", [4], Order::Ascending).unwrap()[0],
+        [1, 5, 9, 13]
+    );
+}
+
+#[test]
+fn races_in_workgroup_memory_want_a_barrier() {
+    // Its neighbour has not run yet.
+    let message = fault("no_barrier", [16]);
+    assert!(message.contains("reads element 1 of `tile`"), "{message}");
+    assert!(message.contains("put a barrier() between"), "{message}");
+    let message = fault("one_barrier", [16]);
+    let (read, write) = (
+        line("let other = tile.get(me ^ 1);"),
+        line("tile.set(me, other);"),
+    );
+    assert!(
+        message.contains(&format!("sanitize.rs:{read}:")),
+        "{message}"
+    );
+    assert!(
+        message.contains(&format!("sanitize.rs:{write}:")),
+        "{message}"
+    );
+    for order in Order::ALL {
+        let [out] = run("two_barriers", [16], order).unwrap();
+        assert_eq!(out[..8], [6, 7, 4, 5, 2, 3, 0, 1]);
+    }
+}
+
+#[test]
+fn a_barrier_orders_its_own_memory_within_its_workgroup() {
+    let message = fault("wrong_barrier", [8, 8]);
+    assert!(
+        message.contains("put a storage_barrier() between"),
+        "{message}"
+    );
+    for order in Order::ALL {
+        assert_eq!(run("right_barrier", [8, 8], order).unwrap()[1][0], 7);
+    }
+    let message = fault("other_group", [16, 16]);
+    assert!(
+        message.contains("nothing orders two workgroups"),
+        "{message}"
+    );
+}
+
+#[test]
+fn workgroup_memory_is_written_before_it_is_read() {
+    let message = fault("unwritten", [8]);
+    assert!(message.contains("of `tile`"), "{message}");
+    assert!(message.contains("before anything was written"), "{message}");
+    // In ascending order it happens to be written in time.
+    run("not_yet", [8], Order::Ascending).unwrap();
+    let message = run("not_yet", [8], Order::Descending).unwrap_err();
+    assert!(message.contains("before anything was written"), "{message}");
+}
+
+#[test]
+fn a_texel_has_one_writer() {
+    let entry = entries().into_iter().find(|e| e.kernel.name == "texel");
+    let mut bytes = [0_u32; 8];
+    let result = (entry.unwrap().run)(&mut Call {
+        args: vec![Arg::TextureMut(TextureMut {
+            size: [4, 2, 1],
+            format: hankel_dsl::native::describe::TexelFormat::R32Uint,
+            bytes: bytemuck::cast_slice_mut(&mut bytes),
+        })],
+        constants: vec![],
+        mode: Mode::sanitized(Order::Ascending),
+    });
+    let message = result.unwrap_err().to_string();
+    assert!(message.contains("element 4 of `marks`"), "{message}");
+}
+
+#[test]
+fn what_is_out_of_range_is_named_with_its_line() {
+    let message = fault("beyond", [8]);
+    let place = format!("sanitize.rs:{}:", line("all.set(i * 3, i);"));
+    assert!(message.contains("index 9 is out of range"), "{message}");
+    assert!(message.contains(&place), "{message}");
+}
+
+#[test]
+fn plain_calls_are_not_looked_at() {
+    let entry = entries().into_iter().find(|e| e.kernel.name == "both");
+    let mut words = [0_u32; 8];
+    (entry.unwrap().run)(&mut Call {
+        args: vec![Arg::BytesMut(bytemuck::cast_slice_mut(&mut words))],
+        constants: vec![],
+        mode: Mode::REFERENCE,
+    })
+    .unwrap();
+    assert_eq!(words, [1, 1, 3, 3, 5, 5, 7, 7]);
+}
