@@ -195,7 +195,7 @@ fn bindings_go_where_they_are_wanted() {
         ("s/hlsl/shade_hamburger_unit.hlsl", " shade_hamburger_unit("),
         (
             "s/hlsl/shade_hamburger.hlsl",
-            "#define SHADE_HAMBURGER_ENCODING 0u",
+            "#define SHADE_HAMBURGER_ENCODING 2u",
         ),
         ("s/wgsl/shade_hamburger.wgsl", "@group(3) @binding(0)"),
         ("s/wgsl/shade_hamburger.wgsl", "@group(1) @binding(0)"),
