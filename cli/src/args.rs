@@ -97,6 +97,16 @@ pub struct Generate {
     /// Fix a specialisation constant's value in every language; may be repeated.
     #[arg(long = "set", value_name = "CONSTANT=VALUE")]
     pub set: Vec<String>,
+    /// Write the kernels that have these constants once more, with their values fixed and SUFFIX at
+    /// the end of the name; may be repeated.
+    #[arg(long = "variant", value_name = "SUFFIX:CONSTANT=VALUE[,…]")]
+    pub variants: Vec<String>,
+    /// Let the specialisation constants that are not fixed be set in HLSL and GLSL (by a macro) and
+    /// MSL (as function constants), too, as they can be in SPIR-V and WGSL.
+    #[arg(long)]
+    pub open_constants: bool,
+    #[command(flatten)]
+    pub placement: Placed,
     /// Bounds checks in HLSL, MSL and GLSL beyond the one guard of each invocation
     /// [unchecked, restrict, readzwrite].
     #[arg(long, value_name = "POLICY", default_value = "unchecked")]
@@ -109,17 +119,50 @@ pub struct Generate {
     pub msl_version: String,
 }
 
+/// Where bindings are in the texts.
+#[derive(Debug, Args)]
+pub struct Placed {
+    /// HLSL: the register space of every binding.
+    #[arg(long, value_name = "SPACE", default_value_t = 0)]
+    pub hlsl_space: u8,
+    /// HLSL: the first register of every class (t, u, b, s).
+    #[arg(long, value_name = "REGISTER", default_value_t = 0)]
+    pub register_base: u16,
+    /// WGSL: the group of every binding.
+    #[arg(long, value_name = "GROUP", default_value_t = 0)]
+    pub wgsl_group: u8,
+    /// MSL: the first slot of buffers, of textures and of samplers.
+    #[arg(long, value_name = "SLOT", default_value_t = 0)]
+    pub msl_slot_base: u8,
+    /// GLSL 4.50 and GLSL ES 3.10: what is added to every binding.
+    #[arg(long, value_name = "BINDING", default_value_t = 0)]
+    pub glsl_binding_base: u8,
+    /// Places of single bindings (TOML).
+    #[arg(long, value_name = "FILE")]
+    pub bindings: Option<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   hankel build --out shaders
   hankel build --out shaders --target hlsl --shader-model 5.1 --kernel 'shade_*'
   hankel build --out shaders --set encoding=1 --kernel shade_hamburger
+  hankel build --out shaders --variant _unit:encoding=1 --kernel shade_hamburger
+  hankel build --out shaders --hlsl-space 2 --wgsl-group 1 --msl-slot-base 8 --bindings places.toml
   hankel build --out shaders --manifest-path my-kernels/Cargo.toml
   hankel build --form functions --out libraries
 
 The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. Files that are right already
 are left alone. A build that was stopped is finished by the next one.
+
+The file of --bindings puts single bindings elsewhere, with names as in manifest.json:
+  [shade_hamburger.map]
+  hlsl = { register = 4, space = 2 }
+  wgsl = { group = 2, binding = 0 }
+  msl = { slot = 7 }
+  glsl = { binding = 3 }
+  essl310 = { binding = 1 }
 
 With --form functions it gets FORM/PREFIX_LIBRARY.EXTENSION, libraries of functions to include and call,
 and functions.json, for each form: wgsl, naga-oil, wesl, hlsl, glsl, godot, msl, slang, c, rust.")]

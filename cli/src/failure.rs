@@ -112,6 +112,8 @@ impl From<codegen::Error> for Failure {
     fn from(error: codegen::Error) -> Self {
         use codegen::Error as E;
         let blame = match &error {
+            E::Kernel(failure) if failure.step == codegen::Step::Place => Blame::Input,
+            E::Kernels(all) if all.iter().all(|it| it.step == codegen::Step::Place) => Blame::Input,
             E::Compile { .. }
             | E::Source(_)
             | E::NoEntryPoint { .. }

@@ -18,6 +18,7 @@ use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, compile};
 use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::inputs::{Inputs, normal};
+use hankel_codegen::placement::Placement;
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
@@ -27,7 +28,7 @@ use hankel_host::crates::{KernelCrate, Native};
 use hankel_host::worker::Worker;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
-use crate::args::Generate;
+use crate::args::{Generate, Placed};
 use crate::failure::{Failure, Result};
 use crate::progress::Progress;
 
@@ -206,7 +207,10 @@ impl Session {
             bounds_checks: args.bounds_checks.parse()?,
             shader_model: args.shader_model.parse()?,
             msl_version: args.msl_version.parse()?,
-            constants: constants(&args.set)?,
+            constants: constants("--set ", &args.set)?,
+            open_constants: args.open_constants,
+            variants: variants(&args.variants)?,
+            placement: placement(&args.placement)?,
         };
         Ok(self.request_for(args.kernels.clone(), targets, options))
     }
@@ -468,12 +472,50 @@ fn target_folder(manifest: &Path) -> Result<PathBuf> {
         .ok_or_else(|| fail("`cargo metadata` names no target folder".into()))
 }
 
-/// `CONSTANT=VALUE` pairs.
-fn constants(pairs: &[String]) -> Result<BTreeMap<String, u32>> {
-    const HELP: &str = "Write --set NAME=NUMBER, once for each constant.";
+/// Where bindings are.
+fn placement(args: &Placed) -> Result<Placement> {
+    let mut placement = Placement::default();
+    placement.hlsl_space = args.hlsl_space;
+    placement.register_base = args.register_base;
+    placement.wgsl_group = args.wgsl_group;
+    placement.msl_slot_base = args.msl_slot_base;
+    placement.glsl_binding_base = args.glsl_binding_base;
+    if let Some(file) = &args.bindings {
+        placement.read(file)?;
+    }
+    Ok(placement)
+}
+
+/// `SUFFIX:CONSTANT=VALUE,…`, by the suffix.
+fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, u32>>> {
+    const HELP: &str = "Write --variant _NAME:CONSTANT=NUMBER, with a comma between constants; the suffix \
+                        has lower-case letters, digits and `_`.";
+    let mut variants = BTreeMap::new();
+    for text in texts {
+        let wrong = |problem: &str| Failure::input(format!("--variant {text}: {problem}"), HELP);
+        let (suffix, pairs) = text
+            .split_once(':')
+            .ok_or_else(|| wrong("there is no `:`"))?;
+        let is_part_of_name =
+            |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
+        if suffix.is_empty() || !suffix.chars().all(is_part_of_name) {
+            return Err(wrong("the suffix cannot end a kernel's name"));
+        }
+        let pairs: Vec<String> = pairs.split(',').map(str::to_owned).collect();
+        let values = constants(&format!("--variant {suffix}:"), &pairs)?;
+        if variants.insert(suffix.to_owned(), values).is_some() {
+            return Err(wrong("this suffix was given already"));
+        }
+    }
+    Ok(variants)
+}
+
+/// `CONSTANT=VALUE` pairs; `option` is what stands before them.
+fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, u32>> {
+    const HELP: &str = "Write NAME=NUMBER, once for each constant.";
     let mut values = BTreeMap::new();
     for pair in pairs {
-        let wrong = |problem: String| Failure::input(format!("--set {pair}: {problem}"), HELP);
+        let wrong = |problem: String| Failure::input(format!("{option}{pair}: {problem}"), HELP);
         let (name, text) = pair
             .split_once('=')
             .ok_or_else(|| wrong("there is no `=`".into()))?;

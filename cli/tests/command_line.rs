@@ -167,6 +167,92 @@ fn a_build_can_be_narrowed() {
     assert!(!desk.path("s/wgsl").exists());
 }
 
+/// Places of bindings and open constants are in the texts, in what a build depends on, and in what a
+/// folder must be checked with.
+#[test]
+fn bindings_go_where_they_are_wanted() {
+    let desk = Desk::new();
+    desk.write(
+        "places.toml",
+        "[shade_hamburger.map]\nhlsl = { register = 9 }\nwgsl = { group = 3, binding = 0 }\n",
+    );
+    let options = "--kernel shade_hamburger --hlsl-space 2 --register-base 1 --wgsl-group 1 \
+                   --msl-slot-base 8 --glsl-binding-base 4 --bindings places.toml --open-constants \
+                   --variant _unit:encoding=1";
+    desk.hankel(&format!("build --out s --depfile s.d {options}"))
+        .code(0);
+    let text = |file: &str| fs::read_to_string(desk.path(file)).expect("it was written");
+    for (file, words) in [
+        ("s/hlsl/shade_hamburger.hlsl", "map : register(t9, space2)"),
+        (
+            "s/hlsl/shade_hamburger.hlsl",
+            "light : register(b1, space2)",
+        ),
+        (
+            "s/hlsl/shade_hamburger_unit.hlsl",
+            "map : register(t9, space2)",
+        ),
+        ("s/hlsl/shade_hamburger_unit.hlsl", " shade_hamburger_unit("),
+        (
+            "s/hlsl/shade_hamburger.hlsl",
+            "#define SHADE_HAMBURGER_ENCODING 2u",
+        ),
+        ("s/wgsl/shade_hamburger.wgsl", "@group(3) @binding(0)"),
+        ("s/wgsl/shade_hamburger.wgsl", "@group(1) @binding(0)"),
+        ("s/msl/shade_hamburger.metal", "map [[texture(8)]]"),
+        ("s/glsl/shade_hamburger.frag", "binding = 4"),
+        (
+            "s/include/hankel.h",
+            "HANKEL_SHADE_HAMBURGER_UNIT_HLSL_FILE",
+        ),
+        ("s/manifest.json", "\"wgsl_group\": 1"),
+    ] {
+        let text = text(file);
+        assert!(text.contains(words), "no `{words}` in {file}:\n{text}");
+    }
+    assert!(!text("s/hlsl/shade_hamburger_unit.hlsl").contains("encoding"));
+    assert!(text("s.d").contains("places.toml"), "{}", text("s.d"));
+    desk.hankel(&format!("check s {options}")).code(0);
+    desk.hankel("check s --kernel shade_hamburger").code(1);
+    desk.write(
+        "places.toml",
+        "[shade_hamburger.map]\nhlsl = { register = 8 }\n",
+    );
+    desk.hankel(&format!("check s {options}")).code(1);
+
+    desk.write(
+        "places.toml",
+        "[shade_hamburger.light]\nwgsl = { binding = 1 }\n",
+    );
+    desk.hankel("build --out t --bindings places.toml").fails(
+        2,
+        &[
+            "places.toml:1",
+            "`shade_hamburger`",
+            "`light` (line 1) and `map`",
+        ],
+    );
+    desk.write("places.toml", "\n[shade_hamburger.lamp]\n");
+    desk.hankel("build --out t --bindings places.toml")
+        .fails(2, &["places.toml:2", "`lamp`", "light, map, sampler"]);
+    desk.hankel("build --out t --bindings nowhere.toml")
+        .fails(2, &["nowhere.toml"]);
+    desk.hankel("build --out t --hlsl-space 256")
+        .fails(2, &["256", "--hlsl-space"]);
+    desk.hankel("build --out t --msl-slot-base 200")
+        .fails(2, &["slot", "base"]);
+    for (variant, words) in [
+        ("unit", "no `:`"),
+        ("_A:encoding=1", "cannot end a kernel's name"),
+        ("_a:encoding", "no `=`"),
+        ("_a:nosuch=1", "nosuch"),
+    ] {
+        desk.hankel(&format!("build --out t --variant {variant}"))
+            .fails(2, &[words]);
+    }
+    assert!(!desk.path("t").exists());
+}
+
 #[test]
 fn misuse_of_build_is_explained() {
     let desk = Desk::new();

@@ -23,10 +23,11 @@ use crate::error::{Error, Failure, Result, Step};
 use crate::files::sha256;
 use crate::finish::{self, Finished};
 use crate::folder::{Change, Folder, Found, Owned};
-use crate::headers::{self, Layouts};
+use crate::headers::{self, InWgsl, Layouts};
 use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
 };
+use crate::spirv;
 use crate::translate::{Ir, Options, Place, Written};
 
 /// The manifest's file.
@@ -87,7 +88,8 @@ impl Request {
     ///
     /// # Errors
     ///
-    /// A filter fits none, two kernels share a name, or a frozen constant is no kernel's.
+    /// A filter fits none, two kernels share a name, a frozen constant is no kernel's, a variant has
+    /// no kernel, or a binding with a place of its own does not exist.
     pub fn chosen(&self) -> Result<Vec<&Kernel>> {
         let mut chosen: BTreeMap<&str, &Kernel> = BTreeMap::new();
         let mut used = BTreeSet::new();
@@ -124,6 +126,7 @@ impl Request {
             .options
             .constants
             .keys()
+            .chain(self.options.variants.values().flat_map(BTreeMap::keys))
             .find(|name| !constants.contains(name.as_str()))
         {
             let known = constants.into_iter().map(str::to_owned).collect();
@@ -132,7 +135,56 @@ impl Request {
                 known,
             });
         }
+        let mut names: BTreeSet<String> = chosen.keys().map(|&name| name.to_owned()).collect();
+        for (suffix, values) in &self.options.variants {
+            let fail = |problem: String| Error::Variant {
+                suffix: suffix.clone(),
+                problem,
+            };
+            let copies: Vec<_> = chosen.values().filter(|it| has_all(it, values)).collect();
+            if copies.is_empty() {
+                return Err(fail(
+                    "no kernel that is built has all of its constants".into(),
+                ));
+            }
+            for kernel in copies {
+                let name = format!("{}{suffix}", kernel.name);
+                if !names.insert(name.clone()) {
+                    return Err(fail(format!("two kernels would be named `{name}`")));
+                }
+            }
+        }
+        self.options.placement.check(&self.kernels)?;
         Ok(chosen.into_values().collect())
+    }
+
+    /// The chosen kernels and their variants.
+    fn jobs(&self, chosen: &[&Kernel]) -> Vec<Variant> {
+        let mut jobs = Vec::new();
+        for kernel in chosen {
+            let suffixes = self.options.variants.iter();
+            let copies = suffixes.filter(|(_, values)| has_all(kernel, values));
+            jobs.push(Variant {
+                of: kernel.name.clone(),
+                kernel: (*kernel).clone(),
+                options: self.options.clone(),
+            });
+            jobs.extend(copies.map(|(suffix, values)| {
+                let name = format!("{}{suffix}", kernel.name);
+                let mut options = self.options.clone();
+                options.constants.extend(values.clone());
+                options.placement = options.placement.of_copy(&kernel.name, &name);
+                Variant {
+                    of: kernel.name.clone(),
+                    kernel: Kernel {
+                        name,
+                        ..(*kernel).clone()
+                    },
+                    options,
+                }
+            }));
+        }
+        jobs
     }
 
     fn targets(&self) -> BTreeSet<Language> {
@@ -160,6 +212,22 @@ impl Request {
         // Nothing in it can fail to become JSON.
         sha256(&serde_json::to_vec(&inputs).unwrap_or_default())
     }
+}
+
+/// A kernel that is written: itself, or once more with constants fixed and under another name.
+struct Variant {
+    /// The kernel whose module it has.
+    of: String,
+    /// With the name that is written.
+    kernel: Kernel,
+    /// With the constants' values.
+    options: Options,
+}
+
+fn has_all(kernel: &Kernel, values: &BTreeMap<String, u32>) -> bool {
+    values
+        .keys()
+        .all(|name| constants(kernel).any(|constant| constant == name))
 }
 
 fn constants(kernel: &Kernel) -> impl Iterator<Item = &str> {
@@ -211,20 +279,27 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
     let all: Vec<Kernel> = chosen.iter().map(|kernel| (*kernel).clone()).collect();
     let layouts = Layouts::of(&all);
     let targets = request.targets();
-    let results: Vec<Result<_, Failure>> = chosen
+    let jobs = request.jobs(&chosen);
+    let results: Vec<Result<_, Failure>> = jobs
         .par_iter()
-        .map(|kernel| one(kernel, modules, &targets, &layouts, &request.options))
+        .map(|job| one(job, modules, &targets, &layouts))
         .collect();
     let made: Vec<(KernelEntry, Files, String)> = collect(results)?;
     let mut files = BTreeMap::new();
     let mut kernels = BTreeMap::new();
     let mut spirv = BTreeMap::new();
-    for (kernel, (entry, texts, hash)) in chosen.iter().zip(made) {
-        spirv.insert(kernel.name.as_str(), hash);
-        kernels.insert(kernel.name.clone(), entry);
+    let mut in_wgsl = InWgsl::new();
+    for (job, (entry, texts, hash)) in jobs.iter().zip(made) {
+        let name = job.kernel.name.as_str();
+        if targets.contains(&Language::Wgsl) {
+            let places = job.options.placement.in_wgsl(&job.kernel)?;
+            in_wgsl.insert(name.to_owned(), places);
+        }
+        spirv.insert(name, hash);
+        kernels.insert(name.to_owned(), entry);
         files.extend(texts);
     }
-    for (path, text) in headers::files(&layouts, &kernels) {
+    for (path, text) in headers::files(&layouts, &kernels, &in_wgsl) {
         files.insert(path.into(), text.into_bytes());
     }
     let file_entry = |bytes: &Vec<u8>| FileEntry {
@@ -281,13 +356,17 @@ impl Readings<'_> {
 
 /// One kernel in every language, and the hash of its SPIR-V.
 fn one(
-    kernel: &Kernel,
+    job: &Variant,
     modules: &Modules,
     targets: &BTreeSet<Language>,
     layouts: &Layouts,
-    options: &Options,
 ) -> Result<(KernelEntry, Files, String), Failure> {
-    let open = open_module(kernel, modules, options)?;
+    let Variant {
+        of,
+        kernel,
+        options,
+    } = job;
+    let open = open_module(of, kernel, modules, options)?;
     let mut entry = manifest::entry(kernel, layouts, options, open.cost);
     let mut files = Vec::new();
     let mut readings = Readings {
@@ -327,11 +406,12 @@ fn one(
             continue;
         }
         // Only WGSL can express a specialisation constant: the others get its value before
-        // optimisation, so that branches on it disappear. So does WGSL where implementations would
-        // refuse it otherwise.
+        // optimisation, so that branches on it disappear, unless it is to stay open. So does WGSL
+        // where implementations would refuse it otherwise.
         let has_open_constants =
             constants(kernel).any(|name| !options.constants.contains_key(name));
-        let ir = readings.get(language != Language::Wgsl && has_open_constants)?;
+        let settles = language != Language::Wgsl && !options.open_constants;
+        let ir = readings.get(settles && has_open_constants)?;
         if entry.findings.is_empty() {
             entry.findings = ir.findings();
         }
@@ -385,17 +465,25 @@ fn defaults(kernel: &Kernel) -> BTreeMap<String, u32> {
 }
 
 /// The final module, with the constants that the options freeze.
-fn open_module(kernel: &Kernel, modules: &Modules, options: &Options) -> Result<Finished, Failure> {
+fn open_module(
+    of: &str,
+    kernel: &Kernel,
+    modules: &Modules,
+    options: &Options,
+) -> Result<Finished, Failure> {
+    let module = |all: &BTreeMap<String, Vec<u8>>| -> Result<Vec<u8>, Failure> {
+        let module = all.get(of).ok_or_else(|| missing(kernel))?;
+        if of == kernel.name {
+            return Ok(module.clone());
+        }
+        let mut module = spirv::load(&spirv::words(module, &kernel.name)?, &kernel.name)?;
+        spirv::names::rename_entry_point(&mut module, of, &kernel.name);
+        Ok(spirv::bytes(&spirv::store(&module)))
+    };
     let finished = match modules {
-        Modules::Raw(raw) => finish::finish(
-            raw.get(&kernel.name).ok_or_else(|| missing(kernel))?,
-            kernel,
-        )?,
+        Modules::Raw(raw) => finish::finish(&module(raw)?, kernel)?,
         Modules::Final(done) => {
-            let spirv = done
-                .get(&kernel.name)
-                .ok_or_else(|| missing(kernel))?
-                .clone();
+            let spirv = module(done)?;
             let cost = crate::cost::of_spirv(&spirv, &kernel.name)?;
             Finished { spirv, cost }
         }

@@ -29,6 +29,8 @@ pub enum Step {
     Parse,
     /// naga's validator.
     Check,
+    /// Giving bindings their places in a language.
+    Place,
     /// naga's writer for a language.
     Write(crate::Language),
     /// Reading back what was written.
@@ -46,6 +48,7 @@ impl fmt::Display for Step {
             Self::Describe => f.write_str("comparing SPIR-V with the kernel's description"),
             Self::Parse => f.write_str("naga's SPIR-V reader"),
             Self::Check => f.write_str("naga's validator"),
+            Self::Place => f.write_str("placing the bindings"),
             Self::Write(language) => write!(f, "naga's {language} writer"),
             Self::Reread(language) => write!(f, "reading the generated {language}"),
         }
@@ -69,7 +72,7 @@ pub struct Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.step == Step::Meaning {
+        if matches!(self.step, Step::Meaning | Step::Place) {
             if let Some(place) = &self.construct {
                 write!(f, "{place}: ")?;
             }
@@ -199,6 +202,14 @@ pub enum Error {
         /// What there is.
         known: Vec<String>,
     },
+    /// A variant that cannot be made.
+    #[error("variant `{suffix}`: {problem}")]
+    Variant {
+        /// The end of its kernels' names.
+        suffix: String,
+        /// Why not.
+        problem: String,
+    },
     /// A value of an option that does not exist.
     #[error("{option} `{value}` is not known: {expected}")]
     Option {
@@ -255,6 +266,14 @@ pub enum Error {
     DuplicateLayout {
         /// The name.
         name: String,
+    },
+    /// The file with places of bindings is wrong.
+    #[error("{place}: {problem}")]
+    Bindings {
+        /// The file, and the line if it is known.
+        place: String,
+        /// What is wrong.
+        problem: String,
     },
     /// hankel.toml is wrong.
     #[error("{}: {problem}", path.display())]
@@ -345,6 +364,14 @@ impl Error {
             Self::Run { .. } => {
                 "`hankel toolchain status` says which compiler is used and what is missing.".into()
             }
+            Self::Bindings { .. } => {
+                "Write `[KERNEL.PARAMETER]`, named as in manifest.json, and below it places in hlsl \
+                 (register, space), wgsl (group, binding), msl (slot), glsl or essl310 (binding)."
+                    .into()
+            }
+            Self::Variant { .. } => "Choose another suffix, or constants of one kernel: \
+                 `hankel list --bindings` shows them."
+                .into(),
             Self::UnknownConstant { .. } => "Give the constant's name in the kernel.".into(),
             Self::Function(_) => {
                 "Write it in the part of Rust that `#[function]`'s documentation names.".into()
@@ -373,6 +400,10 @@ impl Failure {
             Step::Compile => "Correct the kernel where the compiler points.",
             Step::Meaning => {
                 "Write it as the message says: what would be written means something else."
+            }
+            Step::Place => {
+                "Give one of them another place in the file of `--bindings`, take its line out, or \
+                 lower the language's base."
             }
             Step::Read => "The file is damaged or no SPIR-V: make it again.",
             Step::Validate if self.message.contains("capability") => {

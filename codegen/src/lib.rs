@@ -32,6 +32,7 @@ pub mod inputs;
 mod language;
 pub mod lint;
 pub mod manifest;
+pub mod placement;
 pub mod scaffold;
 pub mod spirv;
 pub mod translate;

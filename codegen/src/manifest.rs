@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::cost::Cost;
 use crate::headers::Layouts;
 use crate::lint::Finding;
+use crate::placement::Placement;
 use crate::spirv::names::output_name;
 use crate::translate::{self, Options, Place};
 use crate::{Language, VERSION};
@@ -77,6 +78,16 @@ pub struct WriteOptions {
     pub msl_version: String,
     /// Specialisation constants that were given a value for good.
     pub constants: BTreeMap<String, u32>,
+    /// The others stay open in HLSL, GLSL and MSL, too.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub open_constants: bool,
+    /// Kernels that were written once more with constants fixed: by the end of the copy's name, the
+    /// constants' values.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty", default)]
+    pub variants: BTreeMap<String, BTreeMap<String, u32>>,
+    /// Where bindings are, if not where they are by default.
+    #[serde(skip_serializing_if = "Placement::is_default", default)]
+    pub placement: Placement,
 }
 
 impl WriteOptions {
@@ -87,6 +98,9 @@ impl WriteOptions {
             shader_model: options.shader_model.to_string(),
             msl_version: options.msl_version.to_string(),
             constants: options.constants.clone(),
+            open_constants: options.open_constants,
+            variants: options.variants.clone(),
+            placement: options.placement.without_origin(),
         }
     }
 }
@@ -305,7 +319,7 @@ impl Binding {
 pub struct Constant {
     /// Its name.
     pub name: String,
-    /// `SpecId` in SPIR-V, `@id` in WGSL.
+    /// `SpecId` in SPIR-V, `@id` in WGSL, `function_constant` in MSL.
     pub id: u32,
     /// The value unless specialised.
     pub default: u32,
@@ -313,6 +327,14 @@ pub struct Constant {
     pub overridable_in: Vec<Language>,
     /// The value in the others.
     pub value: u32,
+    /// HLSL and GLSL: the macro whose value it has there, if whoever includes the text defines it.
+    #[serde(rename = "macro", skip_serializing_if = "Option::is_none", default)]
+    pub macro_name: Option<String>,
+}
+
+/// The macro that a text in HLSL or GLSL takes a constant from.
+pub(crate) fn macro_name(kernel: &str, constant: &str) -> String {
+    format!("{kernel}_{constant}").to_uppercase()
 }
 
 /// A value at a stage's interface.
@@ -526,9 +548,12 @@ fn constants(kernel: &Kernel, options: &Options) -> Vec<Constant> {
                 default,
                 overridable_in: match frozen {
                     Some(_) => Vec::new(),
+                    None if options.open_constants => Language::ALL.into(),
                     None => vec![Language::Spirv, Language::Wgsl],
                 },
                 value: frozen.unwrap_or(default),
+                macro_name: (frozen.is_none() && options.open_constants)
+                    .then(|| macro_name(&kernel.name, &param.name)),
             })
         }
         _ => None,
@@ -584,7 +609,7 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
     (inputs, outputs)
 }
 
-fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
+pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
     let plain = |binding: u32, name: &str, kind: BindingKind| Binding {
         set: 0,
         binding,

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use hankel_codegen::Language;
@@ -42,12 +42,13 @@ fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
             )
         })?;
     let mut edits = Edits::new(&args.out)?;
+    let places = places(args)?;
     loop {
         // Before the build: what is edited meanwhile is built next.
-        edits.add(&[], &sources);
+        edits.add(&places, &sources);
         let built = open(args, quiet).and_then(|session| {
             once(args, &session, quiet)?;
-            session.inputs()
+            inputs(args, &session)
         });
         match built {
             Ok(inputs) => edits.add(&inputs, &sources),
@@ -55,6 +56,22 @@ fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
         }
         edits.wait()?;
     }
+}
+
+/// Every file and folder that the output follows from.
+fn inputs(args: &Build, session: &Session) -> Result<Vec<PathBuf>> {
+    Ok([session.inputs()?, places(args)?].concat())
+}
+
+/// The file with places of bindings, as an absolute path.
+fn places(args: &Build) -> Result<Vec<PathBuf>> {
+    let files = args.generate.placement.bindings.iter();
+    files
+        .map(|file| {
+            std::path::absolute(file)
+                .map_err(|e| Failure::machine(format!("{}: {e}", file.display()), None))
+        })
+        .collect()
 }
 
 /// Gives a file the present time.
@@ -72,7 +89,7 @@ fn once(args: &Build, session: &Session, quiet: bool) -> Result<Outcome> {
     request.chosen()?;
     let report = build(&request, &session.modules()?, &args.out, args.force)?;
     if let Some(file) = &args.depfile {
-        let text = depfile::rule(&args.out.join(MANIFEST_FILE), &session.inputs()?);
+        let text = depfile::rule(&args.out.join(MANIFEST_FILE), &inputs(args, session)?);
         Output::create(file, &[])?.finish(text.as_bytes())?;
         // Make compares times: a manifest that stays as it was must not be older than its inputs.
         touch(&args.out.join(MANIFEST_FILE))?;

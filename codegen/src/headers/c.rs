@@ -6,8 +6,8 @@ use std::fmt::Write;
 use hankel_dsl::native::describe::{Scalar, Type};
 
 use super::{Layouts, Part, one_line, padded, parts};
-use crate::VERSION;
 use crate::manifest::KernelEntry;
+use crate::{Language, VERSION};
 
 /// The header.
 pub fn header(layouts: &Layouts, kernels: &BTreeMap<String, KernelEntry>) -> String {
@@ -89,6 +89,13 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry) {
                 Some(index) => {
                     let class = &place.class;
                     let _ = writeln!(text, "#define {prefix}_{name} {index}u /* {class} */");
+                    let what = match language {
+                        Language::Wgsl => "GROUP",
+                        _ => "SPACE",
+                    };
+                    if let Some(space) = place.space.filter(|space| *space != 0) {
+                        let _ = writeln!(text, "#define {prefix}_{name}_{what} {space}u");
+                    }
                 }
                 // GLSL ES 3.00 binds by name.
                 None => {

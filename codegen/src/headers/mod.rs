@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use hankel_dsl::native::describe::{Kernel, Layout, Output, Role, Scalar, Type};
 
-use crate::manifest::KernelEntry;
+use crate::manifest::{Binding, KernelEntry};
 use crate::spirv::names::camel_case;
 
 /// The structures that kernels use, each under a name of its own.
@@ -96,18 +96,72 @@ impl Layouts {
     }
 }
 
+/// Group and binding in WGSL of each binding, by kernel and number in SPIR-V; also of those that the
+/// kernel's code does not use.
+pub type InWgsl = BTreeMap<String, BTreeMap<u32, (u32, u32)>>;
+
+/// The places in WGSL of a kernel's bindings.
+struct Groups<'a> {
+    in_wgsl: Option<&'a BTreeMap<u32, (u32, u32)>>,
+}
+
+impl<'a> Groups<'a> {
+    fn of(in_wgsl: &'a InWgsl, kernel: &str) -> Self {
+        Self {
+            in_wgsl: in_wgsl.get(kernel),
+        }
+    }
+
+    /// Group and binding.
+    fn place(&self, binding: &Binding) -> (u32, u32) {
+        let own = (binding.set, binding.binding);
+        let place = self.in_wgsl.and_then(|it| it.get(&binding.binding));
+        place.copied().unwrap_or(own)
+    }
+
+    /// The groups, each with its bindings and their numbers in it, in order. Without bindings there
+    /// is one group that is empty.
+    fn all<'b>(&self, bindings: &'b [Binding]) -> BTreeMap<u32, Vec<(u32, &'b Binding)>> {
+        let mut groups: BTreeMap<u32, Vec<(u32, &Binding)>> = BTreeMap::new();
+        for binding in bindings {
+            let (group, number) = self.place(binding);
+            groups.entry(group).or_default().push((number, binding));
+        }
+        for members in groups.values_mut() {
+            members.sort_by_key(|(number, _)| *number);
+        }
+        if groups.is_empty() {
+            groups.insert(0, Vec::new());
+        }
+        groups
+    }
+
+    /// Whether all bindings are where SPIR-V has them.
+    fn are_as_in_spirv(&self) -> bool {
+        let mut places = self.in_wgsl.into_iter().flatten();
+        places.all(|(binding, place)| *place == (0, *binding))
+    }
+}
+
 /// Every file of the folder `include`, by its path.
 pub fn files(
     layouts: &Layouts,
     kernels: &BTreeMap<String, KernelEntry>,
+    in_wgsl: &InWgsl,
 ) -> [(&'static str, String); 6] {
     [
         ("include/hankel.h", c::header(layouts, kernels)),
-        ("include/hankel.rs", rust::module(layouts, kernels)),
+        ("include/hankel.rs", rust::module(layouts, kernels, in_wgsl)),
         ("include/hankel_bytemuck.rs", rust::bytemuck(layouts)),
-        ("include/hankel_wgpu.rs", wgpu::module(kernels)),
-        ("include/hankel.js", javascript::module(layouts, kernels)),
-        ("include/hankel.d.ts", javascript::types(layouts, kernels)),
+        ("include/hankel_wgpu.rs", wgpu::module(kernels, in_wgsl)),
+        (
+            "include/hankel.js",
+            javascript::module(layouts, kernels, in_wgsl),
+        ),
+        (
+            "include/hankel.d.ts",
+            javascript::types(layouts, kernels, in_wgsl),
+        ),
     ]
 }
 
@@ -292,7 +346,7 @@ mod tests {
     #[test]
     fn rust_gives_the_bytes_that_shaders_read() {
         let folder = tempfile::tempdir().unwrap();
-        let text = rust::module(&layouts(), &BTreeMap::new());
+        let text = rust::module(&layouts(), &BTreeMap::new(), &InWgsl::new());
         assert!(!text.contains("feature"), "{text}");
         let main = "
             fn main() {
@@ -324,7 +378,7 @@ mod tests {
     #[test]
     fn javascript_writes_the_bytes_that_shaders_read() {
         let folder = tempfile::tempdir().unwrap();
-        let text = javascript::module(&layouts(), &BTreeMap::new());
+        let text = javascript::module(&layouts(), &BTreeMap::new(), &InWgsl::new());
         std::fs::write(folder.path().join("hankel.mjs"), text).unwrap();
         let main = "
             import { LightF64 } from './hankel.mjs';

@@ -167,6 +167,23 @@ fn failure(kernel: &str, construct: String, message: String) -> Failure {
     }
 }
 
+/// Gives the entry point called `from` another name.
+pub(crate) fn rename_entry_point(module: &mut Module, from: &str, to: &str) {
+    let from = Operand::LiteralString(from.into());
+    for entry in &mut module.entry_points {
+        if entry.operands.get(2) != Some(&from) {
+            continue;
+        }
+        entry.operands[2] = Operand::LiteralString(to.into());
+        let function = entry.operands[1].clone();
+        for note in &mut module.debug_names {
+            if op(note) == Op::Name && note.operands.first() == Some(&function) {
+                note.operands[1] = Operand::LiteralString(to.into());
+            }
+        }
+    }
+}
+
 fn entry_point(module: &Module, kernel: &Kernel) -> Result<(), Failure> {
     let [entry] = module.entry_points.as_slice() else {
         let count = module.entry_points.len();

@@ -10,13 +10,14 @@ use naga::{ResourceBinding, ShaderStage};
 use super::{Bound, Job, Kind, Place, Text, Written, text};
 use crate::Language;
 use crate::error::Failure;
+use crate::placement::Slots;
 use crate::spirv::names::camel_case;
 
 /// What brings `precise` to GLSL ES before 3.20.
 const ES_PRECISE: &str = "GL_EXT_gpu_shader5";
 
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
-    let (module, info) = job.frozen()?;
+    let (module, info) = job.settled()?;
     let bound = job.bound();
     let entry = &module.entry_points[0];
     let version = match job.language {
@@ -30,23 +31,38 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         binding_map: Default::default(),
         zero_initialize_workgroup_memory: false,
     };
+    let placement = &job.options.placement;
+    let mut slots = Slots::new(placement, job.kernel, job.language);
     let mut next = BTreeMap::new();
     let mut numbers = BTreeMap::new();
     for it in bound.iter().filter(|it| it.kind != Kind::Sampler) {
-        let counter = next.entry(class(it.kind)).or_insert(0u8);
-        let number = match job.language {
-            Language::Glsl => u8::try_from(it.binding).unwrap_or(u8::MAX),
+        let counter = next.entry(class(it.kind)).or_insert(0u32);
+        let own = match job.language {
+            Language::Glsl => it.binding,
             _ => *counter,
         };
         *counter += 1;
+        let moved = slots.places(it.binding).and_then(|it| match job.language {
+            Language::Glsl => it.glsl,
+            Language::Essl310 => it.essl310,
+            _ => None,
+        });
+        let base = match job.language {
+            // It has no numbers in the text.
+            Language::Essl300 => 0,
+            _ => u32::from(placement.glsl_binding_base),
+        };
+        let number = moved.map_or(base + own, |it| it.binding.into());
+        slots.take(it.binding, class(it.kind), 0, number, u8::MAX.into())?;
         options.binding_map.insert(
             ResourceBinding {
                 group: it.group,
                 binding: it.binding,
             },
-            number,
+            // naga's map has no larger ones.
+            number as u8,
         );
-        numbers.insert(it.binding, u32::from(number));
+        numbers.insert(it.binding, number);
     }
     let pipeline = PipelineOptions {
         shader_stage: entry.stage,
@@ -81,6 +97,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
             "(uint(gl_InstanceID) + naga_vs_first_instance)",
             "uint(gl_InstanceID)",
         );
+    let source = job.open_constants(source)?;
     let types = ["float", "double", "vec", "dvec", "mat", "dmat"];
     let mut source = if job.language == Language::Essl300 {
         source

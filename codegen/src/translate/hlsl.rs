@@ -4,6 +4,7 @@
 //! that HLSL has for 32-bit ones only; here they are our own.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use naga::back::hlsl::{BindTarget, Options, PipelineOptions, ShaderModel, Writer};
 use naga::valid::ModuleInfo;
@@ -13,9 +14,10 @@ use naga::{
 
 use super::{BoundsChecks, Job, Kind, Place, Text, Written, text};
 use crate::error::Failure;
+use crate::placement::Slots;
 
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
-    let (module, info) = job.frozen()?;
+    let (module, info) = job.settled()?;
     let doubles = match Doubles::of(&module, &info) {
         Ok(doubles) => doubles,
         Err(function) => {
@@ -25,8 +27,11 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         }
     };
     let bound = job.bound();
-    let mut registers = BTreeMap::new();
-    let mut next: BTreeMap<char, u32> = BTreeMap::new();
+    let placement = &job.options.placement;
+    let mut slots = Slots::new(placement, job.kernel, job.language);
+    let mut registers: BTreeMap<u32, Register> = BTreeMap::new();
+    let mut samplers = Vec::new();
+    let mut next: BTreeMap<&str, u32> = BTreeMap::new();
     let restrict = job.options.bounds_checks != BoundsChecks::Unchecked;
     let mut options = Options {
         shader_model: job.options.shader_model.0,
@@ -38,15 +43,35 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     };
     for it in &bound {
         let class = match it.kind {
-            Kind::Uniform => 'b',
-            Kind::Buffer { written: false } | Kind::Texture => 't',
-            Kind::Buffer { written: true } | Kind::Image => 'u',
-            Kind::Sampler => 's',
+            Kind::Uniform => "b",
+            Kind::Buffer { written: false } | Kind::Texture => "t",
+            Kind::Buffer { written: true } | Kind::Image => "u",
+            Kind::Sampler => "s",
         };
-        let register = next.entry(class).or_default();
-        registers.insert(it.binding, (class, *register));
+        let next = next.entry(class).or_insert(placement.register_base.into());
+        let moved = slots.places(it.binding).and_then(|it| it.hlsl);
+        let number = moved.and_then(|it| it.register);
+        let space = moved.and_then(|it| it.space);
+        let register = Register {
+            class,
+            number: number.map_or(*next, u32::from),
+            space: space.unwrap_or(placement.hlsl_space),
+        };
+        *next += 1;
+        slots.take(
+            it.binding,
+            class,
+            register.space.into(),
+            register.number,
+            u32::MAX,
+        )?;
         let target = BindTarget {
-            register: *register,
+            space: register.space,
+            // A sampler's is its index in naga's heap, which is replaced below.
+            register: match it.kind {
+                Kind::Sampler => samplers.len() as u32,
+                _ => register.number,
+            },
             restrict_indexing: restrict,
             ..BindTarget::default()
         };
@@ -57,7 +82,10 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
             },
             target,
         );
-        *register += 1;
+        if it.kind == Kind::Sampler {
+            samplers.push(register);
+        }
+        registers.insert(it.binding, register);
     }
     let pipeline = PipelineOptions::default();
     let mut source = String::new();
@@ -69,39 +97,39 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         Some(Err(error)) => return Err(job.failure(&error)),
         None => job.kernel.name.clone(),
     };
-    let source = plain_samplers(&source).ok_or_else(|| Failure {
+    let source = plain_samplers(&source, &samplers).ok_or_else(|| Failure {
         construct: Some("a sampler".into()),
         message: "its declaration is not of the shape that is expected".into(),
-        ..job.failure(&std::fmt::Error)
+        ..job.failure(&fmt::Error)
     })?;
     // Of a selection between two literals without suffix DXC 1.7 rounds both towards zero
     // (`tests/upstream/dxc-literal-selection`).
     let source = text::suffixed(&source);
     let source = without_zero_arrays(&source);
+    let source = job.open_constants(source)?;
     let mut source = doubles.apply(job.precise(source, &["float", "double"])?);
     // fxc, which has models up to 5.1, does not know attributes of Vulkan.
     if job.options.shader_model.0 > ShaderModel::V5_1 {
         for it in bound.iter().filter(|it| it.kind == Kind::Image) {
-            let (class, register) = registers[&it.binding];
             if let TypeInner::Image {
                 class: ImageClass::Storage { format, .. },
                 ..
             } = module.types[module.global_variables[it.handle].ty].inner
                 && let Some(format) = vulkan_format(format)
             {
-                source = with_format(&source, &format!("{class}{register}"), format);
+                source = with_format(&source, registers[&it.binding], format);
             }
         }
     }
     let places = bound
         .iter()
         .map(|it| {
-            let (class, register) = registers[&it.binding];
+            let register = registers[&it.binding];
             let place = Place {
-                name: text::name_before(&source, &format!(" : register({class}{register}")),
-                class: class.into(),
-                index: Some(register),
-                space: Some(0),
+                name: text::name_before(&source, &format!(" : {register}")),
+                class: register.class.into(),
+                index: Some(register.number),
+                space: Some(register.space.into()),
                 block: None,
                 combined_with: Vec::new(),
             };
@@ -116,6 +144,28 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         sized: Vec::new(),
         requires: Vec::new(),
     }))
+}
+
+/// A register, as a declaration names it.
+#[derive(Clone, Copy)]
+struct Register {
+    class: &'static str,
+    number: u32,
+    space: u8,
+}
+
+impl fmt::Display for Register {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            class,
+            number,
+            space,
+        } = self;
+        match space {
+            0 => write!(f, "register({class}{number})"),
+            _ => write!(f, "register({class}{number}, space{space})"),
+        }
+    }
 }
 
 /// The functions of `double` that HLSL lacks: given one, it silently converts to `float`.
@@ -228,7 +278,7 @@ fn without_zero_arrays(source: &str) -> String {
 }
 
 /// Replaces the heap and the indices into it by registers.
-fn plain_samplers(source: &str) -> Option<String> {
+fn plain_samplers(source: &str, registers: &[Register]) -> Option<String> {
     let mut plain = String::with_capacity(source.len());
     for line in source.lines() {
         let heap = line.starts_with("SamplerState nagaSamplerHeap[")
@@ -243,11 +293,11 @@ fn plain_samplers(source: &str) -> Option<String> {
             .filter(|rest| rest.contains("SamplerHeap["));
         match declaration {
             Some(rest) => {
-                // `State name = nagaSamplerHeap[nagaGroup0SamplerIndexArray[register]];`
+                // `State name = nagaSamplerHeap[nagaGroup0SamplerIndexArray[index]];`
                 let (declared, value) = rest.split_once(" = ")?;
-                let register = value.strip_suffix("]];")?.rsplit_once('[')?.1;
-                register.parse::<u32>().ok()?;
-                plain.push_str(&format!("Sampler{declared} : register(s{register});"));
+                let index = value.strip_suffix("]];")?.rsplit_once('[')?.1;
+                let register = registers.get(index.parse::<usize>().ok()?)?;
+                plain.push_str(&format!("Sampler{declared} : {register};"));
             }
             None => plain.push_str(line),
         }
@@ -258,8 +308,8 @@ fn plain_samplers(source: &str) -> Option<String> {
 
 /// Says the format of the storage texture in `register`, which a Direct3D texture type only says
 /// in part. Without it DXC takes 32-bit floats when it makes SPIR-V; for Direct3D it ignores it.
-fn with_format(source: &str, register: &str, format: &str) -> String {
-    let end = format!(" : register({register});");
+fn with_format(source: &str, register: Register, format: &str) -> String {
+    let end = format!(" : {register};");
     source
         .lines()
         .map(|line| {
@@ -322,7 +372,15 @@ const fn vulkan_format(format: StorageFormat) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Doubles, plain_samplers, with_format, without_zero_arrays};
+    use super::{Doubles, Register, plain_samplers, with_format, without_zero_arrays};
+
+    const fn register(class: &'static str, number: u32, space: u8) -> Register {
+        Register {
+            class,
+            number,
+            space,
+        }
+    }
 
     #[test]
     fn arrays_begin_without_zeros() {
@@ -356,7 +414,7 @@ mod tests {
         let source =
             "RWTexture2D<float4> a : register(u0);\nRWTexture2D<float4> b : register(u1);\n";
         assert_eq!(
-            with_format(source, "u1", "rgba16f"),
+            with_format(source, register("u", 1, 0), "rgba16f"),
             "RWTexture2D<float4> a : register(u0);\n\
              [[vk::image_format(\"rgba16f\")]] RWTexture2D<float4> b : register(u1);\n"
         );
@@ -371,12 +429,21 @@ StructuredBuffer<uint> nagaGroup0SamplerIndexArray : register(t0, space255);
 static const SamplerState smp = nagaSamplerHeap[nagaGroup0SamplerIndexArray[1]];
 float x;
 ";
+        let registers = [register("s", 0, 0), register("s", 1, 0)];
         assert_eq!(
-            plain_samplers(source).unwrap(),
+            plain_samplers(source, &registers).unwrap(),
             "SamplerState smp : register(s1);\nfloat x;\n"
         );
+        let registers = [register("s", 0, 0), register("s", 5, 2)];
         assert_eq!(
-            plain_samplers("static const SamplerState smp = nagaSamplerHeap[other];\n"),
+            plain_samplers(source, &registers).unwrap(),
+            "SamplerState smp : register(s5, space2);\nfloat x;\n"
+        );
+        assert_eq!(
+            plain_samplers(
+                "static const SamplerState smp = nagaSamplerHeap[other];\n",
+                &registers
+            ),
             None
         );
     }

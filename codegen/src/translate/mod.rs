@@ -5,11 +5,12 @@
 //! - One module has one entry point, so slots are counted for each kernel by itself: HLSL
 //!   registers for each class (t, u, b, s) and MSL slots for each kind from 0 in the order of the
 //!   bindings, all in `space0`; GLSL 4.50 keeps SPIR-V's binding numbers; GLSL ES counts for each
-//!   kind, because devices have few; WGSL keeps group and binding.
+//!   kind, because devices have few; WGSL keeps group and binding. [`Placement`] moves them.
 //! - The kernel's own guard is the only bounds check unless the options ask for more. WGSL's and
 //!   SPIR-V's implementations have checks of their own.
-//! - Specialisation constants stay overridable in SPIR-V and WGSL; the other writers cannot
-//!   express them and get the default, or the value that the options freeze.
+//! - Specialisation constants stay overridable in SPIR-V and WGSL. naga's other writers cannot
+//!   express them: by default the texts get the value, before optimisation; if the options ask for it,
+//!   GLSL and HLSL take it from a macro and MSL from a function constant.
 //! - Arithmetic of an exact kernel is neither contracted nor reordered. naga knows nothing of that:
 //!   in GLSL and HLSL each result gets a `precise` variable, MSL a pragma, and WGSL cannot say it.
 //!   A pinned kernel gets `precise` on fewer (it reaches what a value is computed from) where that costs no
@@ -22,6 +23,7 @@ mod extent;
 mod glsl;
 mod hlsl;
 mod msl;
+mod open;
 pub(crate) mod reading;
 pub(crate) mod text;
 mod wgsl;
@@ -45,6 +47,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Step, guarded};
 use crate::lint::Finding;
+use crate::placement::Placement;
 use crate::spirv::uniform::{self, Memory};
 use crate::{Error, Language, VERSION, spirv};
 use reading::Dropped;
@@ -189,6 +192,13 @@ pub struct Options {
     pub msl_version: MslVersion,
     /// Specialisation constants that get a fixed value, by name, in every language.
     pub constants: BTreeMap<String, u32>,
+    /// Whether the others stay open in HLSL, GLSL (by a macro) and MSL (as function constants), too.
+    pub open_constants: bool,
+    /// Kernels that are written once more with constants fixed: by the end of the copy's name, the
+    /// constants' values. A kernel has the variants all of whose constants it has.
+    pub variants: BTreeMap<String, BTreeMap<String, u32>>,
+    /// Where bindings are.
+    pub placement: Placement,
 }
 
 impl Options {
@@ -875,17 +885,6 @@ impl Job<'_> {
             .collect();
         bound.sort_by_key(|it| (it.group, it.binding));
         bound
-    }
-
-    /// The module with every specialisation constant replaced by its value.
-    fn frozen(&self) -> Result<(Cow<'_, Module>, Cow<'_, ModuleInfo>), Failure> {
-        naga::back::pipeline_constants::process_overrides(
-            &self.ir.module,
-            &self.ir.info,
-            None,
-            &naga::back::PipelineConstants::default(),
-        )
-        .map_err(|error| self.failure(&error))
     }
 
     /// naga puts an underscore after every name that ends in a digit (`b1_`): takes it away again

@@ -9,33 +9,43 @@ use naga::back::msl::{
 };
 
 use super::{Job, Kind, Place, Text, Written, text};
-use crate::error::Failure;
+use crate::error::{Failure, Step};
+use crate::placement::Slots;
+
+/// Metal's last slots.
+const BUFFERS: u8 = 30;
+const TEXTURES: u8 = 127;
+const SAMPLERS: u8 = 15;
 
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
-    let (module, info) = job.frozen()?;
+    let (module, info) = job.settled()?;
     let bound = job.bound();
-    let (mut buffers, mut textures, mut samplers) = (0u8, 0u8, 0u8);
+    let base = job.options.placement.msl_slot_base;
+    let (mut buffers, mut textures, mut samplers) = (base, base, base);
     let mut resources = EntryPointResources::default();
+    let mut given = Slots::new(&job.options.placement, job.kernel, job.language);
     let mut slots = BTreeMap::new();
-    let mut take = |next: &mut u8, class: &'static str, binding: u32| {
-        let slot = *next;
-        *next += 1;
+    let mut take = |next: &mut u8, class: &'static str, most: u8, binding: u32| {
+        let moved = given.places(binding).and_then(|it| it.msl);
+        let slot = moved.map_or(*next, |it| it.slot);
+        *next = next.saturating_add(1);
+        given.take(binding, class, 0, slot.into(), most.into())?;
         slots.insert(binding, (class, slot));
-        slot
+        Ok::<_, Failure>(slot)
     };
     for it in &bound {
         let mut target = BindTarget::default();
         match it.kind {
             Kind::Uniform | Kind::Buffer { .. } => {
-                target.buffer = Some(take(&mut buffers, "buffer", it.binding));
+                target.buffer = Some(take(&mut buffers, "buffer", BUFFERS, it.binding)?);
                 target.mutable = it.kind == (Kind::Buffer { written: true });
             }
             Kind::Texture | Kind::Image => {
-                target.texture = Some(take(&mut textures, "texture", it.binding));
+                target.texture = Some(take(&mut textures, "texture", TEXTURES, it.binding)?);
                 target.mutable = it.kind == Kind::Image;
             }
             Kind::Sampler => {
-                let slot = take(&mut samplers, "sampler", it.binding);
+                let slot = take(&mut samplers, "sampler", SAMPLERS, it.binding)?;
                 target.sampler = Some(BindSamplerTarget::Resource(slot));
             }
         }
@@ -48,7 +58,10 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         );
     }
     // The sizes come after the other buffers; in the order of the globals, as naga lists them.
-    resources.sizes_buffer = Some(buffers);
+    let last = slots.values().filter(|(class, _)| *class == "buffer");
+    let sizes = last.map(|(_, slot)| slot.saturating_add(1)).max();
+    let sizes = sizes.unwrap_or(base);
+    resources.sizes_buffer = Some(sizes);
     let mut sized: Vec<_> = bound.iter().filter(|it| it.unsized_).collect();
     sized.sort_by_key(|it| it.handle);
     let sized: Vec<u32> = sized.into_iter().map(|it| it.binding).collect();
@@ -89,6 +102,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let source = source
         .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
         .replace(" - 0 - ", " - ");
+    let source = job.open_constants(source)?;
     let source = if job.kernel.rounding == Rounding::Exact {
         exact(&source).ok_or_else(|| Failure {
             construct: Some("`#include`".into()),
@@ -100,7 +114,17 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     };
     let sizes_slot = source
         .contains("_mslBufferSizes& ")
-        .then_some(u32::from(buffers));
+        .then_some(u32::from(sizes));
+    if sizes_slot.is_some() && sizes > BUFFERS {
+        return Err(Failure {
+            step: Step::Place,
+            message: format!(
+                "the buffer of sizes, which comes after all others in MSL, would be at slot {sizes}, \
+                 and there is none above {BUFFERS}"
+            ),
+            ..job.failure(&std::fmt::Error)
+        });
+    }
     let places = bound
         .iter()
         .map(|it| {

@@ -1,5 +1,6 @@
 //! WGSL, which is read back and validated.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use naga::back::pipeline_constants::process_overrides;
@@ -22,7 +23,17 @@ const LARGEST: &str = "340282346638528859811704183484516925440";
 
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let ir = job.ir;
-    let source = wgsl::write_string(&ir.module, &ir.info, wgsl::WriterFlags::empty())
+    let in_wgsl = job.options.placement.in_wgsl(job.kernel)?;
+    let place = |binding: u32| in_wgsl.get(&binding).copied().unwrap_or((0, binding));
+    let mut module = Cow::Borrowed(&ir.module);
+    if in_wgsl.iter().any(|(binding, at)| *at != (0, *binding)) {
+        for (_, global) in module.to_mut().global_variables.iter_mut() {
+            if let Some(at) = &mut global.binding {
+                (at.group, at.binding) = place(at.binding);
+            }
+        }
+    }
+    let source = wgsl::write_string(&module, &ir.info, wgsl::WriterFlags::empty())
         .map_err(|error| job.failure(&error))?;
     // naga writes the shortest digits that round to the largest f32. They are above it, which Tint
     // refuses; these are all of its digits.
@@ -35,11 +46,12 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         .bound()
         .iter()
         .map(|bound| {
+            let (group, number) = place(bound.binding);
             let place = Place {
-                name: declared(&source, bound.group, bound.binding),
+                name: declared(&source, group, number),
                 class: "binding".into(),
-                index: Some(bound.binding),
-                space: Some(bound.group),
+                index: Some(number),
+                space: Some(group),
                 block: None,
                 combined_with: Vec::new(),
             };

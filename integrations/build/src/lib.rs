@@ -41,6 +41,7 @@ pub struct Build {
     manifest: PathBuf,
     committed: Option<PathBuf>,
     arguments: Vec<OsString>,
+    bindings: Option<PathBuf>,
     program: Option<PathBuf>,
 }
 
@@ -103,6 +104,7 @@ impl Build {
             manifest: manifest.into(),
             committed: None,
             arguments: Vec::new(),
+            bindings: None,
             program: None,
         }
     }
@@ -117,6 +119,43 @@ impl Build {
     #[must_use]
     pub fn target(self, language: &str) -> Self {
         self.argument("--target").argument(language)
+    }
+
+    /// HLSL: the register space of every binding.
+    #[must_use]
+    pub fn hlsl_space(self, space: u8) -> Self {
+        self.argument(format!("--hlsl-space={space}"))
+    }
+
+    /// HLSL: the first register of every class (t, u, b, s).
+    #[must_use]
+    pub fn register_base(self, register: u16) -> Self {
+        self.argument(format!("--register-base={register}"))
+    }
+
+    /// WGSL: the group of every binding.
+    #[must_use]
+    pub fn wgsl_group(self, group: u8) -> Self {
+        self.argument(format!("--wgsl-group={group}"))
+    }
+
+    /// MSL: the first slot of buffers, of textures and of samplers.
+    #[must_use]
+    pub fn msl_slot_base(self, slot: u8) -> Self {
+        self.argument(format!("--msl-slot-base={slot}"))
+    }
+
+    /// GLSL 4.50 and GLSL ES 3.10: what is added to every binding.
+    #[must_use]
+    pub fn glsl_binding_base(self, binding: u8) -> Self {
+        self.argument(format!("--glsl-binding-base={binding}"))
+    }
+
+    /// A TOML file with places of single bindings, from the including crate's folder.
+    #[must_use]
+    pub fn bindings(mut self, file: impl Into<PathBuf>) -> Self {
+        self.bindings = Some(file.into());
+        self
     }
 
     /// Any other argument of `hankel build`; `hankel build --help` has them.
@@ -188,7 +227,7 @@ impl Build {
                 command.env_remove(name);
             }
         }
-        let ran = command
+        command
             .env("CARGO_TARGET_DIR", out.join("target"))
             .args(["--quiet", "build", "--manifest-path"])
             .arg(&manifest)
@@ -196,9 +235,11 @@ impl Build {
             .arg(&folder)
             .arg("--depfile")
             .arg(&dependencies)
-            .args(&self.arguments)
-            .output();
-        let output = match ran {
+            .args(&self.arguments);
+        if let Some(file) = &self.bindings {
+            command.arg("--bindings").arg(here.join(file));
+        }
+        let output = match command.output() {
             Ok(output) => output,
             Err(source) => {
                 let missing = named.is_none() && source.kind() == io::ErrorKind::NotFound;
@@ -349,6 +390,48 @@ mod tests {
         assert!(
             error.contains("/nonexistent/hankel") && error.contains(PROGRAM),
             "{error}"
+        );
+    }
+
+    /// A program that writes down its arguments stands for hankel.
+    #[cfg(unix)]
+    #[test]
+    fn places_of_bindings_are_arguments() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let program = folder.path().join("hankel");
+        let said = "#!/bin/sh\nfor argument in \"$@\"; do echo \"$argument\" >&2; done\nexit 2\n";
+        std::fs::write(&program, said).expect("the folder can be written");
+        let mode = std::fs::Permissions::from_mode(0o755);
+        std::fs::set_permissions(&program, mode).expect("it can be made a program");
+        let build = Build::of("Cargo.toml")
+            .program(&program)
+            .hlsl_space(1)
+            .register_base(2)
+            .wgsl_group(3)
+            .msl_slot_base(4)
+            .glsl_binding_base(5)
+            .bindings("places.toml");
+        let Err(BuildError::Failed {
+            said,
+            code: Some(2),
+        }) = build.make(folder.path(), folder.path())
+        else {
+            panic!("the program fails")
+        };
+        let file = folder.path().join("places.toml");
+        let last: Vec<&str> = said.lines().rev().take(7).collect();
+        assert_eq!(
+            last,
+            [
+                file.to_str().expect("a name in UTF-8"),
+                "--bindings",
+                "--glsl-binding-base=5",
+                "--msl-slot-base=4",
+                "--wgsl-group=3",
+                "--register-base=2",
+                "--hlsl-space=1",
+            ]
         );
     }
 
