@@ -35,6 +35,7 @@ if [ "${for_tests:-no}" = yes ]; then
     need ninja ninja-build
     need cmake cmake
     need pip3 python3-pip
+    need curl curl
 fi
 
 if [ -n "$missing" ]; then
@@ -76,6 +77,20 @@ if [ "${for_tests:-no}" = yes ]; then
             compushady-0.17.5/compushady/backends/libdxcompiler_x86_64.so.3.7
         tar -xzOf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" compushady-0.17.5/LICENSE \
             >"$HANKEL_TOOLS/compushady-LICENSE"
+    fi
+    if [ ! -e "$HANKEL_TOOLS/bevy/bevy_render/LICENSE-MIT" ]; then
+        echo "Fetching Bevy's shaders (crates.io: bevy_pbr, bevy_render 0.19.1, MIT or Apache-2.0)"
+        mkdir -p "$HANKEL_TOOLS/bevy"
+        while read -r sha256 crate; do
+            archive="$HANKEL_TOOLS/bevy/$crate.crate"
+            curl --fail --silent --show-error --location --output "$archive" \
+                "https://static.crates.io/crates/${crate%-*}/$crate.crate"
+            echo "$sha256  $archive" | sha256sum --check --quiet -
+            mkdir -p "$HANKEL_TOOLS/bevy/${crate%-*}"
+            tar -xzf "$archive" -C "$HANKEL_TOOLS/bevy/${crate%-*}" --strip-components=1 --wildcards \
+                '*.wgsl' '*/LICENSE-*'
+            rm "$archive"
+        done <xtask/tools/crates.txt
     fi
 fi
 
