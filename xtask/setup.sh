@@ -77,6 +77,18 @@ if [ "${for_tests:-no}" = yes ]; then
         tar -xzOf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" compushady-0.17.5/LICENSE \
             >"$HANKEL_TOOLS/compushady-LICENSE"
     fi
+    if [ ! -e "$HANKEL_TOOLS/bevy/bevy_render/LICENSE-MIT" ]; then
+        echo "Fetching Bevy's shaders (crates.io: bevy_pbr, bevy_render 0.19.1, MIT or Apache-2.0)"
+        while read -r sha256 crate; do
+            # cargo downloads a crate to say what it is.
+            (cd "$HANKEL_TOOLS" && cargo info --quiet "${crate%-*}@${crate##*-}" >/dev/null)
+            archive=$(first "${CARGO_HOME:-$HOME/.cargo}"/registry/cache/*/"$crate.crate")
+            echo "$sha256  $archive" | sha256sum --check --quiet -
+            mkdir -p "$HANKEL_TOOLS/bevy/${crate%-*}"
+            tar -xzf "$archive" -C "$HANKEL_TOOLS/bevy/${crate%-*}" --strip-components=1 --wildcards \
+                '*.wgsl' '*/LICENSE-*'
+        done <xtask/tools/crates.txt
+    fi
 fi
 
 # Mesa's layer for choosing among several GPUs complains on a machine without a desktop.

@@ -38,7 +38,7 @@ const FOLDER: &str = "HANKEL_SHADERS";
 /// Which shaders are wanted.
 #[derive(Clone, Debug)]
 pub struct Build {
-    manifest: PathBuf,
+    manifest: Option<PathBuf>,
     committed: Option<PathBuf>,
     arguments: Vec<OsString>,
     bindings: Option<PathBuf>,
@@ -101,7 +101,15 @@ impl Build {
     /// All kernels of the crate whose Cargo.toml is at `manifest`, in every language.
     pub fn of(manifest: impl Into<PathBuf>) -> Self {
         Self {
-            manifest: manifest.into(),
+            manifest: Some(manifest.into()),
+            ..Self::built_in()
+        }
+    }
+
+    /// The kernels that the program brings: moment shadow maps. Nothing is compiled for them.
+    pub fn built_in() -> Self {
+        Self {
+            manifest: None,
             committed: None,
             arguments: Vec::new(),
             bindings: None,
@@ -217,7 +225,6 @@ impl Build {
             .clone()
             .or_else(|| std::env::var_os(PROGRAM).map(Into::into));
         let program = named.clone().unwrap_or_else(|| "hankel".into());
-        let manifest = here.join(&self.manifest);
         let (folder, dependencies) = (out.join("shaders"), out.join("shaders.d"));
         let mut command = Command::new(&program);
         // What cargo sets for this build script is not meant for the cargo that hankel runs; and the
@@ -229,8 +236,11 @@ impl Build {
         }
         command
             .env("CARGO_TARGET_DIR", out.join("target"))
-            .args(["--quiet", "build", "--manifest-path"])
-            .arg(&manifest)
+            .args(["--quiet", "build"]);
+        if let Some(manifest) = &self.manifest {
+            command.arg("--manifest-path").arg(here.join(manifest));
+        }
+        let ran = command
             .arg("--out")
             .arg(&folder)
             .arg("--depfile")
@@ -256,9 +266,25 @@ impl Build {
             });
         }
         let text = std::fs::read_to_string(&dependencies).map_err(|e| at(&dependencies, e))?;
-        let lines = prerequisites(&text).map(|path| format!("rerun-if-changed={path}"));
-        Ok((folder, lines.collect()))
+        let mut lines: Vec<_> = prerequisites(&text)
+            .map(|path| format!("rerun-if-changed={path}"))
+            .collect();
+        if let Some(program) = found(&program) {
+            lines.push(format!("rerun-if-changed={}", program.display()));
+        }
+        Ok((folder, lines))
     }
+}
+
+/// Where a program lies: where its path says, or else in `PATH`.
+fn found(program: &Path) -> Option<PathBuf> {
+    if program.components().count() > 1 {
+        return Some(program.to_owned());
+    }
+    let folders = std::env::var_os("PATH")?;
+    std::env::split_paths(&folders)
+        .map(|folder| folder.join(program))
+        .find(|path| path.is_file())
 }
 
 /// Whether cargo set a variable for this build script alone.
@@ -433,6 +459,33 @@ mod tests {
                 "--hlsl-space=1",
             ]
         );
+    }
+
+    /// The program that a script stands for: writes its arguments to `said` and an empty rule.
+    #[cfg(unix)]
+    #[test]
+    fn built_in_kernels_need_no_crate_and_follow_the_program() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let program = folder.path().join("hankel");
+        let script =
+            "#!/bin/sh\ncd \"$(dirname \"$0\")\" && echo \"$@\" > said && echo 'a:' > shaders.d\n";
+        std::fs::write(&program, script).expect("a script");
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
+            .expect("it runs");
+        let build = Build::built_in().kernel("vsm").program(&program);
+        let (shaders, lines) = build
+            .make(folder.path(), folder.path())
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(shaders, folder.path().join("shaders"));
+        let watched = format!("rerun-if-changed={}", program.display());
+        assert_eq!(lines, [watched]);
+        let said = std::fs::read_to_string(folder.path().join("said")).expect("it ran");
+        assert!(
+            said.contains("build --out") && said.contains("--kernel vsm"),
+            "{said}"
+        );
+        assert!(!said.contains("--manifest-path"), "{said}");
     }
 
     #[test]
