@@ -102,7 +102,9 @@ fn every_technique_makes_a_graph_for_every_map() {
         for map in technique.maps {
             let (passes, text) = plan(&with_map(technique.name, map));
             assert_eq!(passes.last().map(String::as_str), Some("shade"));
-            let kept = text.lines().any(|l| l.contains("resolve_") && l.contains(map.format.name()));
+            let kept = text
+                .lines()
+                .any(|l| l.contains("resolve_") && l.contains(map.format.name()));
             assert!(kept || passes.len() == 2, "{text}");
         }
     }
@@ -258,9 +260,16 @@ fn variance_of_exponentials_gives_the_same_light_and_shadow() {
 fn the_table_of_techniques_is_current() {
     let page = include_str!("../../docs/frames.md");
     for t in techniques::ALL {
-        let maps: Vec<String> = t.maps.iter().map(|m| format!("`{}` {}", m.format.name(), m.depth_range.name())).collect();
+        let maps: Vec<String> = t
+            .maps
+            .iter()
+            .map(|m| format!("`{}` {}", m.format.name(), m.depth_range.name()))
+            .collect();
         let row = format!("| `{}` | {} | {} |", t.name, t.summary, maps.join(", "));
-        assert!(page.lines().any(|l| l == row), "docs/frames.md has no row\n{row}");
+        assert!(
+            page.lines().any(|l| l == row),
+            "docs/frames.md has no row\n{row}"
+        );
     }
 }
 

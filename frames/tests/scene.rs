@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
-use hankel_frames::scene::{
-    DepthRange, Geometry, Mesh, Procedural, Scene, SceneError, Shadow,
-};
+use hankel_frames::scene::{DepthRange, Geometry, Mesh, Procedural, Scene, SceneError, Shadow};
 use hankel_frames::techniques::Technique;
 
 const LEAST: &str = r#"
