@@ -8,7 +8,7 @@ use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kerne
 use hankel_moments::{markov_1, warped_2};
 
 use crate::resolve::mean;
-use crate::shade::{Light, shade};
+use crate::shade::{Light, shade_with};
 
 /// Exponents of the two warps of exponential variance shadow maps, for depths moved to [-1, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -110,7 +110,7 @@ pub fn shade_esm(
     #[texture] map: Texture2d<'_>,
     #[sampler] sampler: Sampler,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let mean = map.sample_level(sampler, uv, 0.0).x;
         markov_1(mean, exponential(*exponent, z))
     })
@@ -139,7 +139,7 @@ pub fn shade_evsm(
     #[values(1, 2)]
     warps: u32,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let texel = map.sample_level(sampler, uv, 0.0);
         let (positive, negative) = exponents.warp(z);
         let (nearer, _) = warped_2(texel.x, texel.y, positive, light.moment_bias);

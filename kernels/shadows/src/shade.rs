@@ -113,7 +113,7 @@ fn receiver(light: &Light, world: Vec3) -> (Vec2, f32) {
 /// Lambert's law with what `shadow` gives for a receiver's coordinates in the map and its depth, both
 /// from 0 to 1 inside, after the cut against light leaking.
 #[inline(always)]
-pub(crate) fn shade(
+pub(crate) fn shade_with(
     light: &Light,
     world: Vec3,
     normal: Vec3,
@@ -206,7 +206,7 @@ pub fn shade_hamburger(
     #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let m = look_up(map, sampler, encoding, uv);
         hamburger_4(biased(light, m), in_range(z, encoding))
     })
@@ -237,7 +237,7 @@ pub fn shade_hausdorff(
     #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let m = biased(light, look_up(map, sampler, encoding, uv));
         let z = in_range(z, encoding);
         if encoding == encoding::UNIT {
@@ -274,7 +274,7 @@ pub fn shade_variance(
     #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let m = look_up(map, sampler, encoding, uv);
         variance_2(m.b1, m.b2, in_range(z, encoding), light.moment_bias)
     })

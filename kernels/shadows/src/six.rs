@@ -11,7 +11,7 @@ use hankel_moments::{
 
 use crate::bounds::Shadow;
 use crate::resolve::mean;
-use crate::shade::{Light, encoding, shade};
+use crate::shade::{Light, encoding, shade_with};
 
 /// How six moments are turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -179,7 +179,7 @@ pub fn shade_hamburger_6(
     #[values(encoding::PLAIN, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let odd = first.sample_level(sampler, uv, 0.0);
         let even = second.sample_level(sampler, uv, 0.0);
         let m = if encoding == encoding::SYMMETRIC {

@@ -6,7 +6,7 @@ use hankel_moments::{HalfAngle, TrigonometricMoments, cut_leak, trigonometric_4}
 
 use crate::bounds::Shadow;
 use crate::resolve::mean;
-use crate::shade::{Light, shade};
+use crate::shade::{Light, shade_with};
 
 /// How a map holds trigonometric moments: values of the specialisation constant `encoding`.
 pub mod encoding {
@@ -152,7 +152,7 @@ pub fn shade_trigonometric(
     #[values(encoding::PLAIN, encoding::UNORM)]
     encoding: u32,
 ) -> Vec4 {
-    shade(light, world, normal, colour, |uv, z| {
+    shade_with(light, world, normal, colour, |uv, z| {
         let texel = map.sample_level(sampler, uv, 0.0);
         let held = |x: f32| {
             if encoding == encoding::UNORM {
