@@ -59,7 +59,6 @@ pub enum Show {
 pub(crate) fn light(scene: &Scene, view: &LightView, show: Show) -> Light {
     let shadow = &scene.shadow;
     let clip = view.clip_from_world;
-    let target = crate::scene::Shadow::published(shadow.depth_range, shadow.format).four();
     let (irradiance, ambient) = match show {
         Show::Picture => (IRRADIANCE, AMBIENT),
         Show::Light => (1.0, Vec4::ZERO),
@@ -71,7 +70,7 @@ pub(crate) fn light(scene: &Scene, view: &LightView, show: Show) -> Light {
         row_depth: clip.row(2),
         toward: (-view.direction).extend(irradiance),
         ambient,
-        bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
+        bias_target: Vec4::from_array(shadow.map.bias_target),
         moment_bias: shadow.moment_bias,
         depth_bias: shadow.depth_bias,
         light_leak: shadow.leak_cut,

@@ -1,13 +1,17 @@
 //! Passes that techniques share: functions that take handles and return a handle.
 
+use std::borrow::Cow;
+
 use hankel_dsl::glam::IVec2;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::{Address, Filter, Sampler};
+use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_shadows::blur::Direction;
 use hankel_shadows::shade::encoding;
 
-use crate::graph::{AddDraw, Graph, Handle, Result, Shape, Surfaces};
-use crate::scene::{DepthRange, MapFormat, Shadow};
+use crate::graph::{AddCompute, AddDraw, Graph, Handle, Result, Shape, Surfaces};
+use crate::scene::{DepthRange, Shadow};
+use crate::techniques::Map;
 
 /// How maps are looked up.
 pub const BILINEAR: Sampler = Sampler::new(Filter::Linear, Address::ClampToEdge);
@@ -56,46 +60,73 @@ pub fn light_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
         .depth([given.shadow.size; 2])
 }
 
-/// How four moments lie in a map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Encoding {
-    /// The kernel that makes them of depths.
-    resolve: &'static str,
-    /// Value of the shading kernels' constant `encoding`.
-    pub constant: u32,
-}
+/// The maps of four power moments: the moment bias pulls towards a published target, by the published
+/// strength.
+pub const POWER_MOMENTS: &[Map] = &[
+    Map {
+        format: TexelFormat::Rgba16Unorm,
+        depth_range: DepthRange::Symmetric,
+        encoding: encoding::SYMMETRIC,
+        ..biased(SYMMETRIC_4_16_LECTURE)
+    },
+    Map {
+        format: TexelFormat::Rgba16Unorm,
+        depth_range: DepthRange::Unit,
+        encoding: encoding::UNIT,
+        ..biased(UNIT_4_16)
+    },
+    Map {
+        format: TexelFormat::Rgba32Float,
+        depth_range: DepthRange::Symmetric,
+        encoding: encoding::PLAIN,
+        ..biased(SYMMETRIC_4_32)
+    },
+];
 
-impl Encoding {
-    /// What the scene asks for.
-    pub fn of(graph: &mut Graph, given: &Given) -> Self {
-        let (resolve, constant) = match (given.shadow.format, given.shadow.depth_range) {
-            (MapFormat::Rgba32float, _) => {
-                graph.omit("quantisation", "32 bits hold the moments as they are");
-                ("resolve_plain", encoding::PLAIN)
-            }
-            (MapFormat::Rgba16unorm, DepthRange::Unit) => ("resolve_unit", encoding::UNIT),
-            (MapFormat::Rgba16unorm, DepthRange::Symmetric) => {
-                ("resolve_symmetric", encoding::SYMMETRIC)
-            }
-        };
-        Self { resolve, constant }
+const fn biased(bias: Bias) -> Map {
+    let target = bias.four();
+    Map {
+        moment_bias: bias.strength as f32,
+        bias_target: [target.b1, target.b2, target.b3, target.b4],
+        ..DEPTHS[0]
     }
 }
 
-/// The mean of four moments of each texel's samples.
+/// The one map of techniques that make none of the light's depths.
+pub const DEPTHS: &[Map] = &[Map {
+    format: TexelFormat::R32Float,
+    depth_range: DepthRange::Unit,
+    encoding: 0,
+    moment_bias: 0.0,
+    bias_target: [0.0; 4],
+}];
+
+/// The mean of four power moments of each texel's samples, as one of [`POWER_MOMENTS`].
 ///
 /// # Errors
 /// See [`light_depth`].
-pub fn moments(
-    graph: &mut Graph,
-    given: &Given,
-    encoding: Encoding,
-    depth: Handle,
-) -> Result<Handle> {
-    graph
-        .compute("resolve", encoding.resolve)
+pub fn moments(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Handle> {
+    let kernel = match given.shadow.map.encoding {
+        encoding::UNIT => "resolve_unit",
+        encoding::SYMMETRIC => "resolve_symmetric",
+        _ => "resolve_plain",
+    };
+    resolve(graph, given, kernel)
         .arg("depth", depth)
         .image([given.shadow.size; 2])
+}
+
+/// Begins the pass that makes a map of the light's depths.
+pub fn resolve<'g>(
+    graph: &'g mut Graph,
+    given: &Given,
+    kernel: impl Into<Cow<'static, str>>,
+) -> AddCompute<'g> {
+    let format = given.shadow.map.format;
+    if format.bytes() == 4 * format.channels() {
+        graph.omit("quantisation", "32 bits hold what is filtered as it is");
+    }
+    graph.compute("resolve", kernel)
 }
 
 /// Weights of a Gaussian with `taps` taps: of the centre and of the taps to one side. They reach

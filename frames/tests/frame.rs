@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hankel_dsl::glam::{DVec3, Vec3};
 use hankel_frames::scene::{CameraView, Procedural, Scene};
+use hankel_frames::techniques::Technique;
 use hankel_frames::visibility::cast::{Caster, Lens, Segment};
 use hankel_frames::{
     FrameError, NoShaders, Picture, Progress, Quiet, Show, graph_of, render, render_on, techniques,
@@ -28,6 +29,14 @@ fn scene(shadow: &str) -> Scene {
         "#
     );
     Scene::parse(&text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn with_map(technique: &str, map: &techniques::Map) -> String {
+    format!(
+        "technique = '{technique}'\nformat = '{}'\ndepth_range = '{}'",
+        map.format.name(),
+        map.depth_range.name()
+    )
 }
 
 fn plan(shadow: &str) -> (Vec<String>, String) {
@@ -90,9 +99,13 @@ fn a_plan_holds_what_is_needed_and_says_what_is_not() {
 #[test]
 fn every_technique_makes_a_graph_for_every_map() {
     for technique in techniques::ALL {
-        for map in ["", "depth_range = 'unit'", "format = 'rgba32float'"] {
-            let (passes, _) = plan(&format!("technique = '{}'\n{map}", technique.name));
+        for map in technique.maps {
+            let (passes, text) = plan(&with_map(technique.name, map));
             assert_eq!(passes.last().map(String::as_str), Some("shade"));
+            let kept = text
+                .lines()
+                .any(|l| l.contains("resolve_") && l.contains(map.format.name()));
+            assert!(kept || passes.len() == 2, "{text}");
         }
     }
 }
@@ -187,10 +200,9 @@ fn percentage_closer_filtering_is_what_rays_say() {
 fn is_as_filtered_depths(technique: &str) {
     let pcf = scene("technique = 'pcf'\nfilter = 3\nsize = 512\ndepth_bias = 0.003");
     let wanted = ground(&pcf, &native(&pcf), 3).map(|g| i32::from(range(&g)[0]));
-    for map in ["", "depth_range = 'unit'", "format = 'rgba32float'"] {
-        let scene = scene(&format!(
-            "technique = '{technique}'\nfilter = 3\nsize = 512\n{map}"
-        ));
+    for map in Technique::named(technique).unwrap().maps {
+        let map = with_map(technique, map);
+        let scene = scene(&format!("filter = 3\nsize = 512\n{map}"));
         let greys = ground(&scene, &native(&scene), 3);
         for (greys, wanted) in greys.iter().zip(wanted) {
             let off = greys
@@ -220,6 +232,45 @@ fn hausdorff_gives_the_same_light_and_shadow() {
 #[test]
 fn variance_gives_the_same_light_and_shadow() {
     is_as_filtered_depths("vsm");
+}
+
+#[test]
+fn six_moments_give_the_same_light_and_shadow() {
+    is_as_filtered_depths("hamburger-6");
+}
+
+#[test]
+fn trigonometric_moments_give_the_same_light_and_shadow() {
+    is_as_filtered_depths("tmsm");
+}
+
+#[test]
+fn exponentials_give_the_same_light_and_shadow() {
+    is_as_filtered_depths("esm");
+}
+
+#[test]
+fn variance_of_exponentials_gives_the_same_light_and_shadow() {
+    is_as_filtered_depths("evsm2");
+    is_as_filtered_depths("evsm4");
+}
+
+/// The page about frames says of each technique what it is and how its map may be stored.
+#[test]
+fn the_table_of_techniques_is_current() {
+    let page = include_str!("../../docs/frames.md");
+    for t in techniques::ALL {
+        let maps: Vec<String> = t
+            .maps
+            .iter()
+            .map(|m| format!("`{}` {}", m.format.name(), m.depth_range.name()))
+            .collect();
+        let row = format!("| `{}` | {} | {} |", t.name, t.summary, maps.join(", "));
+        assert!(
+            page.lines().any(|l| l == row),
+            "docs/frames.md has no row\n{row}"
+        );
+    }
 }
 
 #[test]

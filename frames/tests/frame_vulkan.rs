@@ -57,7 +57,16 @@ fn agree(geometry: &str, shadow: &str) {
 #[test]
 fn every_technique_agrees_on_a_box() {
     for technique in techniques::ALL {
-        agree("box", &format!("technique = '{}'", technique.name));
+        for map in technique.maps {
+            let (format, range) = (map.format.name(), map.depth_range.name());
+            agree(
+                "box",
+                &format!(
+                    "technique = '{}'\nformat = '{format}'\ndepth_range = '{range}'",
+                    technique.name
+                ),
+            );
+        }
     }
 }
 

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
-use hankel_frames::scene::{
-    DepthRange, Geometry, MapFormat, Mesh, Procedural, Scene, SceneError, Shadow,
-};
+use hankel_frames::passes::POWER_MOMENTS;
+use hankel_frames::scene::{DepthRange, Geometry, Mesh, Procedural, Scene, SceneError, Shadow};
 use hankel_frames::techniques::Technique;
 
 const LEAST: &str = r#"
@@ -84,13 +83,15 @@ fn every_field_is_read() {
     assert_eq!(scene.geometry, Geometry::Model { file, ground: 2.5 });
     assert_eq!(scene.camera.up, Vec3::Z);
     assert_eq!(scene.light, Vec3::NEG_Y);
+    let map = POWER_MOMENTS[1];
+    let stored = (map.format.name(), map.depth_range);
+    assert_eq!(stored, ("rgba16unorm", DepthRange::Unit));
     assert_eq!(
         scene.shadow,
         Shadow {
             technique: Technique::named("hausdorff").unwrap(),
             size: 512,
-            depth_range: DepthRange::Unit,
-            format: MapFormat::Rgba16unorm,
+            map,
             filter: 9,
             moment_bias: 1e-4,
             depth_bias: 0.001,
@@ -156,9 +157,21 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
             with("[shadow]\nformat = 'rgba32float'\ndepth_range = 'unit'"),
             &[
                 "scene.toml:11:15",
-                "`shadow.depth_range` is unit",
-                "symmetric",
+                "`shadow.depth_range` is `unit`",
+                "`symmetric`, for `hamburger` in rgba32float",
             ],
+        ),
+        (
+            with("[shadow]\ntechnique = 'esm'\nformat = 'rgba32float'"),
+            &[
+                "scene.toml:11:10",
+                "`shadow.format` is `rgba32float`",
+                "must be `r32float`, for `esm`",
+            ],
+        ),
+        (
+            with("[shadow]\ntechnique = 'tmsm'\ndepth_range = 'symmetric'"),
+            &["`shadow.depth_range` is `symmetric`", "`unit`, for `tmsm`"],
         ),
         (
             with("[shadow]\nsise = 3"),

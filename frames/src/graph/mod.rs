@@ -412,12 +412,15 @@ impl Graph {
         }
     }
 
-    /// Notes what a technique leaves out, and why.
+    /// Notes what a technique leaves out, and why; the same is noted once.
     pub fn omit(&mut self, what: impl Into<Cow<'static, str>>, why: impl Into<Cow<'static, str>>) {
-        self.omitted.push(Omission {
+        let omission = Omission {
             what: what.into(),
             why: why.into(),
-        });
+        };
+        if !self.omitted.contains(&omission) {
+            self.omitted.push(omission);
+        }
     }
 
     /// Which passes the kept values need.

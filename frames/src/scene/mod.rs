@@ -19,10 +19,10 @@
 //! [shadow]
 //! technique = "hamburger"         # or another of `techniques::ALL`
 //! size = 1024                     # texels along an edge of the map
-//! format = "rgba16unorm"          # or "rgba32float"
-//! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1], for rgba16unorm
+//! format = "rgba16unorm"          # one of those that the technique has; its first without it
+//! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1]: likewise
 //! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
-//! moment_bias = 6e-5
+//! moment_bias = 6e-5              # each map has its default
 //! depth_bias = 0.0                # each technique has its default
 //! leak_cut = 0.02
 //!
@@ -44,12 +44,10 @@ mod view;
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
-use hankel_dsl::native::describe::TexelFormat;
-use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_system::input;
 use serde::Deserialize;
 
-use crate::techniques::{self, Technique};
+use crate::techniques::{self, Map, Technique};
 
 pub use error::{Place, Result, SceneError};
 pub use mesh::{Bounds, Mesh};
@@ -115,23 +113,13 @@ pub enum DepthRange {
     Symmetric,
 }
 
-/// What the moment map's texels are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MapFormat {
-    /// 16 bits for each moment.
-    Rgba16unorm,
-    /// 32 bits for each moment.
-    Rgba32float,
-}
-
-impl MapFormat {
-    /// As a kernel names it.
+impl DepthRange {
+    /// As scene files name it.
     #[must_use]
-    pub const fn texel(self) -> TexelFormat {
+    pub const fn name(self) -> &'static str {
         match self {
-            Self::Rgba16unorm => TexelFormat::Rgba16Unorm,
-            Self::Rgba32float => TexelFormat::Rgba32Float,
+            Self::Unit => "unit",
+            Self::Symmetric => "symmetric",
         }
     }
 }
@@ -143,15 +131,12 @@ pub struct Shadow {
     pub technique: &'static Technique,
     /// Texels along an edge of the map, 16 to [`Scene::MAX_MAP`].
     pub size: u32,
-    /// Interval of depths; [`DepthRange::Symmetric`] with [`MapFormat::Rgba32float`]. PCF takes no
-    /// notice.
-    pub depth_range: DepthRange,
-    /// The map's texels. PCF takes no notice.
-    pub format: MapFormat,
+    /// How its map is stored, one of the technique's.
+    pub map: Map,
     /// Taps of the Gaussian along an axis: odd, 1 (no filter) to [`Scene::MAX_FILTER`].
     pub filter: u32,
-    /// How far moments are pulled towards those of a harmless distribution so that rounding
-    /// cannot make them impossible, 0 to 0.1.
+    /// What is done so that rounding cannot make moments impossible, 0 to 0.1: how far they are pulled
+    /// towards those of a harmless distribution, or what [`Map::moment_bias`] says of the technique.
     pub moment_bias: f32,
     /// Subtracted from the receiver's depth, in units of the map's whole depth, 0 to 0.1.
     pub depth_bias: f32,
@@ -159,34 +144,23 @@ pub struct Shadow {
     pub leak_cut: f32,
 }
 
-impl Shadow {
-    /// The published moment bias for a map: see [`hankel_moments::Bias`].
-    #[must_use]
-    pub const fn recommended_bias(depth_range: DepthRange, format: MapFormat) -> f32 {
-        Self::published(depth_range, format).strength as f32
-    }
-
-    /// The published bias for a map.
-    pub(crate) const fn published(depth_range: DepthRange, format: MapFormat) -> Bias {
-        match (format, depth_range) {
-            (MapFormat::Rgba16unorm, DepthRange::Unit) => UNIT_4_16,
-            (MapFormat::Rgba16unorm, DepthRange::Symmetric) => SYMMETRIC_4_16_LECTURE,
-            (MapFormat::Rgba32float, _) => SYMMETRIC_4_32,
-        }
+impl Default for Shadow {
+    fn default() -> Self {
+        Self::of(techniques::ALL[0], techniques::ALL[0].maps[0])
     }
 }
 
-impl Default for Shadow {
-    fn default() -> Self {
-        let (depth_range, format) = (DepthRange::Symmetric, MapFormat::Rgba16unorm);
+impl Shadow {
+    /// What a technique does unless the scene says otherwise, with one of its maps.
+    #[must_use]
+    pub const fn of(technique: &'static Technique, map: Map) -> Self {
         Self {
-            technique: techniques::ALL[0],
+            technique,
             size: 1024,
-            depth_range,
-            format,
+            map,
             filter: 7,
-            moment_bias: Self::recommended_bias(depth_range, format),
-            depth_bias: 0.0,
+            moment_bias: map.moment_bias,
+            depth_bias: technique.depth_bias,
             leak_cut: 0.02,
         }
     }

@@ -9,8 +9,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
-use super::{Camera, DepthRange, FAR_OFF, Geometry, MapFormat, Procedural, Scene, Shadow};
-use crate::techniques::{self, Technique};
+use super::{Camera, DepthRange, FAR_OFF, Geometry, Procedural, Scene, Shadow};
+use crate::techniques::{self, Map, Technique};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -53,7 +53,7 @@ struct ShadowText {
     technique: Option<Spanned<String>>,
     size: Option<Spanned<i64>>,
     depth_range: Option<Spanned<DepthRange>>,
-    format: Option<MapFormat>,
+    format: Option<Spanned<String>>,
     filter: Option<Spanned<i64>>,
     moment_bias: Option<Spanned<f32>>,
     depth_bias: Option<Spanned<f32>>,
@@ -74,6 +74,16 @@ pub(super) fn parse(text: &str, file: &Path) -> Result<Scene> {
         problem: reader.problem(&e),
     })?;
     reader.scene(f)
+}
+
+/// Names to choose from, each once.
+fn one_of(mut names: Vec<String>) -> String {
+    names.dedup();
+    let names: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
+    match names.len() {
+        1 => names.concat(),
+        _ => format!("one of {}", names.join(", ")),
+    }
 }
 
 struct Reader<'a> {
@@ -267,54 +277,81 @@ impl Reader<'_> {
         }
     }
 
-    fn shadow(&self, s: ShadowText) -> Result<Shadow> {
-        let d = Shadow::default();
-        let format = s.format.unwrap_or(d.format);
-        let depth_range = s
-            .depth_range
-            .as_ref()
-            .map_or(d.depth_range, |r| *r.get_ref());
-        if let (Some(r), MapFormat::Rgba32float, DepthRange::Unit) =
-            (&s.depth_range, format, depth_range)
-        {
-            return self.refuse(
-                r.span(),
-                "shadow.depth_range",
-                "unit",
-                "symmetric: a map of rgba32float holds the moments of depths in [-1, 1]",
-            );
+    /// The technique's map with the given format and range, the first one that has them.
+    fn map(
+        &self,
+        technique: &Technique,
+        format: Option<Spanned<String>>,
+        range: Option<Spanned<DepthRange>>,
+    ) -> Result<Map> {
+        let of_format = |map: &&Map| {
+            let given = format.as_ref().map(Spanned::get_ref);
+            given.is_none_or(|f| f == map.format.name())
+        };
+        let maps: Vec<&Map> = technique.maps.iter().filter(of_format).collect();
+        let found = maps.iter().find(|map| {
+            let given = range.as_ref().map(Spanned::get_ref);
+            given.is_none_or(|r| *r == map.depth_range)
+        });
+        if let Some(map) = found {
+            return Ok(**map);
         }
+        let of = |allowed: Vec<String>| format!("{}, for `{}`", one_of(allowed), technique.name);
+        match (format, range) {
+            (Some(format), _) if maps.is_empty() => {
+                let names = technique.maps.iter().map(|m| m.format.name().to_owned());
+                let value = format!("`{}`", format.get_ref());
+                self.refuse(format.span(), "shadow.format", value, of(names.collect()))
+            }
+            (format, Some(range)) => {
+                let names = maps.iter().map(|m| m.depth_range.name().to_owned());
+                let mut allowed = of(names.collect());
+                if let Some(format) = format {
+                    allowed = format!("{allowed} in {}", format.get_ref());
+                }
+                let value = format!("`{}`", range.get_ref().name());
+                self.refuse(range.span(), "shadow.depth_range", value, allowed)
+            }
+            // Without a format and a range any map will do, and each technique has one.
+            (_, None) => Ok(technique.maps[0]),
+        }
+    }
+
+    fn shadow(&self, s: ShadowText) -> Result<Shadow> {
+        let technique = match &s.technique {
+            Some(name) => match Technique::named(name.get_ref()) {
+                Some(technique) => technique,
+                None => {
+                    let names = techniques::ALL.map(|t| t.name.to_owned());
+                    return self.refuse(
+                        name.span(),
+                        "shadow.technique",
+                        format!("`{}`", name.get_ref()),
+                        one_of(names.into()),
+                    );
+                }
+            },
+            None => Shadow::default().technique,
+        };
+        let d = Shadow::of(technique, self.map(technique, s.format, s.depth_range)?);
         let filter_span = s.filter.as_ref().map_or(0..0, Spanned::span);
         let filter = self.integer("shadow.filter", s.filter, d.filter, 1..=Scene::MAX_FILTER)?;
         if filter.is_multiple_of(2) {
             return self.refuse(filter_span, "shadow.filter", filter, "odd");
         }
-        let technique = match &s.technique {
-            Some(name) => match Technique::named(name.get_ref()) {
-                Some(technique) => technique,
-                None => {
-                    let names = techniques::ALL.map(|t| format!("`{}`", t.name));
-                    return self.refuse(
-                        name.span(),
-                        "shadow.technique",
-                        format!("`{}`", name.get_ref()),
-                        format!("one of {}", names.join(", ")),
-                    );
-                }
-            },
-            None => d.technique,
-        };
-        let bias = Shadow::recommended_bias(depth_range, format);
-        let depth_bias = technique.depth_bias;
+        let bias = 0.0..=0.1;
         Ok(Shadow {
-            technique,
             size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,
-            depth_range,
-            format,
             filter,
-            moment_bias: self.number("shadow.moment_bias", s.moment_bias, bias, 0.0..=0.1)?,
-            depth_bias: self.number("shadow.depth_bias", s.depth_bias, depth_bias, 0.0..=0.1)?,
+            moment_bias: self.number(
+                "shadow.moment_bias",
+                s.moment_bias,
+                d.moment_bias,
+                bias.clone(),
+            )?,
+            depth_bias: self.number("shadow.depth_bias", s.depth_bias, d.depth_bias, bias)?,
             leak_cut: self.number("shadow.leak_cut", s.leak_cut, d.leak_cut, 0.0..=0.9)?,
+            ..d
         })
     }
 

@@ -3,25 +3,25 @@
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, Encoding, Given, blur, light_depth, moments, shade};
+use crate::passes::{BILINEAR, Given, POWER_MOMENTS, blur, light_depth, moments, shade};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "hamburger",
     summary: "four moments, depths anywhere on the line",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
     depth_bias: 0.0,
+    maps: POWER_MOMENTS,
     is_lower_bound: true,
     add,
 };
 
 fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
-    let encoding = Encoding::of(graph, given);
     let depth = light_depth(graph, given)?;
-    let map = moments(graph, given, encoding, depth)?;
+    let map = moments(graph, given, depth)?;
     let map = blur(graph, given, map)?;
     shade(graph, given, "shade_hamburger", |pass| {
         pass.arg("map", map)
             .arg("sampler", BILINEAR)
-            .constant("encoding", encoding.constant)
+            .constant("encoding", given.shadow.map.encoding)
     })
 }

@@ -1,16 +1,23 @@
 //! The techniques: each one a file that adds its passes to a graph, and a line in [`ALL`]. Nothing
 //! else knows their names.
 
+mod esm;
+mod evsm;
 mod hamburger;
+mod hamburger_6;
 mod hausdorff;
 mod pcf;
 mod pcf_gaussian;
+mod trigonometric;
 mod vsm;
 
 use std::fmt;
 
+use hankel_dsl::native::describe::TexelFormat;
+
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::Given;
+use crate::scene::DepthRange;
 
 /// A way to turn depths into shadows.
 pub struct Technique {
@@ -21,17 +28,42 @@ pub struct Technique {
     /// What is taken off a receiver's depth unless the scene says otherwise, in units of the map's
     /// whole depth.
     pub depth_bias: f32,
+    /// How its map may be stored: at least one, the first unless the scene says otherwise.
+    pub maps: &'static [Map],
     /// Whether its shadow is never darker than [`crate::truth::filtered`], but for rounding.
     pub is_lower_bound: bool,
     /// Adds its passes; gives the picture.
     pub add: fn(&mut Graph, &Given) -> Result<Handle>,
 }
 
+/// A way to store what a technique filters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Map {
+    /// What its texels are; scene files name it.
+    pub format: TexelFormat,
+    /// The interval that depths are mapped to.
+    pub depth_range: DepthRange,
+    /// How kernels of the technique call it: a value of a constant of theirs, for example.
+    pub encoding: u32,
+    /// Against what rounding does to moments, unless the scene says otherwise. In most techniques how
+    /// far they are pulled towards those of a harmless distribution, from 0 to 1; with mean and
+    /// variance alone, the least variance; where depths are warped, the least variance relative to
+    /// the square of the receiver's warped depth.
+    pub moment_bias: f32,
+    /// Moments of that distribution, if there are four and the technique takes them from the light.
+    pub bias_target: [f32; 4],
+}
+
 /// All of them.
-pub const ALL: [&Technique; 5] = [
+pub const ALL: [&Technique; 10] = [
     &hamburger::TECHNIQUE,
     &hausdorff::TECHNIQUE,
+    &hamburger_6::TECHNIQUE,
+    &trigonometric::TECHNIQUE,
     &vsm::TECHNIQUE,
+    &esm::TECHNIQUE,
+    &evsm::POSITIVE,
+    &evsm::BOTH,
     &pcf::TECHNIQUE,
     &pcf_gaussian::TECHNIQUE,
 ];

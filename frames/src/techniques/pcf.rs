@@ -3,13 +3,14 @@
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, light_depth, shade};
+use crate::passes::{DEPTHS, Given, light_depth, shade};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "pcf",
     summary: "percentage-closer filtering of the depths themselves",
     // The comparison has no slack, and a slope would be shaded by its own texels.
     depth_bias: 2e-3,
+    maps: DEPTHS,
     is_lower_bound: false,
     add,
 };

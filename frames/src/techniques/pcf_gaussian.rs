@@ -3,7 +3,7 @@
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, gaussian, light_depth, shade};
+use crate::passes::{DEPTHS, Given, gaussian, light_depth, shade};
 use crate::visibility::SAMPLES;
 
 pub const TECHNIQUE: Technique = Technique {
@@ -11,6 +11,7 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "percentage-closer filtering with the other techniques' weights",
     // As for `pcf`.
     depth_bias: 2e-3,
+    maps: DEPTHS,
     is_lower_bound: true,
     add,
 };

@@ -18,11 +18,15 @@
 //! - \[MBD\] M. Worchel, M. Alexa: *Moment Bounds are Differentiable: Efficiently Approximating
 //!   Measures in Inverse Rendering* (2025).
 //! - \[VSM\] W. Donnelly, A. Lauritzen: *Variance Shadow Maps* (2006).
+//! - \[ESM\] T. Annen, T. Mertens, H.-P. Seidel, E. Flerackers, J. Kautz: *Exponential Shadow Maps*
+//!   (2008).
+//! - \[LVSM\] A. Lauritzen, M. McCool: *Layered Variance Shadow Maps* (2008).
 #![no_std]
 
 pub mod bias;
 mod bound;
 mod degenerate;
+mod exponential;
 mod hamburger;
 mod hausdorff;
 mod leak;
@@ -41,6 +45,7 @@ pub use bound::{
     mix_bias_adjoint, mix_bias_and_total,
 };
 pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
+pub use exponential::{markov_1, warped_2};
 pub use hamburger::hamburger_4;
 pub use hausdorff::{hausdorff_4, hausdorff_4_symmetric};
 pub use leak::cut_leak;

@@ -5,9 +5,12 @@
 //! | --- | --- |
 //! | depth from the light, 4x multisampled | [`light_depth`](depth::light_depth) |
 //! | resolve to four moments, quantised | [`resolve_unit`](resolve::resolve_unit), [`resolve_symmetric`](resolve::resolve_symmetric), [`resolve_plain`](resolve::resolve_plain) |
-//! | separable filter, twice | [`blur`](blur::blur) |
+//! | to six | [`resolve_symmetric_6`](six::resolve_symmetric_6), [`resolve_plain_6`](six::resolve_plain_6) |
+//! | to trigonometric ones | [`resolve_trigonometric_unorm`](trigonometric::resolve_trigonometric_unorm), [`resolve_trigonometric_plain`](trigonometric::resolve_trigonometric_plain) |
+//! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm) |
+//! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float) |
 //! | geometry from the camera | [`surface`](shade::surface) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm) |
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -16,6 +19,7 @@ extern crate std;
 pub mod blur;
 pub mod bounds;
 pub mod depth;
+pub mod exponential;
 mod grid;
 #[cfg(not(target_arch = "spirv"))]
 pub mod inputs;
@@ -33,13 +37,25 @@ hankel_dsl::kernels![
     resolve::resolve_unit,
     resolve::resolve_symmetric,
     resolve::resolve_plain,
+    six::resolve_symmetric_6,
+    six::resolve_plain_6,
+    trigonometric::resolve_trigonometric_unorm,
+    trigonometric::resolve_trigonometric_plain,
+    exponential::resolve_esm,
+    exponential::resolve_evsm,
     blur::blur,
+    blur::blur_rgba16float,
+    blur::blur_r32float,
     shade::surface,
     shade::shade_hamburger,
     shade::shade_hausdorff,
     shade::shade_variance,
     shade::shade_pcf,
     shade::shade_pcf_gaussian,
+    six::shade_hamburger_6,
+    trigonometric::shade_trigonometric,
+    exponential::shade_esm,
+    exponential::shade_evsm,
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,

@@ -1,5 +1,8 @@
 //! From multisampled depth to filterable moments: each sample's depth gives a moment vector, the
-//! texel stores their mean (\[BHS\], lecture, "Generate a moment shadow map", step 2).
+//! texel stores their mean (\[BHS\], lecture, "Generate a moment shadow map", step 2). Here are four power
+//! moments.
+
+use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::{Real, Texture2dMultisampled, kernel};
@@ -7,12 +10,12 @@ use hankel_moments::{Moments4, Quantized4, quantize_symmetric_4, quantize_unit_4
 
 /// The mean of what the samples of a texel give; depths beyond [0, 1] are moved to its ends.
 #[inline(always)]
-fn mean(
+pub(crate) fn mean<T: AddAssign + Div<f32, Output = T>>(
     depth: Texture2dMultisampled<'_>,
     at: UVec2,
     samples: u32,
-    moments: impl Fn(f32) -> Vec4,
-) -> Vec4 {
+    moments: impl Fn(f32) -> T,
+) -> T {
     let sample = |i: u32| moments(Real::saturate(depth.load(at, i).x));
     let mut sum = sample(0);
     let mut i = 1;

@@ -1,5 +1,5 @@
-//! Forward shading with a shadow map: each technique is a fragment kernel over the same varyings,
-//! uniforms and map.
+//! Forward shading with a shadow map: each technique is a fragment kernel over the same varyings and the
+//! same light. Here are those of four power moments and of the depths themselves, and what all share.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{
@@ -39,7 +39,8 @@ pub struct Light {
     pub ambient: Vec4,
     /// The moment vector that the bias mixes in.
     pub bias_target: Vec4,
-    /// How much of it, from 0 to 1; for variance shadow mapping the least variance.
+    /// How much of it, from 0 to 1; for variance shadow mapping the least variance, for exponential
+    /// variance shadow mapping the least one relative to the square of the receiver's warped depth.
     #[magnitude(1e-7..=1e-2)]
     pub moment_bias: f32,
     /// What is taken off a receiver's depth, in the map's range of 0 to 1.
@@ -109,6 +110,25 @@ fn receiver(light: &Light, world: Vec3) -> (Vec2, f32) {
     )
 }
 
+/// Lambert's law with what `shadow` gives for a receiver's coordinates in the map and its depth, both
+/// from 0 to 1 inside, after the cut against light leaking.
+#[inline(always)]
+pub(crate) fn shade_with(
+    light: &Light,
+    world: Vec3,
+    normal: Vec3,
+    colour: Vec3,
+    shadow: impl FnOnce(Vec2, f32) -> f32,
+) -> Vec4 {
+    let (uv, z) = receiver(light, world);
+    lit(
+        light,
+        normal,
+        colour,
+        cut_leak(shadow(uv, z), light.light_leak),
+    )
+}
+
 /// Moments from a map's texel.
 #[inline(always)]
 fn decode(texel: Vec4, how: u32) -> Moments4<f32> {
@@ -142,20 +162,10 @@ fn in_range(z: f32, how: u32) -> f32 {
     }
 }
 
-/// The map's moments at a receiver, and its depth in the map's range.
+/// The map's moments at a place.
 #[inline(always)]
-fn look_up(
-    light: &Light,
-    map: Texture2d<'_>,
-    sampler: Sampler,
-    how: u32,
-    world: Vec3,
-) -> (Moments4<f32>, f32) {
-    let (uv, z) = receiver(light, world);
-    (
-        decode(map.sample_level(sampler, uv, 0.0), how),
-        in_range(z, how),
-    )
+fn look_up(map: Texture2d<'_>, sampler: Sampler, how: u32, uv: Vec2) -> Moments4<f32> {
+    decode(map.sample_level(sampler, uv, 0.0), how)
 }
 
 /// Moments with the light's bias mixed in.
@@ -196,14 +206,10 @@ pub fn shade_hamburger(
     #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    let (m, z) = look_up(light, map, sampler, encoding, world);
-    let m = biased(light, m);
-    lit(
-        light,
-        normal,
-        colour,
-        cut_leak(hamburger_4(m, z), light.light_leak),
-    )
+    shade_with(light, world, normal, colour, |uv, z| {
+        let m = look_up(map, sampler, encoding, uv);
+        hamburger_4(biased(light, m), in_range(z, encoding))
+    })
 }
 
 /// Shading with Hausdorff four moment shadow mapping.
@@ -231,14 +237,15 @@ pub fn shade_hausdorff(
     #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    let (m, z) = look_up(light, map, sampler, encoding, world);
-    let m = biased(light, m);
-    let shadow = if encoding == encoding::UNIT {
-        hausdorff_4(m, z)
-    } else {
-        hausdorff_4_symmetric(m, z)
-    };
-    lit(light, normal, colour, cut_leak(shadow, light.light_leak))
+    shade_with(light, world, normal, colour, |uv, z| {
+        let m = biased(light, look_up(map, sampler, encoding, uv));
+        let z = in_range(z, encoding);
+        if encoding == encoding::UNIT {
+            hausdorff_4(m, z)
+        } else {
+            hausdorff_4_symmetric(m, z)
+        }
+    })
 }
 
 /// Shading with variance shadow mapping, from the first two of four moments. The moments are as they
@@ -267,16 +274,10 @@ pub fn shade_variance(
     #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
 ) -> Vec4 {
-    let (m, z) = look_up(light, map, sampler, encoding, world);
-    lit(
-        light,
-        normal,
-        colour,
-        cut_leak(
-            variance_2(m.b1, m.b2, z, light.moment_bias),
-            light.light_leak,
-        ),
-    )
+    shade_with(light, world, normal, colour, |uv, z| {
+        let m = look_up(map, sampler, encoding, uv);
+        variance_2(m.b1, m.b2, in_range(z, encoding), light.moment_bias)
+    })
 }
 
 /// Shading with percentage-closer filtering: the share of a square of depths that is nearer than

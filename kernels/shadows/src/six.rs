@@ -1,9 +1,17 @@
-//! Six moment shadow mapping as a map over rows of moments.
+//! Six moment shadow mapping: as a map over rows of moments, and from depths to shading. Six moments lie in
+//! two textures, whose fourth channels are not used: the odd ones in the first, the even ones in the second.
 
-use hankel_dsl::{Element, Real, kernel};
-use hankel_moments::{Moments6, cut_leak, hamburger_6};
+use core::ops::{AddAssign, Div};
+
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_moments::{
+    Moments6, Quantized6, cut_leak, dequantize_symmetric_6, hamburger_6, quantize_symmetric_6,
+};
 
 use crate::bounds::Shadow;
+use crate::resolve::mean;
+use crate::shade::{Light, encoding, shade_with};
 
 /// How six moments are turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -60,4 +68,139 @@ pub fn hamburger_6msm<R: Real>(
     Shadow {
         shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
     }
+}
+
+/// A texel of each texture.
+#[derive(Clone, Copy)]
+struct Texels {
+    first: Vec4,
+    second: Vec4,
+}
+
+impl AddAssign for Texels {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        self.first += other.first;
+        self.second += other.second;
+    }
+}
+
+impl Div<f32> for Texels {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, by: f32) -> Self {
+        Self {
+            first: self.first / by,
+            second: self.second / by,
+        }
+    }
+}
+
+/// Depth in [0, 1] as a depth in [-1, 1].
+#[inline(always)]
+fn symmetric(z: f32) -> Moments6<f32> {
+    Moments6::of_depth(2.0 * z - 1.0)
+}
+
+/// Means of a texel's six moments, depths moved to [-1, 1], in the basis optimised for 16 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    outputs(rgba16unorm, rgba16unorm),
+    inputs = crate::inputs::maps::depths,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn resolve_symmetric_6(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> (Vec4, Vec4) {
+    let texels = mean(depth, at, samples, |z| {
+        let q = quantize_symmetric_6(symmetric(z));
+        Texels {
+            first: Vec4::new(q.r0, q.g0, q.b0, 0.0),
+            second: Vec4::new(q.r1, q.g1, q.b1, 0.0),
+        }
+    });
+    (texels.first, texels.second)
+}
+
+/// Means of a texel's six moments, depths moved to [-1, 1], as they are, for 32-bit maps.
+#[kernel(
+    compute,
+    threads(8, 8),
+    outputs(rgba32float, rgba32float),
+    inputs = crate::inputs::maps::depths
+)]
+pub fn resolve_plain_6(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> (Vec4, Vec4) {
+    let texels = mean(depth, at, samples, |z| {
+        let m = symmetric(z);
+        Texels {
+            first: Vec4::new(m.b1, m.b3, m.b5, 0.0),
+            second: Vec4::new(m.b2, m.b4, m.b6, 0.0),
+        }
+    });
+    (texels.first, texels.second)
+}
+
+/// Shading with Hamburger six moment shadow mapping. `target` is the moment vector that the bias mixes in;
+/// the light's own is for four.
+#[kernel(
+    fragment,
+    pinned,
+    inputs = crate::inputs::maps::shaded_6
+)]
+pub fn shade_hamburger_6(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] target: &Moments6<f32>,
+    #[texture] first: Texture2d<'_>,
+    #[texture] second: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::SYMMETRIC)]
+    encoding: u32,
+) -> Vec4 {
+    shade_with(light, world, normal, colour, |uv, z| {
+        let odd = first.sample_level(sampler, uv, 0.0);
+        let even = second.sample_level(sampler, uv, 0.0);
+        let m = if encoding == encoding::SYMMETRIC {
+            dequantize_symmetric_6(Quantized6 {
+                r0: odd.x,
+                g0: odd.y,
+                b0: odd.z,
+                r1: even.x,
+                g1: even.y,
+                b1: even.z,
+            })
+        } else {
+            Moments6 {
+                b1: odd.x,
+                b2: even.x,
+                b3: odd.y,
+                b4: even.y,
+                b5: odd.z,
+                b6: even.z,
+            }
+        };
+        hamburger_6(m.lerp(*target, light.moment_bias), 2.0 * z - 1.0).lower
+    })
 }

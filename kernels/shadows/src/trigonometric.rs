@@ -1,9 +1,20 @@
-//! Trigonometric moment shadow mapping as maps over rows of moments.
+//! Trigonometric moment shadow mapping: as maps over rows of moments, and from depths to shading.
 
-use hankel_dsl::{Element, Real, kernel};
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{HalfAngle, TrigonometricMoments, cut_leak, trigonometric_4};
 
 use crate::bounds::Shadow;
+use crate::resolve::mean;
+use crate::shade::{Light, shade_with};
+
+/// How a map holds trigonometric moments: values of the specialisation constant `encoding`.
+pub mod encoding {
+    /// As they are.
+    pub const PLAIN: u32 = 0;
+    /// Moved from [-1, 1] to [0, 1].
+    pub const UNORM: u32 = 1;
+}
 
 /// How trigonometric moments are turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -71,4 +82,91 @@ pub fn trigonometric_4msm<R: Real>(
 #[kernel(compute, threads(64), precision(f32, f64))]
 pub fn trigonometric_moments<R: Real>(#[element] depth: UnitDepth<R>) -> TrigonometricMoments<R> {
     TrigonometricMoments::of_depth(depth.depth)
+}
+
+#[inline(always)]
+fn moments(z: f32) -> Vec4 {
+    let m = TrigonometricMoments::of_depth(z);
+    Vec4::new(m.c1, m.s1, m.c2, m.s2)
+}
+
+/// Mean of a texel's two complex trigonometric moments, depths in [0, 1], as they are, for a 32-bit map.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    pinned,
+    inputs = crate::inputs::maps::depths
+)]
+pub fn resolve_trigonometric_plain(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    mean(depth, at, samples, moments)
+}
+
+/// Mean of a texel's two complex trigonometric moments, depths in [0, 1], moved to [0, 1] for 16 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16unorm),
+    pinned,
+    inputs = crate::inputs::maps::depths,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn resolve_trigonometric_unorm(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    mean(depth, at, samples, |z| moments(z) * 0.5 + Vec4::splat(0.5))
+}
+
+/// Shading with trigonometric moment shadow mapping.
+#[kernel(
+    fragment,
+    pinned,
+    inputs = crate::inputs::maps::shaded_trigonometric
+)]
+pub fn shade_trigonometric(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 1)]
+    #[values(encoding::PLAIN, encoding::UNORM)]
+    encoding: u32,
+) -> Vec4 {
+    shade_with(light, world, normal, colour, |uv, z| {
+        let texel = map.sample_level(sampler, uv, 0.0);
+        let held = |x: f32| {
+            if encoding == encoding::UNORM {
+                2.0 * x - 1.0
+            } else {
+                x
+            }
+        };
+        let m = TrigonometricMoments {
+            c1: held(texel.x),
+            s1: held(texel.y),
+            c2: held(texel.z),
+            s2: held(texel.w),
+        };
+        trigonometric_4(m.biased(light.moment_bias), HalfAngle::of_depth(z)).lower
+    })
 }

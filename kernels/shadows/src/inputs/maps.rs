@@ -8,11 +8,19 @@ use hankel_dsl::glam::{IVec2, Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
 use hankel_dsl::native::{Address, Filter, Sampler};
-use hankel_moments::bias::{Bias, CLAMPED_4_16, SYMMETRIC_4_16, SYMMETRIC_4_32};
-use hankel_moments::{Moments4, from_unorm, quantize_symmetric_4, quantize_unit_4, to_unorm};
+use hankel_moments::bias::{
+    Bias, CLAMPED_4_16, SYMMETRIC_4_16, SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32,
+    TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32,
+};
+use hankel_moments::{
+    Moments4, Moments6, TrigonometricMoments, from_unorm, quantize_symmetric_4,
+    quantize_symmetric_6, quantize_unit_4, to_unorm,
+};
 
 use crate::blur::Direction;
+use crate::exponential::Exponents;
 use crate::shade::{Light, encoding};
+use crate::trigonometric;
 
 /// Texels of a map.
 const SIZE: [u32; 2] = [61, 37];
@@ -70,46 +78,59 @@ fn published(how: u32) -> Bias {
     }
 }
 
-/// A sum of moments, weighted.
-fn plus(a: Moments4<f64>, w: f64, b: Moments4<f64>) -> Moments4<f64> {
-    Moments4 {
-        b1: a.b1 + w * b.b1,
-        b2: a.b2 + w * b.b2,
-        b3: a.b3 + w * b.b3,
-        b4: a.b4 + w * b.b4,
-    }
-}
-
-/// The texels of a map, filtered over 3 x 3 texels and stored as `how` says.
-fn texels(how: u32) -> Vec<Vec4> {
+/// The mean of what `of` gives for the depths of each texel, filtered over 3 x 3 texels.
+fn filtered<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[f64; N]> {
     let all = samples();
     let [width, height] = SIZE.map(|n| n as i32);
-    let zero = Moments4::of_depth(0.0);
+    let plus = |sum: &mut [f64; N], w: f64, with: [f64; N]| {
+        for (sum, x) in sum.iter_mut().zip(with) {
+            *sum += w * x;
+        }
+    };
     let texel = |x: i32, y: i32| {
         let i = (y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize * SAMPLES;
-        all[i..i + SAMPLES].iter().fold(zero, |sum, &z| {
-            let z = if how == encoding::UNIT {
-                z
-            } else {
-                2.0 * z - 1.0
-            };
-            plus(sum, 1.0 / SAMPLES as f64, Moments4::of_depth(z))
-        })
+        let mut sum = [0.0; N];
+        for z in &all[i..i + SAMPLES] {
+            plus(&mut sum, 1.0 / SAMPLES as f64, of(*z));
+        }
+        sum
     };
     let mut map = Vec::new();
     for y in 0..height {
         for x in 0..width {
-            let mut sum = zero;
+            let mut sum = [0.0; N];
             for dy in -1..=1 {
                 for dx in -1..=1_i32 {
                     let weight = |d: i32| if d == 0 { 0.5 } else { 0.25 };
-                    sum = plus(sum, weight(dx) * weight(dy), texel(x + dx, y + dy));
+                    plus(&mut sum, weight(dx) * weight(dy), texel(x + dx, y + dy));
                 }
             }
-            map.push(stored(how, sum));
+            map.push(sum);
         }
     }
     map
+}
+
+/// The texels of a map of four moments, stored as `how` says.
+fn texels(how: u32) -> Vec<Vec4> {
+    let map = filtered(|z| {
+        let z = match how {
+            encoding::UNIT => z,
+            _ => 2.0 * z - 1.0,
+        };
+        let m = Moments4::of_depth(z);
+        [m.b1, m.b2, m.b3, m.b4]
+    });
+    let moments = map
+        .iter()
+        .map(|&[b1, b2, b3, b4]| Moments4 { b1, b2, b3, b4 });
+    moments.map(|m| stored(how, m)).collect()
+}
+
+/// What is left of numbers in 16 bits from 0 to 1.
+fn unorm(channels: [f64; 4]) -> Vec4 {
+    let channel = |x: f64| from_unorm::<f64, 16>(to_unorm::<f64, 16>(x)) as f32;
+    Vec4::from_array(channels.map(channel))
 }
 
 /// Moments as a map stores them: 16 bits in the optimised basis, or floats.
@@ -119,8 +140,7 @@ fn stored(how: u32, m: Moments4<f64>) -> Vec4 {
         encoding::SYMMETRIC => quantize_symmetric_4(m),
         _ => return Vec4::new(m.b1 as f32, m.b2 as f32, m.b3 as f32, m.b4 as f32),
     };
-    let channel = |x: f64| from_unorm::<f64, 16>(to_unorm::<f64, 16>(x)) as f32;
-    Vec4::new(channel(q.r), channel(q.g), channel(q.b), channel(q.a))
+    unorm([q.r, q.g, q.b, q.a])
 }
 
 /// A light whose map's coordinates are the world's x and z, each from 0 to 1, and whose depth is y.
@@ -174,42 +194,177 @@ fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
     [world, normals, colours]
 }
 
+/// What shading reads beside a map: fragments, light and sampler.
+fn fragments_and_light(s: &mut Source, what: &str, light: &Light) -> Given {
+    let [world, normals, colours] = fragments(s);
+    Given::new(what)
+        .buffer("world", &world)
+        .buffer("normal", &normals)
+        .buffer("colour", &colours)
+        .uniform("light", light)
+        .sampler(
+            "sampler",
+            Sampler::new(Filter::Linear, Address::ClampToEdge),
+        )
+}
+
+/// A map of floats.
+fn with_map(given: Given, name: &str, map: &[Vec4]) -> Given {
+    let texels = map.iter().copied();
+    given.texture(name, SIZE, 1, TexelFormat::Rgba32Float, texels)
+}
+
+/// The same with the published bias and a depth bias, and with ten times that strength and none.
+fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>)]) -> Vec<Given> {
+    let mut s = Source::new(request.seed);
+    let strength = bias.strength as f32;
+    [
+        ("a map's bias as published", strength, 1e-3),
+        ("ten times the published bias", 10.0 * strength, 0.0),
+    ]
+    .into_iter()
+    .map(|(what, moment_bias, depth_bias)| {
+        let light = light(bias, moment_bias, depth_bias, 1);
+        let given = fragments_and_light(&mut s, what, &light);
+        maps.iter()
+            .fold(given, |given, (name, map)| with_map(given, name, map))
+    })
+    .collect()
+}
+
 /// What shading with a map of moments reads, for the map's `encoding`.
 #[must_use]
 pub fn shaded(request: &Request) -> Vec<Given> {
     let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
-    let bias = published(how);
-    let map = texels(how);
+    with_bias(request, &published(how), &[("map", texels(how))])
+}
+
+/// What shading with maps of six moments reads, for their `encoding`.
+#[must_use]
+pub fn shaded_6(request: &Request) -> Vec<Given> {
+    let is_plain = request.constant("encoding") == Some(encoding::PLAIN);
+    let bias = if is_plain {
+        SYMMETRIC_6_32
+    } else {
+        SYMMETRIC_6_16
+    };
+    let map = filtered(|z| {
+        let m = Moments6::of_depth(2.0 * z - 1.0);
+        let q = quantize_symmetric_6(m);
+        if is_plain {
+            [m.b1, m.b3, m.b5, m.b2, m.b4, m.b6]
+        } else {
+            [q.r0, q.g0, q.b0, q.r1, q.g1, q.b1]
+        }
+    });
+    let texture = |first: usize| {
+        let texels = map.iter().map(|m| {
+            let channels = [m[first], m[first + 1], m[first + 2], 0.0];
+            if is_plain {
+                Vec4::from_array(channels.map(|x| x as f32))
+            } else {
+                unorm(channels)
+            }
+        });
+        texels.collect::<Vec<_>>()
+    };
+    let maps = [("first", texture(0)), ("second", texture(3))];
+    let given = with_bias(request, &bias, &maps).into_iter();
+    given.map(|g| g.uniform("target", &bias.six())).collect()
+}
+
+/// What shading with a map of trigonometric moments reads, for the map's `encoding`.
+#[must_use]
+pub fn shaded_trigonometric(request: &Request) -> Vec<Given> {
+    let is_plain = request.constant("encoding") == Some(trigonometric::encoding::PLAIN);
+    let map = filtered(|z| {
+        let m = TrigonometricMoments::of_depth(z);
+        let m = [m.c1, m.s1, m.c2, m.s2];
+        if is_plain {
+            m
+        } else {
+            m.map(|x| 0.5 * x + 0.5)
+        }
+    });
+    let bias = if is_plain {
+        TRIGONOMETRIC_2_32
+    } else {
+        TRIGONOMETRIC_2_16
+    };
+    let texels = map.iter().map(|m| {
+        if is_plain {
+            Vec4::from_array(m.map(|x| x as f32))
+        } else {
+            unorm(*m)
+        }
+    });
+    with_bias(request, &bias, &[("map", texels.collect())])
+}
+
+/// The warps of a depth for exponential variance shadow maps, and their squares.
+fn warps(exponents: &Exponents, z: f64) -> [f64; 4] {
+    let z = 2.0 * z - 1.0;
+    let positive = f64::exp(f64::from(exponents.positive) * z);
+    let negative = f64::exp(-f64::from(exponents.negative) * z);
+    [positive, positive * positive, negative, negative * negative]
+}
+
+/// Exponents for maps of 32 and of 16 bits, and the relative variances that go with them.
+const EXPONENTS: [(&str, Exponents, f32); 2] = [
+    (
+        "exponents for 32 bits",
+        Exponents {
+            positive: 40.0,
+            negative: 5.0,
+        },
+        1.6e-5,
+    ),
+    (
+        "exponents for 16 bits",
+        Exponents {
+            positive: 5.54,
+            negative: 5.54,
+        },
+        4e-3,
+    ),
+];
+
+/// What shading with an exponential shadow map reads.
+#[must_use]
+pub fn shaded_exponential(request: &Request) -> Vec<Given> {
     let mut s = Source::new(request.seed);
-    [
-        ("a map's bias as published", bias.strength as f32, 1e-3),
-        (
-            "ten times the published bias",
-            10.0 * bias.strength as f32,
-            0.0,
-        ),
-    ]
-    .into_iter()
-    .map(|(what, moment_bias, depth_bias)| {
-        let [world, normals, colours] = fragments(&mut s);
-        Given::new(what)
-            .buffer("world", &world)
-            .buffer("normal", &normals)
-            .buffer("colour", &colours)
-            .uniform("light", &light(&bias, moment_bias, depth_bias, 1))
-            .texture(
-                "map",
-                SIZE,
-                1,
-                TexelFormat::Rgba32Float,
-                map.iter().copied(),
-            )
-            .sampler(
-                "sampler",
-                Sampler::new(Filter::Linear, Address::ClampToEdge),
-            )
-    })
-    .collect()
+    [(10.0_f32, 0.0), (80.0, 1e-3)]
+        .into_iter()
+        .map(|(exponent, depth_bias)| {
+            let map = filtered(|z| [f64::exp(f64::from(exponent) * z)]);
+            let light = light(&SYMMETRIC_4_32, 0.0, depth_bias, 1);
+            fragments_and_light(&mut s, "an exponential shadow map", &light)
+                .uniform("exponent", &exponent)
+                .texture(
+                    "map",
+                    SIZE,
+                    1,
+                    TexelFormat::R32Float,
+                    map.iter().map(|[x]| Vec4::new(*x as f32, 0.0, 0.0, 0.0)),
+                )
+        })
+        .collect()
+}
+
+/// What shading with an exponential variance shadow map reads.
+#[must_use]
+pub fn shaded_warps(request: &Request) -> Vec<Given> {
+    let mut s = Source::new(request.seed);
+    EXPONENTS
+        .into_iter()
+        .map(|(what, exponents, variance)| {
+            let map = filtered(|z| warps(&exponents, z));
+            let map = map.iter().map(|m| Vec4::from_array(m.map(|x| x as f32)));
+            let light = light(&SYMMETRIC_4_32, variance, 0.0, 1);
+            let given = fragments_and_light(&mut s, what, &light).uniform("exponents", &exponents);
+            with_map(given, "map", &map.collect::<Vec<_>>())
+        })
+        .collect()
 }
 
 /// What shading with a map of depths reads.
@@ -256,10 +411,52 @@ pub fn depths(_: &Request) -> Vec<Given> {
     [given.texture("depth", SIZE, SAMPLES as u32, TexelFormat::R32Float, texels)].into()
 }
 
-/// A map and the weights of a filter.
+/// Depths of several samples, and an exponent.
+#[must_use]
+pub fn exponential_depths(request: &Request) -> Vec<Given> {
+    [10.0_f32, 80.0]
+        .iter()
+        .flat_map(|exponent| {
+            let all = depths(request).into_iter();
+            all.map(|given| given.uniform("exponent", exponent))
+        })
+        .collect()
+}
+
+/// Depths of several samples, and exponents that 16-bit floats have room for.
+#[must_use]
+pub fn warped_depths(request: &Request) -> Vec<Given> {
+    let [_, (_, narrow, _)] = EXPONENTS;
+    let half = Exponents {
+        positive: 5.0,
+        negative: 1.0,
+    };
+    [narrow, half]
+        .iter()
+        .flat_map(|exponents| {
+            let all = depths(request).into_iter();
+            all.map(|given| given.uniform("exponents", exponents))
+        })
+        .collect()
+}
+
+/// A map of moments and the weights of a filter.
 #[must_use]
 pub fn blurred(_: &Request) -> Vec<Given> {
-    let map = texels(encoding::SYMMETRIC);
+    with_filter("a map of moments", &texels(encoding::SYMMETRIC))
+}
+
+/// A map of warps and the weights of a filter.
+#[must_use]
+pub fn blurred_warps(_: &Request) -> Vec<Given> {
+    let [_, (_, narrow, _)] = EXPONENTS;
+    let map = filtered(|z| warps(&narrow, z));
+    let map = map.iter().map(|m| Vec4::from_array(m.map(|x| x as f32)));
+    with_filter("a map of warps", &map.collect::<Vec<_>>())
+}
+
+/// A map, filtered along each axis.
+fn with_filter(what: &str, map: &[Vec4]) -> Vec<Given> {
     [(IVec2::X, 0.75_f64), (IVec2::Y, 1.5)]
         .into_iter()
         .map(|(step, sigma)| {
@@ -268,16 +465,10 @@ pub fn blurred(_: &Request) -> Vec<Given> {
                 .collect();
             let total = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
             let weights: Vec<f32> = raw.iter().map(|w| (w / total) as f32).collect();
-            Given::new("a map of moments")
+            let given = Given::new(what)
                 .uniform("direction", &Direction { step })
-                .buffer("weights", &weights)
-                .texture(
-                    "source",
-                    SIZE,
-                    1,
-                    TexelFormat::Rgba32Float,
-                    map.iter().copied(),
-                )
+                .buffer("weights", &weights);
+            with_map(given, "source", map)
         })
         .collect()
 }

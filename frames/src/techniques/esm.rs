@@ -1,0 +1,39 @@
+//! Exponential shadow mapping: the least shadow that the mean of a texel's exponentials allows. The
+//! exponentials of depths are filtered.
+
+use hankel_dsl::native::describe::TexelFormat;
+
+use super::{Map, Technique};
+use crate::graph::{Graph, Handle, Result};
+use crate::passes::{BILINEAR, DEPTHS, Given, blur, light_depth, resolve, shade};
+
+/// The authors' own for 32-bit floats, of which the largest is exp(88): what is left is room for sums.
+const EXPONENT: f32 = 80.0;
+
+pub const TECHNIQUE: Technique = Technique {
+    name: "esm",
+    summary: "the mean of an exponential, in one channel",
+    // On a surface the exponential's mean is 1 or, on a slope, more.
+    depth_bias: 0.0,
+    maps: &[Map {
+        format: TexelFormat::R32Float,
+        ..DEPTHS[0]
+    }],
+    is_lower_bound: true,
+    add,
+};
+
+fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    let exponent = graph.constant("exponent", &EXPONENT);
+    let depth = light_depth(graph, given)?;
+    let map = resolve(graph, given, "resolve_esm")
+        .arg("depth", depth)
+        .arg("exponent", exponent)
+        .image([given.shadow.size; 2])?;
+    let map = blur(graph, given, map)?;
+    shade(graph, given, "shade_esm", |pass| {
+        pass.arg("exponent", exponent)
+            .arg("map", map)
+            .arg("sampler", BILINEAR)
+    })
+}

@@ -1,0 +1,75 @@
+//! Exponential variance shadow mapping: the least shadow that mean and variance of warped depths allow,
+//! with the warp that grows with depth or with one that falls as well. Both are filtered as they are.
+
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_shadows::exponential::Exponents;
+
+use super::{Map, Technique};
+use crate::graph::{Graph, Handle, Result};
+use crate::passes::{BILINEAR, Given, blur, light_depth, resolve, shade};
+use crate::scene::DepthRange;
+
+/// By `Map::encoding`: what is usual for 32-bit floats, and the most of which 16 bits hold the square.
+const EXPONENTS: [Exponents; 2] = [
+    Exponents {
+        positive: 40.0,
+        negative: 5.0,
+    },
+    Exponents {
+        positive: 5.54,
+        negative: 5.54,
+    },
+];
+
+const MAPS: &[Map] = &[
+    // The usual least deviation, 1e-4 of a depth in [-1, 1], as the warp with exponent 40 shows it. It is
+    // four times what rounding leaves of a variance: 20 roundings by 2^-24 of either moment.
+    map(TexelFormat::Rgba32Float, 0, 1.6e-5),
+    // What rounding leaves: three times, each moment is rounded by 2^-11.
+    map(TexelFormat::Rgba16Float, 1, 4e-3),
+];
+
+const fn map(format: TexelFormat, encoding: u32, least_variance: f32) -> Map {
+    Map {
+        format,
+        depth_range: DepthRange::Symmetric,
+        encoding,
+        moment_bias: least_variance,
+        bias_target: [0.0; 4],
+    }
+}
+
+pub const POSITIVE: Technique = Technique {
+    name: "evsm2",
+    summary: "mean and variance of one exponential",
+    // The least variance keeps a surface from shading itself.
+    depth_bias: 0.0,
+    maps: MAPS,
+    is_lower_bound: true,
+    add: |graph, given| add(graph, given, 1),
+};
+
+pub const BOTH: Technique = Technique {
+    name: "evsm4",
+    summary: "mean and variance of two exponentials",
+    add: |graph, given| add(graph, given, 2),
+    ..POSITIVE
+};
+
+fn add(graph: &mut Graph, given: &Given, warps: u32) -> Result<Handle> {
+    let map = given.shadow.map;
+    let exponents = graph.constant("exponents", &EXPONENTS[map.encoding as usize]);
+    let depth = light_depth(graph, given)?;
+    let kernel = format!("resolve_evsm_{}", map.format.name());
+    let map = resolve(graph, given, kernel)
+        .arg("depth", depth)
+        .arg("exponents", exponents)
+        .image([given.shadow.size; 2])?;
+    let map = blur(graph, given, map)?;
+    shade(graph, given, "shade_evsm", |pass| {
+        pass.arg("exponents", exponents)
+            .arg("map", map)
+            .arg("sampler", BILINEAR)
+            .constant("warps", warps)
+    })
+}

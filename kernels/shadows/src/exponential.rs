@@ -1,0 +1,154 @@
+//! Exponential shadow maps and exponential variance shadow maps, from depths to shading.
+//!
+//! The warps are computed by [`math`]: the same bits on every device, so that a map and what is compared
+//! with it agree. They are taken of each sample's depth, and then filtered.
+
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel, math};
+use hankel_moments::{markov_1, warped_2};
+
+use crate::resolve::mean;
+use crate::shade::{Light, shade_with};
+
+/// Exponents of the two warps of exponential variance shadow maps, for depths moved to [-1, 1].
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Exponents {
+    /// Of the warp that grows with depth: from 0 to 42 for 32-bit floats, to 5.54 for 16 bits, whose
+    /// largest number is 65504.
+    #[range(1.0..=42.0)]
+    pub positive: f32,
+    /// Of the one that falls, likewise.
+    #[range(1.0..=42.0)]
+    pub negative: f32,
+}
+
+impl Exponents {
+    /// Both warps of a depth from 0 to 1, each above 0.
+    #[inline(always)]
+    fn warp(&self, z: f32) -> (f32, f32) {
+        let z = 2.0 * Real::saturate(z) - 1.0;
+        (
+            math::exp(self.positive * z),
+            math::exp(-(self.negative * z)),
+        )
+    }
+}
+
+/// `exp(exponent * z)` of a depth from 0 to 1.
+#[inline(always)]
+fn exponential(exponent: f32, z: f32) -> f32 {
+    math::exp(exponent * Real::saturate(z))
+}
+
+/// Mean of a texel's `exp(exponent * z)`, depths z in [0, 1]: an exponential shadow map.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(r32float),
+    pinned,
+    inputs = crate::inputs::maps::exponential_depths
+)]
+pub fn resolve_esm(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[uniform]
+    #[range(1.0..=80.0)]
+    exponent: &f32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> f32 {
+    mean(depth, at, samples, |z| exponential(*exponent, z))
+}
+
+/// Means of a texel's two warps and of their squares: an exponential variance shadow map.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16float, rgba32float),
+    pinned,
+    inputs = crate::inputs::maps::warped_depths,
+    parity(
+        ulp = 1,
+        exact(rgba32float),
+        why = "rounding to 16 bits, up or down: one step"
+    )
+)]
+pub fn resolve_evsm(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[uniform] exponents: &Exponents,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    mean(depth, at, samples, |z| {
+        let (positive, negative) = exponents.warp(z);
+        Vec4::new(positive, positive * positive, negative, negative * negative)
+    })
+}
+
+/// Shading with exponential shadow mapping.
+#[kernel(
+    fragment,
+    pinned,
+    inputs = crate::inputs::maps::shaded_exponential
+)]
+pub fn shade_esm(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[uniform]
+    #[range(1.0..=80.0)]
+    exponent: &f32,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    shade_with(light, world, normal, colour, |uv, z| {
+        let mean = map.sample_level(sampler, uv, 0.0).x;
+        markov_1(mean, exponential(*exponent, z))
+    })
+}
+
+/// Shading with exponential variance shadow mapping, by the warp that grows with depth or by both: the
+/// larger of two lower bounds is one, too.
+#[kernel(
+    fragment,
+    pinned,
+    inputs = crate::inputs::maps::shaded_warps
+)]
+pub fn shade_evsm(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] exponents: &Exponents,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(1, 2)]
+    warps: u32,
+) -> Vec4 {
+    shade_with(light, world, normal, colour, |uv, z| {
+        let texel = map.sample_level(sampler, uv, 0.0);
+        let (positive, negative) = exponents.warp(z);
+        let (nearer, _) = warped_2(texel.x, texel.y, positive, light.moment_bias);
+        if warps == 1 {
+            nearer
+        } else {
+            // What falls with depth is larger where depth is less.
+            let (_, also_nearer) = warped_2(texel.z, texel.w, negative, light.moment_bias);
+            Real::max(nearer, also_nearer)
+        }
+    })
+}
