@@ -8,7 +8,12 @@ use std::num::NonZeroU64;
 use hankel_codegen::build::generate;
 
 /// As a host includes them. They are made in `placement.rs`, which compares them, too.
-#[allow(dead_code, reason = "headers have more than one host uses")]
+#[allow(
+    clippy::all,
+    dead_code,
+    unused_qualifications,
+    reason = "generated, and more than one host uses"
+)]
 mod shaders {
     include!("placed/include/hankel.rs");
     include!("placed/include/hankel_wgpu.rs");
