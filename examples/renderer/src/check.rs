@@ -59,7 +59,7 @@ pub fn shadows(drawn: &Drawn) {
     }
     let [lit, dark] = count;
     assert!(
-        lit > 20_000 && dark > 2_000,
+        lit > 20_000 && dark > 1_000,
         "{lit} lit, {dark} dark pixels"
     );
     assert!(
@@ -70,5 +70,6 @@ pub fn shadows(drawn: &Drawn) {
     );
 }
 
-/// Pixels to each side of an edge that are not looked at: what the map's filter covers.
-const EDGE: usize = 8;
+/// Pixels to each side of an edge that are not looked at. The map's filter reaches 2.5 texels, and Bevy moves
+/// receivers by 1.8 texels: together 0.24 of the world's units, of which the nearest shadow has 50 pixels.
+const EDGE: usize = 12;
