@@ -146,7 +146,15 @@ pub fn on_vulkan(
     let as_it_is = arithmetic == Arithmetic::Free && kernel.stage != Stage::Vertex;
     let translated = match program.shader {
         Some(Shader::SpirvThroughNaga(words)) if !as_it_is => {
-            Some(super::translate::spirv_to_spirv(words, arithmetic))
+            let values = slots::constants(kernel, program.constants)?;
+            let ids = kernel.params.iter().filter_map(|p| match p.role {
+                Role::Constant { id, .. } => Some(id),
+                _ => None,
+            });
+            let constants: Vec<(u32, u32)> = ids.zip(values).collect();
+            Some(super::translate::spirv_to_spirv(
+                words, &constants, arithmetic,
+            ))
         }
         Some(Shader::Wgsl { text, entry_point }) if !as_it_is => Some(
             super::translate::wgsl_to_spirv(text, entry_point, &kernel.name, arithmetic),

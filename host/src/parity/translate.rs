@@ -4,6 +4,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use naga::back::PipelineConstants;
 use naga::back::pipeline_constants::process_overrides;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -11,11 +12,20 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use crate::device::Arithmetic;
 use crate::device::vulkan::words;
 
-/// SPIR-V read and written anew by naga, with its specialisation constants at their defaults.
+/// SPIR-V read and written anew by naga, with the specialisation constants of `constants`, by their
+/// numbers, set to these values, and the others to their defaults.
 ///
 /// # Errors
 /// naga's words.
-pub fn spirv_to_spirv(code: &[u32], arithmetic: Arithmetic) -> Result<Vec<u32>, String> {
+pub fn spirv_to_spirv(
+    code: &[u32],
+    constants: &[(u32, u32)],
+    arithmetic: Arithmetic,
+) -> Result<Vec<u32>, String> {
+    let constants = constants
+        .iter()
+        .map(|(id, value)| (id.to_string(), f64::from(*value)))
+        .collect();
     guarded(|| {
         let options = naga::front::spv::Options {
             adjust_coordinate_space: false,
@@ -25,11 +35,12 @@ pub fn spirv_to_spirv(code: &[u32], arithmetic: Arithmetic) -> Result<Vec<u32>, 
         let module = naga::front::spv::Frontend::new(code.iter().copied(), &options)
             .parse()
             .map_err(|e| format!("naga cannot read its SPIR-V: {e}"))?;
-        write(&module, arithmetic)
+        write(&module, &constants, arithmetic)
     })
 }
 
-/// WGSL to SPIR-V, with the entry point `entry_point` under the name `name`.
+/// WGSL to SPIR-V, with the entry point `entry_point` under the name `name`, and its overrides at their
+/// defaults.
 ///
 /// # Errors
 /// naga's words.
@@ -47,15 +58,19 @@ pub fn wgsl_to_spirv(
                 entry.name = name.into();
             }
         }
-        write(&module, arithmetic)
+        write(&module, &PipelineConstants::default(), arithmetic)
     })
 }
 
-fn write(module: &naga::Module, arithmetic: Arithmetic) -> Result<Vec<u32>, String> {
+fn write(
+    module: &naga::Module,
+    constants: &PipelineConstants,
+    arithmetic: Arithmetic,
+) -> Result<Vec<u32>, String> {
     let info = Validator::new(ValidationFlags::all(), Capabilities::all())
         .validate(module)
         .map_err(|e| format!("naga finds it invalid: {}", e.into_inner()))?;
-    let (module, info) = process_overrides(module, &info, None, &Default::default())
+    let (module, info) = process_overrides(module, &info, None, constants)
         .map_err(|e| format!("naga cannot set its constants: {e}"))?;
     let options = spv::Options {
         lang_version: (1, 3),
