@@ -15,9 +15,6 @@ use hankel_moments::{markov_1, warped_2};
 use crate::resolve::mean;
 use crate::shade::{Light, shade_with};
 
-/// Samples of a texel. A pinned kernel has no constants: parity cannot set them behind naga.
-const SAMPLES: u32 = 4;
-
 /// Exponents of the two warps of exponential variance shadow maps, for depths moved to [-1, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
@@ -60,12 +57,15 @@ fn exponential(exponent: f32, z: f32) -> f32 {
 )]
 pub fn resolve_esm(
     #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
     #[uniform]
     #[range(1.0..=80.0)]
     exponent: &f32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> f32 {
-    mean(depth, at, SAMPLES, |z| exponential(*exponent, z))
+    mean(depth, at, samples, |z| exponential(*exponent, z))
 }
 
 /// Means of a texel's two warps and of their squares: an exponential variance shadow map.
@@ -84,10 +84,13 @@ pub fn resolve_esm(
 )]
 pub fn resolve_evsm(
     #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
     #[uniform] exponents: &Exponents,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
-    mean(depth, at, SAMPLES, |z| {
+    mean(depth, at, samples, |z| {
         let (positive, negative) = exponents.warp(z);
         Vec4::new(positive, positive * positive, negative, negative * negative)
     })
