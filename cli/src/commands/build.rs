@@ -16,6 +16,12 @@ use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     if args.form == Form::Functions {
+        if let Some(option) = of_shaders_alone(args) {
+            return Err(Failure::input(
+                format!("{option}: it is for shaders, and --form functions writes libraries"),
+                "Leave it out: a library has all of its functions in every form.",
+            ));
+        }
         let manifest = args.generate.source.manifest_path.as_deref();
         let (prefix, out) = (&args.prefix, &args.out);
         return functions::build(manifest, prefix, out, args.force, args.format, quiet);
@@ -25,6 +31,29 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     }
     let session = open(args, quiet)?;
     once(args, &session, quiet)
+}
+
+/// An option that was given and says nothing of libraries of functions.
+fn of_shaders_alone(args: &Build) -> Option<&'static str> {
+    let it = &args.generate;
+    let placed = &it.placement;
+    [
+        ("--target", !it.targets.is_empty()),
+        ("--kernel", !it.kernels.is_empty()),
+        ("--set", !it.set.is_empty()),
+        ("--variant", !it.variants.is_empty()),
+        ("--open-constants", it.open_constants),
+        ("--hlsl-space", placed.hlsl_space != 0),
+        ("--register-base", placed.register_base != 0),
+        ("--wgsl-group", placed.wgsl_group != 0),
+        ("--msl-slot-base", placed.msl_slot_base != 0),
+        ("--glsl-binding-base", placed.glsl_binding_base != 0),
+        ("--bindings", placed.bindings.is_some()),
+        ("--depfile", args.depfile.is_some()),
+        ("--watch", args.watch),
+    ]
+    .into_iter()
+    .find_map(|(option, given)| given.then_some(option))
 }
 
 fn open(args: &Build, quiet: bool) -> Result<Session> {
