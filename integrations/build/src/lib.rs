@@ -240,7 +240,7 @@ impl Build {
         if let Some(manifest) = &self.manifest {
             command.arg("--manifest-path").arg(here.join(manifest));
         }
-        let ran = command
+        command
             .arg("--out")
             .arg(&folder)
             .arg("--depfile")
