@@ -71,7 +71,7 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
 
 const FAULTS: &str = r#"//! Test.
 #![no_std]
-use hankel_dsl::{Atomics, Shared, StorageMut, barrier, kernel};
+use hankel_dsl::{Atomics, Buffer, Shared, StorageMut, barrier, kernel};
 /// Right: its numbers do not meet.
 #[kernel(compute, threads(64))]
 pub fn fine(#[element] x: u32, #[storage(unordered)] all: StorageMut<'_, u32>, #[atomic] n: Atomics<'_>) {
@@ -120,8 +120,8 @@ pub fn divides(#[element] x: u32) -> u32 {
 }
 /// Reads beyond the end.
 #[kernel(compute, threads(64))]
-pub fn beyond(#[index] i: u32, #[element] x: u32, #[storage] table: &[u32]) -> u32 {
-    table[(i * 1000) as usize] & x
+pub fn beyond(#[index] i: u32, #[element] x: u32, #[storage] table: Buffer<'_, u32>) -> u32 {
+    table.get(i * 1000) & x
 }
 /// Does not end for 0.
 #[kernel(compute, threads(64))]
@@ -167,7 +167,7 @@ fn what_no_shader_may_do_is_named_with_its_line() {
             ["shift", "attempt to shift left with overflow", "src/"],
         ),
         ("7 / x", ["divides", "attempt to divide by zero", "src/"]),
-        ("table[(i", ["beyond", "out of", "src/"]),
+        ("table.get(i", ["beyond", "out of", "src/"]),
     ] {
         says(&words);
         says(&[words[0], &line(source)]);

@@ -31,6 +31,7 @@ impl<'a, T: Copy> Buffer<'a, T> {
     /// Element `i`, which must be less than [`Buffer::len`]. A shader does not test that, unless it
     /// was exported with bounds checks; the native device does, and reports the kernel.
     #[inline(always)]
+    #[cfg_attr(not(target_arch = "spirv"), track_caller)]
     #[must_use]
     pub fn get(self, i: u32) -> T {
         #[cfg(target_arch = "spirv")]

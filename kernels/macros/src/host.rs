@@ -420,6 +420,16 @@ impl Kernel {
             .collect()
     }
 
+    /// Whether invocations can meet in memory that one of them writes.
+    fn meets(&self) -> bool {
+        self.params.iter().any(|p| {
+            matches!(
+                p.role,
+                Role::StorageMut { .. } | Role::Atomic { .. } | Role::StorageTexture { .. }
+            )
+        })
+    }
+
     fn run_compute(&self, c: &Compute, variant: &Variant) -> TokenStream {
         let call = self.host_call(variant);
         match self.form() {
@@ -429,13 +439,15 @@ impl Kernel {
         }
         let checks = self.length_checks();
         let out = self.concrete(&self.outputs[0], variant);
+        let suffix = if self.meets() { "_meeting" } else { "" };
         if let Some(format) = variant.format {
             let format = format_ident!("{}", format.variant);
-            let (map, index) = if self.dimensions() == 2 {
-                (quote!(map_texels2), self.index_type())
+            let map = if self.dimensions() == 2 {
+                format_ident!("map_texels2{suffix}")
             } else {
-                (quote!(map_texels), self.index_type())
+                format_ident!("map_texels{suffix}")
             };
+            let index = self.index_type();
             return quote! {
                 let output = args.texture_mut("output", describe::TexelFormat::#format)?;
                 exec::#map(mode, output, |i: #index| #call)
@@ -444,7 +456,8 @@ impl Kernel {
         let map = if self.real.is_some() {
             self.lane_map(variant, &call, &out)
         } else {
-            quote!(exec::map1(mode, output, |i| #call))
+            let map = format_ident!("map1{suffix}");
+            quote!(exec::#map(mode, output, |i| #call))
         };
         quote! {
             let output = args.slice_mut::<#out>("output")?;
@@ -466,7 +479,8 @@ impl Kernel {
             )
         });
         if !spreads {
-            return quote!(exec::map1(mode, output, |i| #call));
+            let map = format_ident!("map1{}", if self.meets() { "_meeting" } else { "" });
+            return quote!(exec::#map(mode, output, |i| #call));
         }
         let fields = self.params.iter().map(|p| {
             let name = &p.name;

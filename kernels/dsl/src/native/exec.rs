@@ -373,6 +373,23 @@ pub fn map1<T: Send>(
     })
 }
 
+/// The same for a map whose invocations meet in other memory, in the order of a sanitized call.
+pub fn map1_meeting<T: Send>(
+    mode: Mode,
+    out: &mut [T],
+    f: impl Fn(usize) -> T + Sync,
+) -> Result<(), CallError> {
+    let Some(order) = sanitize::order(out.len()) else {
+        return map1(mode, out, f);
+    };
+    guard(|| {
+        for i in order {
+            sanitize::enter_alone(UVec3::new(i, 0, 0), i);
+            out[i as usize] = f(i as usize);
+        }
+    })
+}
+
 /// Calls `f` for each invocation of `extent`: where it is, and its number, counted along x, then
 /// y, then z.
 pub fn for_each(
@@ -515,6 +532,36 @@ pub fn map_texels<T: Texel<Channels: Channels>>(
             }
         });
     })
+}
+
+/// The same for a map whose invocations meet in other memory, in the order of a sanitized call.
+pub fn map_texels_meeting<T: Texel<Channels: Channels>>(
+    mode: Mode,
+    out: TextureMut<'_>,
+    f: impl Fn(UVec3) -> T + Sync,
+) -> Result<(), CallError> {
+    let [width, height, depth] = out.size;
+    let Some(order) = sanitize::order(width as usize * height as usize * depth as usize) else {
+        return map_texels(mode, out, f);
+    };
+    let texel = out.format.bytes();
+    guard(|| {
+        for i in order {
+            let at = UVec3::new(i % width, i / width % height, i / (width * height));
+            sanitize::enter_alone(at, i);
+            let bytes = &mut out.bytes[i as usize * texel..][..texel];
+            f(at).channels().store(out.format, bytes);
+        }
+    })
+}
+
+/// [`map_texels_meeting`] with a two-dimensional index.
+pub fn map_texels2_meeting<T: Texel<Channels: Channels>>(
+    mode: Mode,
+    out: TextureMut<'_>,
+    f: impl Fn(UVec2) -> T + Sync,
+) -> Result<(), CallError> {
+    map_texels_meeting(mode, out, |at| f(at.truncate()))
 }
 
 /// [`map_texels`] with a two-dimensional index.

@@ -399,7 +399,7 @@ impl Session {
     fn race(&self, space: Space, address: usize, earlier: Made, made: Made) -> String {
         let cure = match space {
             _ if earlier.group != made.group => {
-                "nothing orders two workgroups: use Atomics, or give each its own elements"
+                "only a barrier within a workgroup orders accesses: use Atomics, or give each its own elements"
             }
             Space::Workgroup => "put a barrier() between the two",
             Space::Storage => "put a storage_barrier() between the two, or use Atomics",
