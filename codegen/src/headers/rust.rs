@@ -75,7 +75,7 @@ fn bytes(text: &mut String, name: &str, layout: &Layout) {
     let _ = write!(
         text,
         "impl {name} {{\n    /// The bytes that a shader reads; padding is 0.\n    #[must_use]\n    \
-         pub fn to_bytes(&self) -> [u8; {0}] {{\n        let mut bytes = [0; {0}];\n",
+         pub fn to_bytes(self) -> [u8; {0}] {{\n        let mut bytes = [0; {0}];\n",
         layout.size
     );
     for field in &layout.fields {
@@ -90,10 +90,14 @@ fn put(text: &mut String, ty: &Type, value: &str, at: &str, depth: usize) {
     let indent = "    ".repeat(depth);
     let each = |text: &mut String, stride: u32, inner: &dyn Fn(&mut String, &str, &str)| {
         let (item, start) = (format!("item{depth}"), format!("at{depth}"));
+        let base = match at {
+            "0" => String::new(),
+            _ => format!("{at} + "),
+        };
         let _ = write!(
             text,
             "{indent}for (i, {item}) in {value}.iter().enumerate() {{\n{indent}    \
-             let {start} = {at} + i * {stride};\n"
+             let {start} = {base}i * {stride};\n"
         );
         inner(text, &item, &start);
         let _ = writeln!(text, "{indent}}}");
@@ -125,10 +129,13 @@ fn put(text: &mut String, ty: &Type, value: &str, at: &str, depth: usize) {
                 Type::Struct { .. } => "to_bytes",
                 _ => "to_le_bytes",
             };
+            let end = match at.parse::<u32>() {
+                Ok(start) => (start + size(ty)).to_string(),
+                Err(_) => format!("{at} + {}", size(ty)),
+            };
             let _ = writeln!(
                 text,
-                "{indent}bytes[{at}..{at} + {}].copy_from_slice(&{value}.{method}());",
-                size(ty)
+                "{indent}bytes[{at}..{end}].copy_from_slice(&{value}.{method}());"
             );
         }
     }

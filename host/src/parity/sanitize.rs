@@ -28,7 +28,7 @@ pub enum Fault {
         /// How many numbers differ.
         numbers: u64,
         /// The first of them; none if another number of bytes was written.
-        first: Option<Difference>,
+        first: Option<Box<Difference>>,
     },
 }
 
@@ -122,7 +122,7 @@ pub fn check<E: fmt::Display>(
             return Err(Fault::Order {
                 order,
                 numbers: found.beyond,
-                first: found.first,
+                first: found.first.map(Box::new),
             });
         }
     }

@@ -42,9 +42,10 @@ fn through_a_face(i: u32, on: Vec2) -> Vec3 {
     let group = i / 64;
     let major = if group & 1 == 0 { 1.0 } else { -1.0 };
     let (s, t) = (on.x, on.y * 0.5);
-    if group % 3 == 0 {
+    let axis = group % 3;
+    if axis == 0 {
         Vec3::new(major, t, s)
-    } else if group % 3 == 1 {
+    } else if axis == 1 {
         Vec3::new(s, major, t)
     } else {
         Vec3::new(t, s, major)

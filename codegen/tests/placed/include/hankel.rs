@@ -23,12 +23,12 @@ const _: () = assert!(core::mem::offset_of!(Settings, pad1) == 12);
 impl Settings {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 16] {
+    pub fn to_bytes(self) -> [u8; 16] {
         let mut bytes = [0; 16];
-        bytes[0..0 + 4].copy_from_slice(&self.bias.to_le_bytes());
-        bytes[4..4 + 4].copy_from_slice(&self.depth_bias.to_le_bytes());
-        bytes[8..8 + 4].copy_from_slice(&self.pad0.to_le_bytes());
-        bytes[12..12 + 4].copy_from_slice(&self.pad1.to_le_bytes());
+        bytes[0..4].copy_from_slice(&self.bias.to_le_bytes());
+        bytes[4..8].copy_from_slice(&self.depth_bias.to_le_bytes());
+        bytes[8..12].copy_from_slice(&self.pad0.to_le_bytes());
+        bytes[12..16].copy_from_slice(&self.pad1.to_le_bytes());
         bytes
     }
 }
@@ -57,13 +57,13 @@ const _: () = assert!(core::mem::offset_of!(Moments, z) == 16);
 impl Moments {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 20] {
+    pub fn to_bytes(self) -> [u8; 20] {
         let mut bytes = [0; 20];
-        bytes[0..0 + 4].copy_from_slice(&self.b1.to_le_bytes());
-        bytes[4..4 + 4].copy_from_slice(&self.b2.to_le_bytes());
-        bytes[8..8 + 4].copy_from_slice(&self.b3.to_le_bytes());
-        bytes[12..12 + 4].copy_from_slice(&self.b4.to_le_bytes());
-        bytes[16..16 + 4].copy_from_slice(&self.z.to_le_bytes());
+        bytes[0..4].copy_from_slice(&self.b1.to_le_bytes());
+        bytes[4..8].copy_from_slice(&self.b2.to_le_bytes());
+        bytes[8..12].copy_from_slice(&self.b3.to_le_bytes());
+        bytes[12..16].copy_from_slice(&self.b4.to_le_bytes());
+        bytes[16..20].copy_from_slice(&self.z.to_le_bytes());
         bytes
     }
 }
@@ -83,10 +83,10 @@ const _: () = assert!(core::mem::offset_of!(Shadow, error) == 4);
 impl Shadow {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 8] {
+    pub fn to_bytes(self) -> [u8; 8] {
         let mut bytes = [0; 8];
-        bytes[0..0 + 4].copy_from_slice(&self.visibility.to_le_bytes());
-        bytes[4..4 + 4].copy_from_slice(&self.error.to_le_bytes());
+        bytes[0..4].copy_from_slice(&self.visibility.to_le_bytes());
+        bytes[4..8].copy_from_slice(&self.error.to_le_bytes());
         bytes
     }
 }

@@ -23,12 +23,12 @@ const _: () = assert!(core::mem::offset_of!(Moments4, b4) == 12);
 impl Moments4 {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 16] {
+    pub fn to_bytes(self) -> [u8; 16] {
         let mut bytes = [0; 16];
-        bytes[0..0 + 4].copy_from_slice(&self.b1.to_le_bytes());
-        bytes[4..4 + 4].copy_from_slice(&self.b2.to_le_bytes());
-        bytes[8..8 + 4].copy_from_slice(&self.b3.to_le_bytes());
-        bytes[12..12 + 4].copy_from_slice(&self.b4.to_le_bytes());
+        bytes[0..4].copy_from_slice(&self.b1.to_le_bytes());
+        bytes[4..8].copy_from_slice(&self.b2.to_le_bytes());
+        bytes[8..12].copy_from_slice(&self.b3.to_le_bytes());
+        bytes[12..16].copy_from_slice(&self.b4.to_le_bytes());
         bytes
     }
 }
@@ -57,13 +57,13 @@ const _: () = assert!(core::mem::offset_of!(Settings, least_variance) == 28);
 impl Settings {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 32] {
+    pub fn to_bytes(self) -> [u8; 32] {
         let mut bytes = [0; 32];
-        bytes[0..0 + 16].copy_from_slice(&self.bias_target.to_bytes());
-        bytes[16..16 + 4].copy_from_slice(&self.moment_bias.to_le_bytes());
-        bytes[20..20 + 4].copy_from_slice(&self.depth_bias.to_le_bytes());
-        bytes[24..24 + 4].copy_from_slice(&self.light_leak.to_le_bytes());
-        bytes[28..28 + 4].copy_from_slice(&self.least_variance.to_le_bytes());
+        bytes[0..16].copy_from_slice(&self.bias_target.to_bytes());
+        bytes[16..20].copy_from_slice(&self.moment_bias.to_le_bytes());
+        bytes[20..24].copy_from_slice(&self.depth_bias.to_le_bytes());
+        bytes[24..28].copy_from_slice(&self.light_leak.to_le_bytes());
+        bytes[28..32].copy_from_slice(&self.least_variance.to_le_bytes());
         bytes
     }
 }
@@ -83,10 +83,10 @@ const _: () = assert!(core::mem::offset_of!(Receiver4, depth) == 16);
 impl Receiver4 {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 20] {
+    pub fn to_bytes(self) -> [u8; 20] {
         let mut bytes = [0; 20];
-        bytes[0..0 + 16].copy_from_slice(&self.moments.to_bytes());
-        bytes[16..16 + 4].copy_from_slice(&self.depth.to_le_bytes());
+        bytes[0..16].copy_from_slice(&self.moments.to_bytes());
+        bytes[16..20].copy_from_slice(&self.depth.to_le_bytes());
         bytes
     }
 }
@@ -103,9 +103,9 @@ const _: () = assert!(core::mem::offset_of!(Shadow, shadow) == 0);
 impl Shadow {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 4] {
+    pub fn to_bytes(self) -> [u8; 4] {
         let mut bytes = [0; 4];
-        bytes[0..0 + 4].copy_from_slice(&self.shadow.to_le_bytes());
+        bytes[0..4].copy_from_slice(&self.shadow.to_le_bytes());
         bytes
     }
 }
@@ -131,12 +131,12 @@ const _: () = assert!(core::mem::offset_of!(Moments4F64, b4) == 24);
 impl Moments4F64 {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 32] {
+    pub fn to_bytes(self) -> [u8; 32] {
         let mut bytes = [0; 32];
-        bytes[0..0 + 8].copy_from_slice(&self.b1.to_le_bytes());
-        bytes[8..8 + 8].copy_from_slice(&self.b2.to_le_bytes());
-        bytes[16..16 + 8].copy_from_slice(&self.b3.to_le_bytes());
-        bytes[24..24 + 8].copy_from_slice(&self.b4.to_le_bytes());
+        bytes[0..8].copy_from_slice(&self.b1.to_le_bytes());
+        bytes[8..16].copy_from_slice(&self.b2.to_le_bytes());
+        bytes[16..24].copy_from_slice(&self.b3.to_le_bytes());
+        bytes[24..32].copy_from_slice(&self.b4.to_le_bytes());
         bytes
     }
 }
@@ -165,13 +165,13 @@ const _: () = assert!(core::mem::offset_of!(SettingsF64, least_variance) == 56);
 impl SettingsF64 {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 64] {
+    pub fn to_bytes(self) -> [u8; 64] {
         let mut bytes = [0; 64];
-        bytes[0..0 + 32].copy_from_slice(&self.bias_target.to_bytes());
-        bytes[32..32 + 8].copy_from_slice(&self.moment_bias.to_le_bytes());
-        bytes[40..40 + 8].copy_from_slice(&self.depth_bias.to_le_bytes());
-        bytes[48..48 + 8].copy_from_slice(&self.light_leak.to_le_bytes());
-        bytes[56..56 + 8].copy_from_slice(&self.least_variance.to_le_bytes());
+        bytes[0..32].copy_from_slice(&self.bias_target.to_bytes());
+        bytes[32..40].copy_from_slice(&self.moment_bias.to_le_bytes());
+        bytes[40..48].copy_from_slice(&self.depth_bias.to_le_bytes());
+        bytes[48..56].copy_from_slice(&self.light_leak.to_le_bytes());
+        bytes[56..64].copy_from_slice(&self.least_variance.to_le_bytes());
         bytes
     }
 }
@@ -191,10 +191,10 @@ const _: () = assert!(core::mem::offset_of!(Receiver4F64, depth) == 32);
 impl Receiver4F64 {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 40] {
+    pub fn to_bytes(self) -> [u8; 40] {
         let mut bytes = [0; 40];
-        bytes[0..0 + 32].copy_from_slice(&self.moments.to_bytes());
-        bytes[32..32 + 8].copy_from_slice(&self.depth.to_le_bytes());
+        bytes[0..32].copy_from_slice(&self.moments.to_bytes());
+        bytes[32..40].copy_from_slice(&self.depth.to_le_bytes());
         bytes
     }
 }
@@ -211,9 +211,9 @@ const _: () = assert!(core::mem::offset_of!(ShadowF64, shadow) == 0);
 impl ShadowF64 {
     /// The bytes that a shader reads; padding is 0.
     #[must_use]
-    pub fn to_bytes(&self) -> [u8; 8] {
+    pub fn to_bytes(self) -> [u8; 8] {
         let mut bytes = [0; 8];
-        bytes[0..0 + 8].copy_from_slice(&self.shadow.to_le_bytes());
+        bytes[0..8].copy_from_slice(&self.shadow.to_le_bytes());
         bytes
     }
 }
