@@ -248,6 +248,7 @@ impl Session {
     }
 
     /// SPIR-V of every entry point.
+    #[cfg(any(feature = "frames", feature = "measure"))]
     pub fn all_words(&self) -> Result<BTreeMap<String, Vec<u32>>> {
         let bundle = self.bundle()?;
         let all: std::result::Result<_, _> = bundle

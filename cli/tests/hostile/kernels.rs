@@ -28,13 +28,14 @@ pub fn bottomless(#[element] x: f32) -> f32 {
 hankel_dsl::kernels![endless, bottomless];
 "#;
 
-/// A folder with the crate `bad`, with these sources.
-fn bad(sources: &str) -> Desk {
+/// A folder with a crate in `bad`, with these sources. Tests share a target folder, so that each has
+/// a name of its own.
+fn bad(name: &str, sources: &str) -> Desk {
     let desk = Desk::new();
     desk.write(
         "bad/Cargo.toml",
         format!(
-            "[package]\nname = \"bad\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n\
+            "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n\
              [dependencies]\nhankel-dsl = {{ path = {:?} }}\n",
             root().join("kernels/dsl")
         ),
@@ -53,7 +54,7 @@ fn bad(sources: &str) -> Desk {
 /// Both in one test: the crate is built once.
 #[test]
 fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
-    let desk = bad(KERNELS);
+    let desk = bad("bad", KERNELS);
     desk.write("rows.csv", "x\n1\n2\n3\n");
     for (kernel, words) in [
         ("endless", ["row 3", "x = 3", "was ended after 1 s"]),
@@ -136,7 +137,7 @@ hankel_dsl::kernels![fine, race, branch, unwritten, order, wraps, shift, divides
 
 #[test]
 fn what_no_shader_may_do_is_named_with_its_line() {
-    let desk = bad(FAULTS);
+    let desk = bad("faulty", FAULTS);
     let run = desk.hankel("sanitize --manifest-path bad/Cargo.toml --limit 2");
     let said = run.code(1).out();
     let says = |words: &[&str]| {
