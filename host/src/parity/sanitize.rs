@@ -49,18 +49,18 @@ impl fmt::Display for Fault {
             } => {
                 write!(
                     f,
-                    "the result depends on the order of the invocations: {numbers} numbers differ {order}"
+                    "the result depends on the order of the invocations: {numbers} numbers are others if the invocations run {order}"
                 )?;
                 if let Some(d) = first {
                     write!(
                         f,
-                        ", first {} of element {}, {} and {}",
+                        "; the first is `{}` of element {}: {} in ascending order, then {}",
                         d.value, d.invocation, d.expected, d.got
                     )?;
                 }
                 write!(
                     f,
-                    "; where only the places of the elements depend on it, say `unordered` of that parameter"
+                    ". If only the places of the elements depend on it, mark that parameter as `unordered`"
                 )
             }
         }
