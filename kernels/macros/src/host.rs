@@ -420,16 +420,6 @@ impl Kernel {
             .collect()
     }
 
-    /// Whether invocations can meet in memory that one of them writes.
-    fn meets(&self) -> bool {
-        self.params.iter().any(|p| {
-            matches!(
-                p.role,
-                Role::StorageMut { .. } | Role::Atomic { .. } | Role::StorageTexture { .. }
-            )
-        })
-    }
-
     fn run_compute(&self, c: &Compute, variant: &Variant) -> TokenStream {
         let call = self.host_call(variant);
         match self.form() {
@@ -439,13 +429,12 @@ impl Kernel {
         }
         let checks = self.length_checks();
         let out = self.concrete(&self.outputs[0], variant);
-        let suffix = if self.meets() { "_meeting" } else { "" };
         if let Some(format) = variant.format {
             let format = format_ident!("{}", format.variant);
             let map = if self.dimensions() == 2 {
-                format_ident!("map_texels2{suffix}")
+                quote!(map_texels2)
             } else {
-                format_ident!("map_texels{suffix}")
+                quote!(map_texels)
             };
             let index = self.index_type();
             return quote! {
@@ -456,8 +445,7 @@ impl Kernel {
         let map = if self.real.is_some() {
             self.lane_map(variant, &call, &out)
         } else {
-            let map = format_ident!("map1{suffix}");
-            quote!(exec::#map(mode, output, |i| #call))
+            quote!(exec::map1(mode, output, |i| #call))
         };
         quote! {
             let output = args.slice_mut::<#out>("output")?;
@@ -479,8 +467,7 @@ impl Kernel {
             )
         });
         if !spreads {
-            let map = format_ident!("map1{}", if self.meets() { "_meeting" } else { "" });
-            return quote!(exec::#map(mode, output, |i| #call));
+            return quote!(exec::map1(mode, output, |i| #call));
         }
         let fields = self.params.iter().map(|p| {
             let name = &p.name;

@@ -345,9 +345,24 @@ fn message(payload: &(dyn Any + Send)) -> String {
         .unwrap_or_else(|| "no message".to_string())
 }
 
-/// Calls `f` with consecutive chunks of `out` and the index of each chunk's first element.
-fn chunks<T: Send>(mode: Mode, out: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync) {
-    if mode.parallel {
+/// Calls `f` with consecutive parts of `out` and the index of each part's first element. A part has
+/// `chunk` elements; in a sanitized call it has the `one` elements of a single invocation, which is
+/// at `at(number)`, and the parts come in the order of that call.
+fn chunks<T: Send>(
+    mode: Mode,
+    out: &mut [T],
+    one: usize,
+    chunk: usize,
+    at: impl Fn(u32) -> UVec3,
+    f: impl Fn(usize, &mut [T]) + Sync,
+) {
+    if let Some(order) = sanitize::order(out.len() / one) {
+        for i in order {
+            sanitize::enter_alone(at(i), i);
+            let start = i as usize * one;
+            f(start, &mut out[start..start + one]);
+        }
+    } else if mode.parallel {
         out.par_chunks_mut(chunk)
             .enumerate()
             .for_each(|(i, c)| f(i * chunk, c));
@@ -358,6 +373,11 @@ fn chunks<T: Send>(mode: Mode, out: &mut [T], chunk: usize, f: impl Fn(usize, &m
     }
 }
 
+/// Where an invocation of one dimension is.
+fn along(i: u32) -> UVec3 {
+    UVec3::new(i, 0, 0)
+}
+
 /// A map over one dimension, invocation by invocation.
 pub fn map1<T: Send>(
     mode: Mode,
@@ -365,28 +385,11 @@ pub fn map1<T: Send>(
     f: impl Fn(usize) -> T + Sync,
 ) -> Result<(), CallError> {
     guard(|| {
-        chunks(mode, out, CHUNK, |start, chunk| {
+        chunks(mode, out, 1, CHUNK, along, |start, chunk| {
             for (i, slot) in chunk.iter_mut().enumerate() {
                 *slot = f(start + i);
             }
         });
-    })
-}
-
-/// The same for a map whose invocations meet in other memory, in the order of a sanitized call.
-pub fn map1_meeting<T: Send>(
-    mode: Mode,
-    out: &mut [T],
-    f: impl Fn(usize) -> T + Sync,
-) -> Result<(), CallError> {
-    let Some(order) = sanitize::order(out.len()) else {
-        return map1(mode, out, f);
-    };
-    guard(|| {
-        for i in order {
-            sanitize::enter_alone(UVec3::new(i, 0, 0), i);
-            out[i as usize] = f(i as usize);
-        }
     })
 }
 
@@ -454,7 +457,7 @@ pub trait LaneBody: Sync {
 pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Result<(), CallError> {
     let level = if mode.lanes { lanes::level() } else { None };
     guard(|| {
-        chunks(mode, out, CHUNK, |start, chunk| {
+        chunks(mode, out, 1, CHUNK, along, |start, chunk| {
             let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), 0);
             scalar_chunk(start + done, &mut chunk[done..], body);
         });
@@ -516,52 +519,26 @@ pub fn map_texels<T: Texel<Channels: Channels>>(
     f: impl Fn(UVec3) -> T + Sync,
 ) -> Result<(), CallError> {
     let TextureMut {
-        size,
+        size: [width, height, _],
         format,
         bytes,
     } = out;
-    let (texel, width) = (format.bytes(), size[0] as usize);
+    let texel = format.bytes();
+    let at = |i: u32| {
+        let line = i / width;
+        UVec3::new(i % width, line % height, line / height)
+    };
     guard(|| {
-        chunks(mode, bytes, width * texel, |start, row| {
-            let index = start / (width * texel);
-            let (y, z) = (index as u32 % size[1], index as u32 / size[1]);
-            for (x, bytes) in row.chunks_exact_mut(texel).enumerate() {
-                f(UVec3::new(x as u32, y, z))
+        let row = width as usize * texel;
+        chunks(mode, bytes, texel, row, at, |start, bytes| {
+            let first = at((start / texel) as u32);
+            for (x, bytes) in (first.x..).zip(bytes.chunks_exact_mut(texel)) {
+                f(UVec3::new(x, first.y, first.z))
                     .channels()
                     .store(format, bytes);
             }
         });
     })
-}
-
-/// The same for a map whose invocations meet in other memory, in the order of a sanitized call.
-pub fn map_texels_meeting<T: Texel<Channels: Channels>>(
-    mode: Mode,
-    out: TextureMut<'_>,
-    f: impl Fn(UVec3) -> T + Sync,
-) -> Result<(), CallError> {
-    let [width, height, depth] = out.size;
-    let Some(order) = sanitize::order(width as usize * height as usize * depth as usize) else {
-        return map_texels(mode, out, f);
-    };
-    let texel = out.format.bytes();
-    guard(|| {
-        for i in order {
-            let at = UVec3::new(i % width, i / width % height, i / (width * height));
-            sanitize::enter_alone(at, i);
-            let bytes = &mut out.bytes[i as usize * texel..][..texel];
-            f(at).channels().store(out.format, bytes);
-        }
-    })
-}
-
-/// [`map_texels_meeting`] with a two-dimensional index.
-pub fn map_texels2_meeting<T: Texel<Channels: Channels>>(
-    mode: Mode,
-    out: TextureMut<'_>,
-    f: impl Fn(UVec2) -> T + Sync,
-) -> Result<(), CallError> {
-    map_texels_meeting(mode, out, |at| f(at.truncate()))
 }
 
 /// [`map_texels`] with a two-dimensional index.
