@@ -69,6 +69,34 @@ fn a_text_of_gigabytes_is_refused() {
     }
 }
 
+/// A uniform whose only member starts so many bytes in.
+fn gap(bytes: u32) -> String {
+    format!(
+        "OpDecorate %block Block
+OpMemberDecorate %block 0 Offset {bytes}
+OpDecorate %uniform DescriptorSet 0
+OpDecorate %uniform Binding 0
+%block = OpTypeStruct %float
+%of_block = OpTypePointer Uniform %block
+%of_float = OpTypePointer Uniform %float
+%uniform = OpVariable %of_block Uniform
+%main = OpFunction %void None %call
+%begin = OpLabel
+%place = OpAccessChain %of_float %uniform %zero
+%value = OpLoad %float %place
+"
+    )
+}
+
+#[test]
+fn a_structure_of_gaps_is_refused() {
+    read(&gap(256)).unwrap();
+    let error = read(&gap(1 << 28)).unwrap_err();
+    for words in ["`bound`", "268435456 bytes", "more than 65536"] {
+        assert!(error.contains(words), "{error}");
+    }
+}
+
 #[test]
 fn what_would_take_the_stack_is_refused() {
     // On a stack that is smaller than any thread's.

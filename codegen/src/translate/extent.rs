@@ -1,9 +1,10 @@
 //! How long and how deeply nested a text will be, before it is written.
 //!
 //! naga's writers spell out constants of arrays and structures number by number at every use, and
-//! initial zeros of variables too: a module of a few kilobytes can ask for gigabytes of text. They
-//! also call themselves for every level of an expression or a block, and a deep one would take
-//! their stack. Both are refused here, with what is to blame.
+//! initial zeros of variables too. HLSL has a member for every four bytes that a structure leaves
+//! unused. So a module of a few kilobytes can ask for gigabytes of text. The writers also call
+//! themselves for every level of an expression or a block, and a deep one would take their stack.
+//! All of that is refused here, with what is to blame.
 
 use naga::valid::ModuleInfo;
 use naga::{
@@ -14,12 +15,17 @@ use naga::{
 /// Most numbers in the constants of a text: tens of megabytes of it.
 pub(crate) const MOST_NUMBERS: u64 = 4_000_000;
 
+/// Most bytes that a structure may leave unused: the whole of the smallest constant buffer that
+/// every device has. HLSL has a member for every four of them.
+const MOST_PADDING: u32 = 64 << 10;
+
 /// Most levels of an expression within an expression or a block within a block: the writers' stack
 /// ([`crate::error::STACK`]) has 32 KiB for each.
 pub(crate) const MOST_LEVELS: u32 = 2000;
 
 /// Refuses what would be too long or too deep.
 pub(super) fn check(module: &Module, info: &ModuleInfo) -> Result<(), String> {
+    padding(module)?;
     let types = type_sizes(module);
     let size = |ty: Handle<Type>| types[ty.index()];
     let constants = constant_sizes(module, &types);
@@ -83,6 +89,31 @@ impl Numbers {
              buffer"
         ))
     }
+}
+
+/// Refuses structures that are mostly gaps.
+fn padding(module: &Module) -> Result<(), String> {
+    for (_, ty) in module.types.iter() {
+        let TypeInner::Struct { members, span } = &ty.inner else {
+            continue;
+        };
+        let mut end = 0;
+        let mut unused: u32 = 0;
+        for member in members {
+            unused = unused.saturating_add(member.offset.saturating_sub(end));
+            let size = module.types[member.ty].inner.size(module.to_ctx());
+            end = member.offset.saturating_add(size);
+        }
+        unused = unused.saturating_add(span.saturating_sub(end));
+        if unused > MOST_PADDING {
+            return Err(format!(
+                "its structure {} leaves {unused} bytes unused between its members and behind \
+                 them, more than {MOST_PADDING}: HLSL needs a member for every four of them",
+                ty.name.as_deref().unwrap_or("without a name"),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Numbers in a value of each type, saturating.
