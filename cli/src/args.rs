@@ -37,6 +37,8 @@ pub enum Command {
     Build(Build),
     /// Fail if committed shaders no longer follow from their sources.
     Check(Check),
+    /// Show what changed between two builds.
+    Diff(Diff),
     /// Show kernels, their bindings and what they cost.
     List(List),
     /// Make a kernel crate.
@@ -217,8 +219,8 @@ A budget is a TOML file:
   [budget.kernels.hamburger_4msm]
   operations = 120
 
-It limits arithmetic, operations, branches, texture, total (see `hankel list`), and findings: loops
-that cannot be unrolled and dynamic indices into a function's own arrays.
+It limits arithmetic, operations, registers, branches, texture, total (see `hankel list`), and findings:
+loops that cannot be unrolled and dynamic indices into a function's own arrays.
 
 Give the options that the folder was built with.")]
 pub struct Check {
@@ -231,6 +233,49 @@ pub struct Check {
     #[arg(long, value_name = "FILE")]
     pub budget: Option<PathBuf>,
     /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// What changes `hankel diff` fails for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Deny {
+    /// Of the interface.
+    Interface,
+    /// All.
+    Any,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel diff old/shaders shaders
+  hankel diff old/shaders shaders --deny interface --format json
+  hankel diff old/shaders shaders --run
+
+A change is of the interface where code that binds or calls a shader may have to change, too: bindings,
+layouts, workgroup sizes, entry points, signatures. Everything else is a change of the text, of what it
+costs (see `hankel list`), or of what is said of it.")]
+pub struct Diff {
+    /// The folder of the old build.
+    #[arg(value_name = "OLD")]
+    pub old: PathBuf,
+    /// The folder of the new build.
+    #[arg(value_name = "NEW")]
+    pub new: PathBuf,
+    /// Run the old and the new SPIR-V on Vulkan with the inputs of `hankel parity`, and compare the
+    /// numbers. For kernels of which the interface is the same.
+    #[arg(long)]
+    pub run: bool,
+    #[command(flatten)]
+    pub source: Source,
+    /// Seed of the generated inputs.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "run")]
+    pub seed: u64,
+    /// Exit with 1 if there is such a change.
+    #[arg(long, value_enum)]
+    pub deny: Option<Deny>,
+    /// How the changes are printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }

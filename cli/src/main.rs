@@ -34,6 +34,7 @@ fn main() -> ExitCode {
     let outcome = session::check_lanes().and_then(|()| match arguments.command {
         Command::Build(a) => commands::build::run(&a, quiet),
         Command::Check(a) => commands::check::run(&a, quiet),
+        Command::Diff(a) => commands::diff::run(&a, quiet),
         Command::List(a) => commands::list::run(&a, quiet),
         Command::New(a) => commands::new::run(&a, quiet),
         Command::Parity(a) => commands::parity::run(&a, quiet),

@@ -29,6 +29,8 @@ pub struct Limits {
     pub texture: Option<u32>,
     /// Most instructions in all.
     pub total: Option<u32>,
+    /// Most 32-bit values alive at one place.
+    pub registers: Option<u32>,
     /// Most findings of [`crate::lint`].
     pub findings: Option<u32>,
 }
@@ -64,6 +66,8 @@ pub struct Budget {
     pub texture: Option<u32>,
     /// Most instructions in all.
     pub total: Option<u32>,
+    /// Most 32-bit values alive at one place.
+    pub registers: Option<u32>,
     /// Most findings of [`crate::lint`].
     pub findings: Option<u32>,
     /// Limits of single kernels, which come before those for all.
@@ -100,6 +104,7 @@ impl Budget {
             branches: own.branches.or(self.branches),
             texture: own.texture.or(self.texture),
             total: own.total.or(self.total),
+            registers: own.registers.or(self.registers),
             findings: own.findings.or(self.findings),
         }
     }
@@ -240,6 +245,7 @@ fn over_budget(kernel: &str, entry: &KernelEntry, limits: Limits) -> Vec<OverBud
         ("branches", cost.branches, limits.branches),
         ("texture instructions", cost.texture, limits.texture),
         ("instructions", cost.total, limits.total),
+        ("registers", cost.registers, limits.registers),
         (FINDINGS, entry.findings.len() as u32, limits.findings),
     ]
     .into_iter()

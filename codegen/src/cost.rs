@@ -10,6 +10,7 @@
 //!   multiply-add: what a scalar machine would do.
 //! - *branches*: conditional branches and switches. A map kernel's guard is one branch and one
 //!   comparison for each dimension.
+//! - *registers*: the most 32-bit values that are alive at one place.
 
 use rspirv::dr::{Instruction, Module};
 use rspirv::spirv::{Op, Word};
@@ -17,6 +18,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Failure;
+use crate::registers;
 use crate::spirv::{self, global, literal, op};
 
 /// Counts of a module's instructions.
@@ -38,6 +40,10 @@ pub struct Cost {
     pub barriers: u32,
     /// All instructions within functions, labels not counted.
     pub total: u32,
+    /// The largest number of 32-bit values that are alive at one place; local arrays count
+    /// everywhere. Grows and shrinks with the registers that a GPU needs.
+    #[serde(default)]
+    pub registers: u32,
 }
 
 /// Counts the instructions of a SPIR-V binary, anybody's.
@@ -52,7 +58,10 @@ pub fn of_spirv(bytes: &[u8], name: &str) -> Result<Cost, Failure> {
 
 /// Counts a module's instructions.
 pub fn of_module(module: &Module) -> Cost {
-    let mut cost = Cost::default();
+    let mut cost = Cost {
+        registers: registers::most_alive(module),
+        ..Cost::default()
+    };
     let body = module
         .functions
         .iter()

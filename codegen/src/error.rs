@@ -283,6 +283,14 @@ pub enum Error {
         /// What is wrong.
         problem: String,
     },
+    /// A folder that another one cannot be compared with.
+    #[error("{}: {problem}", path.display())]
+    Compared {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A function of a library has no form in other languages.
     #[error("{0}")]
     Function(#[from] crate::functions::Refusal),
@@ -369,6 +377,9 @@ impl Error {
                  (register, space), wgsl (group, binding), msl (slot), glsl or essl310 (binding)."
                     .into()
             }
+            Self::Compared { .. } => "Give two folders that `hankel build --out` made, both with \
+                 the same `--form`, by this version or one with the same format."
+                .into(),
             Self::Variant { .. } => "Choose another suffix, or constants of one kernel: \
                  `hankel list --bindings` shows them."
                 .into(),

@@ -24,11 +24,12 @@ pub fn run(args: &List, quiet: bool) -> Result<Outcome> {
         return Ok(Outcome::Fine);
     }
     say!(
-        "{:<26} {:<9} {:>10} {:>10} {:>8} {:>7} {:>7}  summary",
+        "{:<26} {:<9} {:>10} {:>10} {:>9} {:>8} {:>7} {:>7}  summary",
         "kernel",
         "stage",
         "operations",
         "arithmetic",
+        "registers",
         "branches",
         "memory",
         "texture"
@@ -58,11 +59,12 @@ fn row(kernel: &Kernel, entry: &KernelEntry) {
     };
     let c = &entry.cost;
     say!(
-        "{:<26} {:<9} {:>10} {:>10} {:>8} {:>7} {:>7}  {}",
+        "{:<26} {:<9} {:>10} {:>10} {:>9} {:>8} {:>7} {:>7}  {}",
         kernel.name,
         stage,
         c.operations,
         c.arithmetic,
+        c.registers,
         c.branches,
         c.memory,
         c.texture,

@@ -110,6 +110,7 @@ fn instructions(quiet: bool) -> Result<Table> {
             Column::count("loops"),
             Column::count("memory"),
             Column::count("total"),
+            Column::count("registers"),
             Column::count("dynamic indices"),
             Column::count("loops of unknown length"),
         ],
@@ -129,6 +130,7 @@ fn instructions(quiet: bool) -> Result<Table> {
             cost.loops.into(),
             cost.memory.into(),
             cost.total.into(),
+            cost.registers.into(),
             found(Construct::DynamicIndex).into(),
             found(Construct::Loop).into(),
         ]);

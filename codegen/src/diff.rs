@@ -1,0 +1,423 @@
+//! What changed between two builds, for whoever reviews the change or binds the shaders.
+//!
+//! Everything comes from the manifests, so a new field of the manifest is compared without a word
+//! here. A change is one of the *interface* if code that binds or calls the old shader may have to
+//! change with it: a binding, a layout, a workgroup size, an entry point, a signature.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::Language;
+use crate::build::MANIFEST_FILE;
+use crate::error::{Error, Result};
+use crate::files::sha256;
+use crate::folder::{Folder, Found};
+use crate::functions::api;
+use crate::manifest::Manifest;
+
+/// What changed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Diff {
+    /// Versions and options: `made_by.naga`, `options.shader_model`.
+    pub build: Vec<Change>,
+    /// Kernels, structures in memory, or libraries of functions, by what they are and their name:
+    /// `kernel hamburger_4msm_f32`, `layout Light`.
+    pub items: BTreeMap<String, Item>,
+    /// How many of them are the same.
+    pub same: usize,
+}
+
+/// A kernel, a layout, or a library that is not the same.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "state")]
+pub enum Item {
+    /// Only the new build has it.
+    Added,
+    /// Only the old build has it: a change of the interface.
+    Removed,
+    /// Both have it.
+    Changed {
+        /// What of it, in the words of the manifest.
+        changes: Vec<Change>,
+        /// Languages whose text changed.
+        texts: Vec<Language>,
+    },
+}
+
+/// A value that is not the same.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// Its path in the manifest's entry: `bindings.moments.format`.
+    pub what: String,
+    /// The old value, if there was one.
+    pub old: Option<Value>,
+    /// The new value, if there is one.
+    pub new: Option<Value>,
+    /// Code that binds or calls the shader may have to change.
+    pub interface: bool,
+}
+
+impl Item {
+    /// A change, if there is any.
+    fn of(changes: Vec<Change>, texts: Vec<Language>) -> Option<Self> {
+        (!changes.is_empty() || !texts.is_empty()).then_some(Self::Changed { changes, texts })
+    }
+
+    /// Whether code that binds or calls it may have to change.
+    #[must_use]
+    pub fn changes_interface(&self) -> bool {
+        match self {
+            Self::Added => false,
+            Self::Removed => true,
+            Self::Changed { changes, .. } => changes.iter().any(|change| change.interface),
+        }
+    }
+}
+
+impl Diff {
+    /// Whether nothing changed at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.build.is_empty() && self.items.is_empty()
+    }
+
+    /// Whether code that binds or calls the shaders may have to change.
+    #[must_use]
+    pub fn changes_interface(&self) -> bool {
+        self.items.values().any(Item::changes_interface)
+    }
+}
+
+/// Compares two folders that `hankel build` wrote: both of shaders, or both of functions.
+///
+/// # Errors
+///
+/// A folder that cannot be read, has no manifest, or one of another format; folders of different
+/// kinds.
+pub fn compare(old: &Path, new: &Path) -> Result<Diff> {
+    match (Build::read(old)?, Build::read(new)?) {
+        (Build::Shaders(old), Build::Shaders(new)) => Ok(of_manifests(&old, &new)),
+        (Build::Functions(old), Build::Functions(new)) => Ok(of_libraries(&old, &new)),
+        _ => Err(Error::Compared {
+            path: new.to_owned(),
+            problem: format!(
+                "it and {} are of different kinds: one has shaders, the other has functions",
+                old.display()
+            ),
+        }),
+    }
+}
+
+/// What a folder says of itself.
+enum Build {
+    Shaders(Box<Manifest>),
+    Functions(api::Record),
+}
+
+impl Build {
+    fn read(path: &Path) -> Result<Self> {
+        let fail = |problem: String| Error::Compared {
+            path: path.to_owned(),
+            problem,
+        };
+        let Some(folder) = Folder::open(path)? else {
+            return Err(fail("there is no such folder".into()));
+        };
+        if let Found::File(bytes) = folder.read(MANIFEST_FILE)? {
+            let manifest = Manifest::from_json(&bytes)
+                .map_err(|problem| fail(format!("{MANIFEST_FILE}: {problem}")))?;
+            return Ok(Self::Shaders(Box::new(manifest)));
+        }
+        if let Found::File(bytes) = folder.read(api::FILE)? {
+            let record = serde_json::from_slice(&bytes)
+                .map_err(|error| fail(format!("{}: {error}", api::FILE)))?;
+            return Ok(Self::Functions(record));
+        }
+        Err(fail(format!(
+            "it has neither {MANIFEST_FILE} nor {}",
+            api::FILE
+        )))
+    }
+}
+
+/// The SPIR-V of a kernel in a folder of shaders.
+///
+/// # Errors
+///
+/// The folder cannot be read, has no such file, or another one than its manifest says.
+pub fn spirv(path: &Path, kernel: &str) -> Result<Vec<u8>> {
+    let fail = |problem: String| Error::Compared {
+        path: path.to_owned(),
+        problem,
+    };
+    let Build::Shaders(manifest) = Build::read(path)? else {
+        return Err(fail("it has functions, no shaders".into()));
+    };
+    let file = manifest
+        .kernels
+        .get(kernel)
+        .and_then(|entry| entry.languages.get(&Language::Spirv))
+        .map(|language| &language.file)
+        .ok_or_else(|| fail(format!("kernel `{kernel}` has no SPIR-V in it")))?;
+    let found = Folder::open(path)?.map(|folder| folder.read(file));
+    match found.transpose()? {
+        Some(Found::File(bytes))
+            if manifest
+                .files
+                .get(file)
+                .is_some_and(|entry| entry.sha256 == sha256(&bytes)) =>
+        {
+            Ok(bytes)
+        }
+        _ => Err(fail(format!(
+            "{file} is missing, or is not the file that {MANIFEST_FILE} names"
+        ))),
+    }
+}
+
+/// Compares two manifests.
+#[must_use]
+pub fn of_manifests(old: &Manifest, new: &Manifest) -> Diff {
+    let mut diff = Diff {
+        build: [
+            changes("made_by", &old.made_by, &new.made_by, |_| false),
+            changes("options", &old.options, &new.options, |_| false),
+        ]
+        .concat(),
+        ..Diff::default()
+    };
+    diff.add("layout", &old.layouts, &new.layouts, |one, other| {
+        Item::of(
+            changes("", one, other, |path| !path.ends_with("summary")),
+            Vec::new(),
+        )
+    });
+    diff.add("kernel", &old.kernels, &new.kernels, |one, other| {
+        let mut found = changes("", one, other, is_interface);
+        // The place in the source is no property of the shader.
+        found.retain(|change| !["file", "line"].contains(&change.what.as_str()));
+        // Another language is an offer.
+        for change in &mut found {
+            if change.what.starts_with("languages.") && change.old.is_none() {
+                change.interface = false;
+            }
+        }
+        let texts = one
+            .languages
+            .iter()
+            .filter_map(|(language, before)| {
+                let after = other.languages.get(language)?;
+                let hash = |of: &Manifest, file: &str| Some(of.files.get(file)?.sha256.clone());
+                (hash(old, &before.file) != hash(new, &after.file)).then_some(*language)
+            })
+            .collect();
+        Item::of(found, texts)
+    });
+    diff
+}
+
+/// Compares two records of libraries.
+#[must_use]
+pub fn of_libraries(old: &api::Record, new: &api::Record) -> Diff {
+    let mut diff = Diff {
+        build: [
+            changes("hankel", &old.hankel, &new.hankel, |_| false),
+            changes("prefix", &old.prefix, &new.prefix, |_| true),
+        ]
+        .concat(),
+        ..Diff::default()
+    };
+    diff.add("library", &old.libraries, &new.libraries, |one, other| {
+        let mut found = changes("", one, other, |path| path.starts_with("signatures."));
+        // A new function is an offer.
+        for change in &mut found {
+            change.interface &= change.old.is_some();
+        }
+        Item::of(found, Vec::new())
+    });
+    diff.add("file", &old.files, &new.files, |one, other| {
+        (one != other).then(|| Item::Changed {
+            changes: Vec::new(),
+            texts: Vec::new(),
+        })
+    });
+    diff
+}
+
+/// Whether code that binds a kernel follows from what the manifest's entry says at `path`.
+fn is_interface(path: &str) -> bool {
+    let first = path.split('.').next().unwrap_or_default();
+    let value_of_constant = first == "constants" && path.rsplit('.').next() != Some("id");
+    let interface = [
+        "stage",
+        "workgroup_size",
+        "dimensions",
+        "range",
+        "bindings",
+        "constants",
+        "inputs",
+        "outputs",
+        "languages",
+    ];
+    interface.contains(&first) && !value_of_constant
+}
+
+impl Diff {
+    /// Adds the items of a kind that are not the same.
+    fn add<T>(
+        &mut self,
+        kind: &str,
+        old: &BTreeMap<String, T>,
+        new: &BTreeMap<String, T>,
+        compare: impl Fn(&T, &T) -> Option<Item>,
+    ) {
+        let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+        for name in names {
+            let item = match (old.get(name), new.get(name)) {
+                (None, _) => Item::Added,
+                (_, None) => Item::Removed,
+                (Some(one), Some(other)) => match compare(one, other) {
+                    Some(item) => item,
+                    None => {
+                        self.same += 1;
+                        continue;
+                    }
+                },
+            };
+            self.items.insert(format!("{kind} {name}"), item);
+        }
+    }
+}
+
+/// The values of two things that are not the same; `interface` says of a path what it is.
+fn changes<T: Serialize>(
+    root: &str,
+    old: &T,
+    new: &T,
+    interface: impl Fn(&str) -> bool,
+) -> Vec<Change> {
+    let values = |it: &T| {
+        let mut values = BTreeMap::new();
+        // Maps have string keys and floats are finite: nothing here can fail.
+        flatten(
+            root.to_owned(),
+            serde_json::to_value(it).unwrap_or_default(),
+            &mut values,
+        );
+        values
+    };
+    let (old, new) = (values(old), values(new));
+    let paths: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+    paths
+        .into_iter()
+        .filter(|path| old.get(*path) != new.get(*path))
+        .map(|path| Change {
+            what: path.clone(),
+            old: old.get(path).cloned(),
+            new: new.get(path).cloned(),
+            interface: interface(path),
+        })
+        .collect()
+}
+
+/// All values within `value` by their paths. Elements of an array that have names go by these.
+fn flatten(path: String, value: Value, out: &mut BTreeMap<String, Value>) {
+    let below = |name: &str| match path.as_str() {
+        "" => name.to_owned(),
+        path => format!("{path}.{name}"),
+    };
+    let name = |value: &Value| Some(value.get("name")?.as_str()?.to_owned());
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                flatten(below(&name), value, out);
+            }
+        }
+        Value::Array(elements)
+            if !elements.is_empty() && elements.iter().all(|it| name(it).is_some()) =>
+        {
+            for mut value in elements {
+                let name = name(&value).unwrap_or_default();
+                if let Value::Object(fields) = &mut value {
+                    fields.remove("name");
+                }
+                flatten(below(&name), value, out);
+            }
+        }
+        value => {
+            out.insert(path, value);
+        }
+    }
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shown = |value: &Option<Value>| match value {
+            None => "none".into(),
+            Some(Value::String(text)) => text.clone(),
+            Some(value) => value.to_string(),
+        };
+        write!(
+            f,
+            "{}: {} -> {}",
+            self.what,
+            shown(&self.old),
+            shown(&self.new)
+        )?;
+        let number = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64);
+        if let (Some(old), Some(new)) = (number(&self.old), number(&self.new))
+            && self.what.starts_with("cost.")
+            && old > 0.0
+        {
+            write!(f, " ({:+.1} %)", 100.0 * (new - old) / old)?;
+        }
+        if self.interface {
+            f.write_str("  [interface]")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Diff {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() {
+            return write!(f, "nothing changed: {} items are the same", self.same);
+        }
+        for change in &self.build {
+            writeln!(f, "{change}")?;
+        }
+        for (name, item) in &self.items {
+            match item {
+                Item::Added => writeln!(f, "+ {name}")?,
+                Item::Removed => writeln!(f, "- {name}  [interface]")?,
+                Item::Changed { changes, texts } => {
+                    writeln!(f, "~ {name}")?;
+                    for change in changes {
+                        writeln!(f, "    {change}")?;
+                    }
+                    if !texts.is_empty() {
+                        let texts: Vec<&str> = texts.iter().map(|it| it.name()).collect();
+                        writeln!(f, "    text: {}", texts.join(", "))?;
+                    }
+                }
+            }
+        }
+        let count = |which: fn(&Item) -> bool| self.items.values().filter(|it| which(it)).count();
+        write!(
+            f,
+            "{} changed, {} added, {} removed, {} the same; interface of {}",
+            count(|it| matches!(it, Item::Changed { .. })),
+            count(|it| matches!(it, Item::Added)),
+            count(|it| matches!(it, Item::Removed)),
+            self.same,
+            match count(Item::changes_interface) {
+                0 => "none changed".into(),
+                n => format!("{n} changed"),
+            }
+        )
+    }
+}
