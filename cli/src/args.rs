@@ -183,8 +183,8 @@ pub struct Build {
     /// Overwrite files that hankel did not write or that were edited since.
     #[arg(long)]
     pub force: bool,
-    /// Write what the shaders are made from to this file, as a rule in Make's syntax for
-    /// OUT/manifest.json.
+    /// Write what the shaders or libraries are made from to this file, as a rule in Make's syntax for
+    /// OUT/manifest.json or OUT/functions.json.
     #[arg(long, value_name = "FILE")]
     pub depfile: Option<PathBuf>,
     /// Stay, and build again after each edit. A kernel that does not compile is reported, and what

@@ -294,7 +294,7 @@ fn misuse_of_build_is_explained() {
         .fails(2, &["nowhere", "no such file"]);
     desk.hankel("check nowhere")
         .fails(2, &["nowhere", "no such folder"]);
-    for option in ["--target wgsl", "--depfile d", "--watch", "--wgsl-group 2"] {
+    for option in ["--target wgsl", "--open-constants", "--wgsl-group 2"] {
         let name = option.split(' ').next().unwrap_or_default();
         desk.hankel(&format!("build --form functions --out lib {option}"))
             .fails(2, &[&format!("{name}: it is for shaders")]);

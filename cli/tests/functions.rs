@@ -83,3 +83,28 @@ fn a_wrong_prefix_and_a_crate_without_libraries_are_misuse() {
     assert!(String::from_utf8_lossy(&none.stderr).contains("library!"));
     assert!(!Path::new(out).exists());
 }
+
+#[test]
+fn what_libraries_follow_from_is_known_to_build_tools() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let manifest = root().join("kernels/shadows/Cargo.toml");
+    let manifest = manifest.to_str().unwrap();
+    let line = "build --form functions --out lib --depfile lib.d --manifest-path";
+    let mut arguments: Vec<&str> = line.split(' ').collect();
+    arguments.push(manifest);
+    let built = hankel(&arguments, elsewhere.path());
+    assert!(
+        built.status.success(),
+        "{}",
+        String::from_utf8_lossy(&built.stderr)
+    );
+    let rule = std::fs::read_to_string(elsewhere.path().join("lib.d")).unwrap();
+    assert!(rule.starts_with("lib/functions.json:"), "{rule}");
+    for file in [
+        "shadows/Cargo.toml",
+        "shadows/src/library",
+        "moments/src/lib.rs",
+    ] {
+        assert!(rule.contains(file), "no {file} in {rule}");
+    }
+}

@@ -45,8 +45,8 @@ fn library() -> &'static Library {
     thread_local! {
         static LIBRARY: &'static Library = {
             let manifest = root().join("kernels/shadows/Cargo.toml");
-            let texts = crates::texts(&manifest).expect("the sources can be read");
-            let mut libraries = functions::read(&texts).unwrap_or_else(|e| panic!("{e}"));
+            let sources = crates::sources(&manifest).expect("the sources can be read");
+            let mut libraries = functions::read(&sources.texts).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(libraries.len(), 1);
             Box::leak(Box::new(libraries.remove(0)))
         };

@@ -4,6 +4,7 @@ use std::time::SystemTime;
 
 use hankel_codegen::Language;
 use hankel_codegen::build::{MANIFEST_FILE, build, check_output};
+use hankel_codegen::functions::api;
 use hankel_system::output::Output;
 
 use super::functions;
@@ -15,22 +16,19 @@ use crate::session::Session;
 use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
-    if args.form == Form::Functions {
-        if let Some(option) = of_shaders_alone(args) {
-            return Err(Failure::input(
-                format!("{option}: it is for shaders, and --form functions writes libraries"),
-                "Leave it out: a library has all of its functions in every form.",
-            ));
-        }
-        let manifest = args.generate.source.manifest_path.as_deref();
-        let (prefix, out) = (&args.prefix, &args.out);
-        return functions::build(manifest, prefix, out, args.force, args.format, quiet);
+    if args.form == Form::Functions
+        && let Some(option) = of_shaders_alone(args)
+    {
+        return Err(Failure::input(
+            format!("{option}: it is for shaders, and --form functions writes libraries"),
+            "Leave it out: a library has all of its functions in every form.",
+        ));
     }
     if args.watch {
         return watch(args, quiet);
     }
-    let session = open(args, quiet)?;
-    once(args, &session, quiet)
+    once(args, quiet)?;
+    Ok(Outcome::Fine)
 }
 
 /// An option that was given and says nothing of libraries of functions.
@@ -49,16 +47,9 @@ fn of_shaders_alone(args: &Build) -> Option<&'static str> {
         ("--msl-slot-base", placed.msl_slot_base != 0),
         ("--glsl-binding-base", placed.glsl_binding_base != 0),
         ("--bindings", placed.bindings.is_some()),
-        ("--depfile", args.depfile.is_some()),
-        ("--watch", args.watch),
     ]
     .into_iter()
     .find_map(|(option, given)| given.then_some(option))
-}
-
-fn open(args: &Build, quiet: bool) -> Result<Session> {
-    check_output(&args.out)?;
-    Session::open(args.generate.source.manifest_path.as_deref(), quiet)
 }
 
 /// Builds after each edit, until the program is stopped.
@@ -75,11 +66,7 @@ fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
     loop {
         // Before the build: what is edited meanwhile is built next.
         edits.add(&places, &sources);
-        let built = open(args, quiet).and_then(|session| {
-            once(args, &session, quiet)?;
-            inputs(args, &session)
-        });
-        match built {
+        match once(args, quiet) {
             Ok(inputs) => edits.add(&inputs, &sources),
             Err(failure) => print::note(format_args!("{:?}", miette::Report::new(failure))),
         }
@@ -87,9 +74,20 @@ fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
     }
 }
 
-/// Every file and folder that the output follows from.
-fn inputs(args: &Build, session: &Session) -> Result<Vec<PathBuf>> {
-    Ok([session.inputs()?, places(args)?].concat())
+/// Builds. Gives every file and folder that the output follows from, if that was asked for.
+fn once(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
+    let (inputs, record) = match args.form {
+        Form::Functions => (functions::build(args, quiet)?, api::FILE),
+        Form::Kernels => (shaders(args, quiet)?, MANIFEST_FILE),
+    };
+    if let Some(file) = &args.depfile {
+        let record = args.out.join(record);
+        let text = depfile::rule(&record, &inputs);
+        Output::create(file, &[])?.finish(text.as_bytes())?;
+        // Make compares times: a record that stays as it was must not be older than its inputs.
+        touch(&record)?;
+    }
+    Ok(inputs)
 }
 
 /// The file with places of bindings, as an absolute path.
@@ -112,23 +110,24 @@ fn touch(file: &Path) -> Result<()> {
         .map_err(|e| Failure::machine(format!("{}: {e}", file.display()), None))
 }
 
-fn once(args: &Build, session: &Session, quiet: bool) -> Result<Outcome> {
+/// Writes shaders. Gives what they follow from, if that was asked for.
+fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
+    check_output(&args.out)?;
+    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
     let request = session.request(&args.generate)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
     let report = build(&request, &session.modules()?, &args.out, args.force)?;
-    if let Some(file) = &args.depfile {
-        let text = depfile::rule(&args.out.join(MANIFEST_FILE), &inputs(args, session)?);
-        Output::create(file, &[])?.finish(text.as_bytes())?;
-        // Make compares times: a manifest that stays as it was must not be older than its inputs.
-        touch(&args.out.join(MANIFEST_FILE))?;
-    }
+    let inputs = match args.watch || args.depfile.is_some() {
+        true => [session.inputs()?, places(args)?].concat(),
+        false => Vec::new(),
+    };
     if args.format == Format::Json {
         print::json(&report);
-        return Ok(Outcome::Fine);
+        return Ok(inputs);
     }
     if quiet {
-        return Ok(Outcome::Fine);
+        return Ok(inputs);
     }
     say!(
         "{}: {} kernels, {} files written, {} unchanged, {} removed",
@@ -146,5 +145,5 @@ fn once(args: &Build, session: &Session, quiet: bool) -> Result<Outcome> {
     for ((language, why), kernels) in missing {
         say!("no {language} of {}: {why}", kernels.join(", "));
     }
-    Ok(Outcome::Fine)
+    Ok(inputs)
 }

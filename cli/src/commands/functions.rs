@@ -1,28 +1,32 @@
 //! Libraries of functions: `hankel build --form functions`, and `hankel check` of such a folder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use hankel_codegen::Error;
+use hankel_codegen::functions::crates::Sources;
 use hankel_codegen::functions::folder::Folder;
 use hankel_codegen::functions::source::CrateText;
 use hankel_codegen::functions::{crates, read};
 
-use crate::args::Format;
+use crate::args::{Build, Format};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::session::built_in_manifest;
 
-/// Translates the libraries of the crate at `manifest`, or of the built-in one. No kernel is
-/// compiled for it.
-fn folder(manifest: Option<&Path>, prefix: &str) -> Result<Folder> {
+/// Translates the libraries of the crate at `manifest`, or of the built-in one, and names the files
+/// and folders that they follow from. No kernel is compiled for it.
+fn folder(manifest: Option<&Path>, prefix: &str) -> Result<(Folder, Vec<PathBuf>)> {
     let manifest = match manifest {
         Some(path) if path.is_dir() => Some(path.join("Cargo.toml")),
         Some(path) => Some(path.to_owned()),
         None => built_in_manifest(),
     };
-    let texts = match manifest {
+    let Sources { texts, paths } = match manifest {
         Some(manifest) => from_disk(&manifest)?,
-        None => embedded(),
+        None => Sources {
+            texts: embedded(),
+            paths: Vec::new(),
+        },
     };
     let sha256 = crates::hash(&texts);
     let libraries = read(&texts).map_err(Error::from)?;
@@ -30,17 +34,17 @@ fn folder(manifest: Option<&Path>, prefix: &str) -> Result<Folder> {
         let name = texts.first().map(|t| t.name.clone()).unwrap_or_default();
         return Err(Error::NoLibrary { name }.into());
     }
-    Ok(Folder::new(&libraries, prefix, &sha256)?)
+    Ok((Folder::new(&libraries, prefix, &sha256)?, paths))
 }
 
-fn from_disk(manifest: &Path) -> Result<Vec<CrateText>> {
+fn from_disk(manifest: &Path) -> Result<Sources> {
     if !manifest.is_file() {
         return Err(Failure::input(
             format!("{}: there is no such file", manifest.display()),
             "Give the path of a kernel crate's Cargo.toml.",
         ));
     }
-    Ok(crates::texts(manifest)?)
+    Ok(crates::sources(manifest)?)
 }
 
 /// The built-in crate's sources, as this program was compiled with them.
@@ -60,29 +64,23 @@ fn embedded() -> Vec<CrateText> {
     all
 }
 
-/// Writes the libraries.
-pub fn build(
-    manifest: Option<&Path>,
-    prefix: &str,
-    out: &Path,
-    force: bool,
-    format: Format,
-    quiet: bool,
-) -> Result<Outcome> {
-    let report = folder(manifest, prefix)?.write(out, force)?;
-    if format == Format::Json {
+/// Writes the libraries. Gives the files and folders that they follow from.
+pub fn build(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
+    let (folder, paths) = folder(args.generate.source.manifest_path.as_deref(), &args.prefix)?;
+    let report = folder.write(&args.out, args.force)?;
+    if args.format == Format::Json {
         print::json(&report);
     } else if !quiet {
         say!(
             "{}: {} functions, {} files written, {} unchanged, {} removed",
-            out.display(),
+            args.out.display(),
             report.functions,
             report.written.len(),
             report.unchanged,
             report.removed.len()
         );
     }
-    Ok(Outcome::Fine)
+    Ok(paths)
 }
 
 /// Compares a committed folder of libraries with its sources.
@@ -93,7 +91,7 @@ pub fn check(
     format: Format,
     quiet: bool,
 ) -> Result<Outcome> {
-    let differences = folder(manifest, prefix)?.check(committed)?;
+    let differences = folder(manifest, prefix)?.0.check(committed)?;
     if format == Format::Json {
         print::json(&differences);
     } else if !quiet || !differences.is_fine() {

@@ -13,12 +13,20 @@ use crate::inputs::{normal, workspace_of};
 /// Size of the largest source, in bytes.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// The texts of the kernel crate at `manifest`, which is the first, and of the crates that it
-/// depends on by path.
+/// What libraries are made from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sources {
+    /// The kernel crate, which is the first, and the crates that it depends on by path.
+    pub texts: Vec<CrateText>,
+    /// Every file and folder that was read, as absolute paths.
+    pub paths: Vec<PathBuf>,
+}
+
+/// The sources of the kernel crate at `manifest`.
 ///
 /// # Errors
 /// A file that cannot be read, or a Cargo.toml that is none.
-pub fn texts(manifest: &Path) -> Result<Vec<CrateText>> {
+pub fn sources(manifest: &Path) -> Result<Sources> {
     let manifest = normal(&std::path::absolute(manifest).during("resolve", manifest)?);
     let mut found = BTreeMap::new();
     let mut all = vec![manifest];
@@ -32,13 +40,18 @@ pub fn texts(manifest: &Path) -> Result<Vec<CrateText>> {
         all.extend(krate.dependencies()?);
         found.insert(manifest, krate);
     }
-    let mut texts = Vec::new();
+    let mut sources = Sources::default();
     for manifest in all {
         if let Some(krate) = found.remove(&manifest) {
-            texts.push(krate.text()?);
+            sources.paths.push(manifest);
+            sources.paths.push(krate.workspace.0.join("Cargo.toml"));
+            let text = krate.text(&mut sources.paths)?;
+            sources.texts.push(text);
         }
     }
-    Ok(texts)
+    sources.paths.sort();
+    sources.paths.dedup();
+    Ok(sources)
 }
 
 /// Hash of all texts, in whatever order the crates are.
@@ -127,18 +140,26 @@ impl Crate {
             .into()
     }
 
-    fn text(&self) -> Result<CrateText> {
+    fn text(&self, paths: &mut Vec<PathBuf>) -> Result<CrateText> {
         let mut krate = CrateText {
             name: self.field("name"),
             version: self.field("version"),
             licence: self.field("license"),
             ..CrateText::default()
         };
-        self.add(&self.folder.join("src"), "src", &mut krate)?;
+        self.add(&self.folder.join("src"), "src", &mut krate, paths)?;
         Ok(krate)
     }
 
-    fn add(&self, folder: &Path, name: &str, krate: &mut CrateText) -> Result<()> {
+    fn add(
+        &self,
+        folder: &Path,
+        name: &str,
+        krate: &mut CrateText,
+        paths: &mut Vec<PathBuf>,
+    ) -> Result<()> {
+        // A file that is added to the folder counts, too.
+        paths.push(folder.to_owned());
         for entry in std::fs::read_dir(folder).during("read", folder)? {
             let entry = entry.during("read", folder)?;
             let own = entry.file_name().to_string_lossy().into_owned();
@@ -147,7 +168,7 @@ impl Crate {
             }
             let (path, name) = (entry.path(), format!("{name}/{own}"));
             if path.is_dir() {
-                self.add(&path, &name, krate)?;
+                self.add(&path, &name, krate, paths)?;
             } else if own.ends_with(".rs") {
                 let bytes = files::read(&path, MOST_BYTES)?;
                 let text = String::from_utf8(bytes).map_err(|_| Error::NotAFile {
@@ -155,6 +176,7 @@ impl Crate {
                     problem: "it is no UTF-8 text".into(),
                 })?;
                 krate.files.insert(name, text.replace("\r\n", "\n"));
+                paths.push(path);
             }
         }
         Ok(())

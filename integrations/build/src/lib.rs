@@ -17,6 +17,14 @@
 //! bindings, and the structures of its buffers. The build script runs again when a file changes that
 //! the shaders are made from.
 //!
+//! [`Build::functions_of`] makes libraries of functions instead, to include and call; in Rust:
+//!
+//! ```ignore
+//! mod shadows {
+//!     include!(concat!(env!("HANKEL_FUNCTIONS"), "/rust/hankel_shadows.rs"));
+//! }
+//! ```
+//!
 //! The work is done by the program `hankel`: the one that the environment variable `HANKEL` names, or
 //! else the one in `PATH`. This crate only starts it, so that a build script compiles in seconds.
 
@@ -32,12 +40,35 @@ use sha2::{Digest, Sha256};
 /// The environment variable that names the program.
 const PROGRAM: &str = "HANKEL";
 
-/// What the including crate finds the folder by.
-const FOLDER: &str = "HANKEL_SHADERS";
+/// What is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Kernels,
+    Functions,
+}
+
+impl Form {
+    /// What the including crate finds the folder by.
+    fn variable(self) -> &'static str {
+        match self {
+            Self::Kernels => "HANKEL_SHADERS",
+            Self::Functions => "HANKEL_FUNCTIONS",
+        }
+    }
+
+    /// The file that says what a folder holds.
+    fn record(self) -> &'static str {
+        match self {
+            Self::Kernels => "manifest.json",
+            Self::Functions => "functions.json",
+        }
+    }
+}
 
 /// Which shaders are wanted.
 #[derive(Clone, Debug)]
 pub struct Build {
+    form: Form,
     manifest: Option<PathBuf>,
     committed: Option<PathBuf>,
     arguments: Vec<OsString>,
@@ -109,12 +140,36 @@ impl Build {
     /// The kernels that the program brings: moment shadow maps. Nothing is compiled for them.
     pub fn built_in() -> Self {
         Self {
+            form: Form::Kernels,
             manifest: None,
             committed: None,
             arguments: Vec::new(),
             bindings: None,
             program: None,
         }
+    }
+
+    /// The libraries of functions of the crate whose Cargo.toml is at `manifest`, in every form. The
+    /// folder is in `HANKEL_FUNCTIONS`. No kernel is compiled for them.
+    pub fn functions_of(manifest: impl Into<PathBuf>) -> Self {
+        Self {
+            form: Form::Functions,
+            ..Self::of(manifest)
+        }
+    }
+
+    /// The libraries of functions that the program brings: moment shadow maps.
+    pub fn built_in_functions() -> Self {
+        Self {
+            form: Form::Functions,
+            ..Self::built_in()
+        }
+    }
+
+    /// Libraries: what the names of functions begin with, instead of `hankel`.
+    #[must_use]
+    pub fn prefix(self, prefix: &str) -> Self {
+        self.argument("--prefix").argument(prefix)
     }
 
     /// Only kernels of this name, where `*` stands for any letters. May be called again.
@@ -189,8 +244,8 @@ impl Build {
         self
     }
 
-    /// Builds, and tells cargo: what to watch, and in `HANKEL_SHADERS` where the shaders are. Gives
-    /// that folder.
+    /// Builds, and tells cargo: what to watch, and in `HANKEL_SHADERS` where the shaders are, or in
+    /// `HANKEL_FUNCTIONS` where the libraries are. Gives that folder.
     ///
     /// # Errors
     ///
@@ -204,7 +259,11 @@ impl Build {
         for line in lines {
             println!("cargo::{line}");
         }
-        println!("cargo::rustc-env={FOLDER}={}", folder.display());
+        println!(
+            "cargo::rustc-env={}={}",
+            self.form.variable(),
+            folder.display()
+        );
         Ok(folder)
     }
 
@@ -225,7 +284,10 @@ impl Build {
             .clone()
             .or_else(|| std::env::var_os(PROGRAM).map(Into::into));
         let program = named.clone().unwrap_or_else(|| "hankel".into());
-        let (folder, dependencies) = (out.join("shaders"), out.join("shaders.d"));
+        let (folder, dependencies) = match self.form {
+            Form::Kernels => (out.join("shaders"), out.join("shaders.d")),
+            Form::Functions => (out.join("functions"), out.join("functions.d")),
+        };
         let mut command = Command::new(&program);
         // What cargo sets for this build script is not meant for the cargo that hankel runs; and the
         // target folder in use is locked until this script ends.
@@ -237,6 +299,9 @@ impl Build {
         command
             .env("CARGO_TARGET_DIR", out.join("target"))
             .args(["--quiet", "build"]);
+        if self.form == Form::Functions {
+            command.args(["--form", "functions"]);
+        }
         if let Some(manifest) = &self.manifest {
             command.arg("--manifest-path").arg(here.join(manifest));
         }
@@ -254,7 +319,7 @@ impl Build {
             Err(source) => {
                 let missing = named.is_none() && source.kind() == io::ErrorKind::NotFound;
                 return match &self.committed {
-                    Some(folder) if missing => as_committed(&here.join(folder)),
+                    Some(folder) if missing => as_committed(&here.join(folder), self.form),
                     _ => Err(BuildError::NoProgram { program, source }),
                 };
             }
@@ -349,20 +414,24 @@ fn prerequisites(text: &str) -> impl Iterator<Item = String> {
 }
 
 /// A committed folder, if nothing in it was changed or lost.
-fn as_committed(folder: &Path) -> Result<(PathBuf, Vec<String>), BuildError> {
+fn as_committed(folder: &Path, form: Form) -> Result<(PathBuf, Vec<String>), BuildError> {
     #[derive(serde::Deserialize)]
-    struct Manifest {
+    struct Record {
         files: BTreeMap<String, File>,
     }
+    /// Of shaders, and of libraries.
     #[derive(serde::Deserialize)]
-    struct File {
-        sha256: String,
+    #[serde(untagged)]
+    enum File {
+        Entry { sha256: String },
+        Hash(String),
     }
-    let path = folder.join("manifest.json");
+    let path = folder.join(form.record());
     let text = std::fs::read(&path).map_err(|e| at(&path, e))?;
-    let manifest: Manifest = serde_json::from_slice(&text).map_err(|e| at(&path, e))?;
+    let record: Record = serde_json::from_slice(&text).map_err(|e| at(&path, e))?;
     let mut lines = vec![format!("rerun-if-changed={}", path.display())];
-    for (name, file) in &manifest.files {
+    for (name, file) in &record.files {
+        let (File::Entry { sha256 } | File::Hash(sha256)) = file;
         let inside = Path::new(name)
             .components()
             .all(|part| matches!(part, Component::Normal(_)));
@@ -378,7 +447,7 @@ fn as_committed(folder: &Path) -> Result<(PathBuf, Vec<String>), BuildError> {
             .iter()
             .map(|byte| format!("{byte:02x}"))
             .collect();
-        if hash != file.sha256 {
+        if hash != *sha256 {
             return Err(at(
                 &path,
                 "it is not as hankel wrote it; restore it, or build the folder anew with hankel",
@@ -387,7 +456,7 @@ fn as_committed(folder: &Path) -> Result<(PathBuf, Vec<String>), BuildError> {
         lines.push(format!("rerun-if-changed={}", path.display()));
     }
     lines.push(format!(
-        "warning=there is no program `hankel`: the shaders of {} are used as they are; `hankel check` \
+        "warning=there is no program `hankel`: the files of {} are used as they are; `hankel check` \
          tells whether they follow from their sources",
         folder.display()
     ));
@@ -488,6 +557,27 @@ mod tests {
         assert!(!said.contains("--manifest-path"), "{said}");
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn libraries_are_asked_for_by_their_form() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let program = folder.path().join("hankel");
+        let script = "#!/bin/sh\ncd \"$(dirname \"$0\")\" && echo \"$@\" > said && echo 'a: /b.rs' > functions.d\n";
+        std::fs::write(&program, script).expect("a script");
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
+            .expect("it runs");
+        let build = Build::built_in_functions().prefix("own").program(&program);
+        let (functions, lines) = build
+            .make(folder.path(), folder.path())
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(functions, folder.path().join("functions"));
+        assert!(lines.contains(&"rerun-if-changed=/b.rs".to_owned()));
+        let said = std::fs::read_to_string(folder.path().join("said")).expect("it ran");
+        assert!(said.contains("build --form functions --out"), "{said}");
+        assert!(said.contains("--prefix own"), "{said}");
+    }
+
     #[test]
     fn committed_shaders_are_used_whole_or_not_at_all() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -503,7 +593,7 @@ mod tests {
             "manifest.json",
             &format!("{{\"files\":{{\"a.wgsl\":{{\"sha256\":\"{hash}\"}}}}}}"),
         );
-        let (_, lines) = as_committed(folder.path()).expect("it is whole");
+        let (_, lines) = as_committed(folder.path(), Form::Kernels).expect("it is whole");
         assert!(
             lines
                 .iter()
@@ -515,12 +605,22 @@ mod tests {
                 .any(|l| l.starts_with("rerun-if-changed=") && l.ends_with("a.wgsl"))
         );
 
+        // The record of libraries has bare hashes.
+        let record = format!("{{\"files\":{{\"a.wgsl\":\"{hash}\"}}}}");
+        write("functions.json", &record);
+        as_committed(folder.path(), Form::Functions).expect("it is whole");
+
         write("a.wgsl", "other");
-        let error = as_committed(folder.path()).unwrap_err().to_string();
+        as_committed(folder.path(), Form::Functions).unwrap_err();
+        let error = as_committed(folder.path(), Form::Kernels)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("a.wgsl"), "{error}");
         let outside = "{\"files\":{\"../b\":{\"sha256\":\"\"}}}";
         write("manifest.json", outside);
-        let error = as_committed(folder.path()).unwrap_err().to_string();
+        let error = as_committed(folder.path(), Form::Kernels)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("../b"), "{error}");
     }
 }
