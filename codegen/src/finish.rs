@@ -73,7 +73,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     trim::debug(&mut module);
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);
-    trim::write_only_textures(&mut module);
+    trim::accesses_of_textures(&mut module);
     reading::coordinate_types(&mut module);
     split::apply(&mut module, kernel);
     names::apply(&mut module, kernel)?;

@@ -244,6 +244,9 @@ pub struct Binding {
     pub kind: BindingKind,
     /// The kernel writes it.
     pub written: bool,
+    /// Storage textures: the kernel reads texels of it.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub read: bool,
     /// Buffers: the type of the value or of an element; a structure's name is in `layouts`.
     #[serde(rename = "type", skip_serializing_if = "Option::is_none", default)]
     pub ty: Option<String>,
@@ -254,10 +257,11 @@ pub struct Binding {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub element_for_each: Option<String>,
     /// Textures: `1d`, `2d`, `2d-array`, `2d-multisampled`, `3d`, `cube`, `cube-array`; of depths
-    /// `depth-2d`, `depth-2d-array`, `depth-cube`.
+    /// `depth-2d`, `depth-2d-array`, `depth-cube`; of integers `uint-2d`, `uint-2d-array`, `uint-3d`,
+    /// or with `sint-`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub texture: Option<String>,
-    /// Written textures: the format.
+    /// Storage textures: the format.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub format: Option<String>,
     /// Where it is in each language; absent where the kernel's code does not use it.
@@ -276,7 +280,7 @@ pub enum BindingKind {
     Atomic,
     /// A texture that is read.
     Texture,
-    /// A texture that is written.
+    /// A texture of which any texel is written, or read, or both.
     StorageTexture,
     /// A sampler.
     Sampler,
@@ -286,6 +290,8 @@ pub enum BindingKind {
 
 /// Before and after how a texture is seen, in [`Binding::texture`].
 const DEPTH: &str = "depth-";
+const UINT: &str = "uint-";
+const SINT: &str = "sint-";
 const MULTISAMPLED: &str = "-multisampled";
 
 impl Binding {
@@ -293,7 +299,11 @@ impl Binding {
     #[must_use]
     pub fn view_dimension(&self) -> Option<&str> {
         let texture = self.texture.as_deref()?;
-        let texture = texture.strip_prefix(DEPTH).unwrap_or(texture);
+        let before = [DEPTH, UINT, SINT].into_iter();
+        let texture = before
+            .filter_map(|it| texture.strip_prefix(it))
+            .next()
+            .unwrap_or(texture);
         Some(texture.strip_suffix(MULTISAMPLED).unwrap_or(texture))
     }
 
@@ -303,6 +313,27 @@ impl Binding {
         self.texture
             .as_deref()
             .is_some_and(|it| it.starts_with(DEPTH))
+    }
+
+    /// `uint` or `sint`, for a texture of integers.
+    #[must_use]
+    pub fn integers(&self) -> Option<&'static str> {
+        let texture = self.texture.as_deref()?;
+        match texture {
+            _ if texture.starts_with(UINT) => Some("uint"),
+            _ if texture.starts_with(SINT) => Some("sint"),
+            _ => None,
+        }
+    }
+
+    /// What is done with the texels of a storage texture, in WebGPU's words.
+    #[must_use]
+    pub const fn access(&self) -> &'static str {
+        match (self.written, self.read) {
+            (true, false) => "write-only",
+            (true, true) => "read-write",
+            (false, _) => "read-only",
+        }
     }
 
     /// Whether it is a texture with several samples in each texel.
@@ -616,6 +647,7 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
         name: name.into(),
         kind,
         written: false,
+        read: false,
         ty: None,
         stride: None,
         element_for_each: None,
@@ -661,7 +693,12 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                 ..plain(*binding, name, BindingKind::Atomic)
             },
             Role::Texture { binding, texture } => {
-                let before = if texture.is_depth() { DEPTH } else { "" };
+                let before = match texture.channels() {
+                    _ if texture.is_depth() => DEPTH,
+                    describe::Channels::Float => "",
+                    describe::Channels::Uint => UINT,
+                    describe::Channels::Sint => SINT,
+                };
                 let after = if texture.is_multisampled() {
                     MULTISAMPLED
                 } else {
@@ -676,8 +713,10 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                 binding,
                 format,
                 dimensions,
+                access,
             } => Binding {
-                written: true,
+                written: access.writes(),
+                read: access.reads(),
                 texture: Some(format!("{dimensions}d")),
                 format: Some(format_name(*format)),
                 ..plain(*binding, name, BindingKind::StorageTexture)

@@ -228,6 +228,9 @@ fn from_f64(scalar: Scalar, x: f64) -> Number {
         // `as` saturates.
         Scalar::U32 => Number::U32(x as u32),
         Scalar::I32 => Number::I32(x as i32),
+        Scalar::U64 => Number::U64(x as u64),
+        Scalar::I64 => Number::I64(x as i64),
+        Scalar::Bool => Number::U32(u32::from(x != 0.0)),
     }
 }
 
@@ -456,6 +459,32 @@ fn parse(scalar: Scalar, text: &str) -> Result<Number, String> {
     if text.is_empty() {
         return Err("it is empty".into());
     }
+    // Not by way of f64, which does not hold all of them.
+    match scalar {
+        Scalar::U64 => {
+            let number = text.parse().map(Number::U64);
+            return number
+                .map_err(|_| format!("`{text}` is no whole number from 0 to {}", u64::MAX));
+        }
+        Scalar::I64 => {
+            let number = text.parse().map(Number::I64);
+            return number.map_err(|_| {
+                format!(
+                    "`{text}` is no whole number from {} to {}",
+                    i64::MIN,
+                    i64::MAX
+                )
+            });
+        }
+        Scalar::Bool => {
+            return match text {
+                "0" | "false" => Ok(Number::U32(0)),
+                "1" | "true" => Ok(Number::U32(1)),
+                _ => Err(format!("`{text}` is neither 0 nor 1")),
+            };
+        }
+        Scalar::F32 | Scalar::F64 | Scalar::U32 | Scalar::I32 => {}
+    }
     let Ok(wide) = text.parse::<f64>() else {
         return Err(format!("`{text}` is not a number"));
     };
@@ -474,7 +503,7 @@ fn parse(scalar: Scalar, text: &str) -> Result<Number, String> {
             Ok(x) if x.is_finite() => Ok(Number::F32(x)),
             _ => Err(too_large("f32")),
         },
-        Scalar::U32 | Scalar::I32 => {
+        _ => {
             let (name, least, most) = if scalar == Scalar::U32 {
                 ("u32", 0.0, f64::from(u32::MAX))
             } else {

@@ -111,10 +111,15 @@ pub enum Number {
     U32(u32),
     /// `i32`.
     I32(i32),
+    /// `u64`.
+    U64(u64),
+    /// `i64`.
+    I64(i64),
 }
 
 impl Number {
-    /// Reads the number of type `scalar` at the start of `bytes`; 0 if there are too few.
+    /// Reads the number of type `scalar` at the start of `bytes`; 0 if there are too few. A truth
+    /// value is a `u32`.
     #[must_use]
     pub fn read(scalar: Scalar, bytes: &[u8]) -> Self {
         fn take<const N: usize>(bytes: &[u8]) -> [u8; N] {
@@ -123,8 +128,10 @@ impl Number {
         match scalar {
             Scalar::F32 => Self::F32(f32::from_le_bytes(take(bytes))),
             Scalar::F64 => Self::F64(f64::from_le_bytes(take(bytes))),
-            Scalar::U32 => Self::U32(u32::from_le_bytes(take(bytes))),
+            Scalar::U32 | Scalar::Bool => Self::U32(u32::from_le_bytes(take(bytes))),
             Scalar::I32 => Self::I32(i32::from_le_bytes(take(bytes))),
+            Scalar::U64 => Self::U64(u64::from_le_bytes(take(bytes))),
+            Scalar::I64 => Self::I64(i64::from_le_bytes(take(bytes))),
         }
     }
 
@@ -135,10 +142,12 @@ impl Number {
             Self::F64(x) => bytes[..8].copy_from_slice(&x.to_le_bytes()),
             Self::U32(x) => bytes[..4].copy_from_slice(&x.to_le_bytes()),
             Self::I32(x) => bytes[..4].copy_from_slice(&x.to_le_bytes()),
+            Self::U64(x) => bytes[..8].copy_from_slice(&x.to_le_bytes()),
+            Self::I64(x) => bytes[..8].copy_from_slice(&x.to_le_bytes()),
         }
     }
 
-    /// As `f64`, exactly.
+    /// As `f64`: exactly, but for integers of more than 53 bits.
     #[must_use]
     pub fn to_f64(self) -> f64 {
         match self {
@@ -146,6 +155,8 @@ impl Number {
             Self::F64(x) => x,
             Self::U32(x) => x.into(),
             Self::I32(x) => x.into(),
+            Self::U64(x) => x as f64,
+            Self::I64(x) => x as f64,
         }
     }
 }
@@ -158,6 +169,8 @@ impl std::fmt::Display for Number {
             Self::F64(x) => write!(f, "{x:?}"),
             Self::U32(x) => write!(f, "{x}"),
             Self::I32(x) => write!(f, "{x}"),
+            Self::U64(x) => write!(f, "{x}"),
+            Self::I64(x) => write!(f, "{x}"),
         }
     }
 }
@@ -267,6 +280,8 @@ mod tests {
             Number::F64(-5e-324),
             Number::U32(u32::MAX),
             Number::I32(-7),
+            Number::U64(u64::MAX),
+            Number::I64(i64::MIN),
         ] {
             n.write(&mut b);
             let scalar = match n {
@@ -274,6 +289,8 @@ mod tests {
                 Number::F64(_) => Scalar::F64,
                 Number::U32(_) => Scalar::U32,
                 Number::I32(_) => Scalar::I32,
+                Number::U64(_) => Scalar::U64,
+                Number::I64(_) => Scalar::I64,
             };
             assert_eq!(Number::read(scalar, &b), n);
         }

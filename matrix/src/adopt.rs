@@ -273,6 +273,14 @@ fn vulkan_format(name: &str) -> Option<ImageFormat> {
         "rgba8unorm" => ImageFormat::Rgba8,
         "r32uint" => ImageFormat::R32ui,
         "rgba32uint" => ImageFormat::Rgba32ui,
+        "r32sint" => ImageFormat::R32i,
+        "rgba32sint" => ImageFormat::Rgba32i,
+        "rg32uint" => ImageFormat::Rg32ui,
+        "rg32sint" => ImageFormat::Rg32i,
+        "rgba16uint" => ImageFormat::Rgba16ui,
+        "rgba16sint" => ImageFormat::Rgba16i,
+        "rgba8uint" => ImageFormat::Rgba8ui,
+        "rgba8sint" => ImageFormat::Rgba8i,
         _ => return None,
     })
 }

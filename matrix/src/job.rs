@@ -16,6 +16,7 @@
 use std::path::PathBuf;
 
 use hankel_dsl::native::Sampler;
+use hankel_dsl::native::describe::TexelAccess;
 use serde::{Deserialize, Serialize};
 
 /// A kernel to be run.
@@ -113,12 +114,14 @@ pub enum Role {
     },
     /// A sampler.
     Sampler,
-    /// A texture that is written.
+    /// A texture of which any texel is read or written.
     StorageTexture {
         /// WebGPU's name of its format.
         format: String,
         /// 2 or 3.
         dimensions: u32,
+        /// WebGPU's word for what is done with its texels: `write-only`, `read-only`, `read-write`.
+        access: String,
     },
     /// A vertex attribute, tightly packed.
     Attribute {
@@ -157,17 +160,17 @@ pub enum Role {
 impl Role {
     /// Whether the kernel writes it.
     #[must_use]
-    pub const fn is_written(&self) -> bool {
-        matches!(
-            self,
+    pub fn is_written(&self) -> bool {
+        match self {
             Self::Atomic
-                | Self::Write
-                | Self::StorageTexture { .. }
-                | Self::Position
-                | Self::Passed { .. }
-                | Self::Depth
-                | Self::Target { .. }
-        )
+            | Self::Write
+            | Self::Position
+            | Self::Passed { .. }
+            | Self::Depth
+            | Self::Target { .. } => true,
+            Self::StorageTexture { access, .. } => access != TexelAccess::Read.word(),
+            _ => false,
+        }
     }
 }
 

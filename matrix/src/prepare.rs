@@ -199,9 +199,14 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
             depth: kind.is_depth(),
             multisampled: kind.is_multisampled(),
         },
-        Use::StorageTexture { format, dimensions } => Role::StorageTexture {
+        Use::StorageTexture {
+            format,
+            dimensions,
+            access,
+        } => Role::StorageTexture {
             format: format.name().into(),
             dimensions,
+            access: access.word().into(),
         },
         Use::Attribute(location, ty) => Role::Attribute {
             location,
@@ -248,7 +253,10 @@ fn value(ty: &Type) -> Result<Value, String> {
         describe::Scalar::F32 => Scalar::F32,
         describe::Scalar::U32 => Scalar::U32,
         describe::Scalar::I32 => Scalar::I32,
-        describe::Scalar::F64 => return Err("64-bit values do not pass between stages".into()),
+        describe::Scalar::F64 | describe::Scalar::U64 | describe::Scalar::I64 => {
+            return Err("64-bit values do not pass between stages".into());
+        }
+        describe::Scalar::Bool => return Err("truth values do not pass between stages".into()),
     };
     Ok(Value { scalar, size })
 }

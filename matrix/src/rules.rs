@@ -40,10 +40,12 @@ pub fn lacking(kernel: &Kernel, column: Column) -> Option<String> {
         | Use::StorageMut { layout: l, .. }
         | Use::Output(l) => flat::leaves(l)
             .iter()
-            .any(|leaf| leaf.scalar == Scalar::F64),
+            .any(|leaf| matches!(leaf.scalar, Scalar::F64 | Scalar::U64 | Scalar::I64)),
         _ => false,
     });
     // `tests/upstream/glslang-templated-load`.
-    (column == Column::HlslGlslang && wide)
-        .then(|| "64-bit floats in buffers (glslang's HLSL has no `Load<double>`)".into())
+    (column == Column::HlslGlslang && wide).then(|| {
+        "64-bit numbers in buffers (glslang's HLSL has no `Load<double>`, nor `Load<uint64_t>`)"
+            .into()
+    })
 }

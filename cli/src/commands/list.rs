@@ -127,9 +127,17 @@ fn bindings(kernel: &Kernel) {
             ),
             Role::Texture { binding, texture } => format!("binding {binding}: {texture:?}"),
             Role::StorageTexture {
-                binding, format, ..
+                binding,
+                format,
+                access,
+                ..
             } => {
-                format!("binding {binding}: texture {}, written", format.name())
+                let does = match (access.reads(), access.writes()) {
+                    (true, true) => "read and written",
+                    (true, false) => "read",
+                    _ => "written",
+                };
+                format!("binding {binding}: texture {}, {does}", format.name())
             }
             Role::Sampler {
                 binding,

@@ -116,7 +116,9 @@ fn c_type(layouts: &Layouts, ty: &Type) -> (String, String) {
         match scalar {
             Scalar::F32 => "float",
             Scalar::F64 => "double",
-            Scalar::U32 => "uint32_t",
+            Scalar::U32 | Scalar::Bool => "uint32_t",
+            Scalar::U64 => "uint64_t",
+            Scalar::I64 => "int64_t",
             Scalar::I32 => "int32_t",
         }
         .to_owned()

@@ -202,7 +202,10 @@ fn put(text: &mut String, layouts: &Layouts, ty: &Type, value: &str, at: &str, d
             let setter = match scalar {
                 Scalar::F32 => "setFloat32",
                 Scalar::F64 => "setFloat64",
-                Scalar::U32 => "setUint32",
+                // `true` is written as 1.
+                Scalar::U32 | Scalar::Bool => "setUint32",
+                Scalar::U64 => "setBigUint64",
+                Scalar::I64 => "setBigInt64",
                 Scalar::I32 => "setInt32",
             };
             let _ = writeln!(text, "{indent}view.{setter}({at}, {value}, true);");
@@ -236,6 +239,7 @@ fn layout_entry(number: u32, binding: &Binding, stage: u32, filters: bool) -> se
         (false, true) => "float",
         (false, false) => "unfilterable-float",
     };
+    let sample_type = binding.integers().unwrap_or(sample_type);
     let (key, value) = match binding.kind {
         BindingKind::Uniform => ("buffer", json!({ "type": "uniform" })),
         BindingKind::Storage if !binding.written => {
@@ -252,7 +256,7 @@ fn layout_entry(number: u32, binding: &Binding, stage: u32, filters: bool) -> se
         ),
         BindingKind::StorageTexture => (
             "storageTexture",
-            json!({ "access": "write-only", "format": binding.format, "viewDimension": dimension }),
+            json!({ "access": binding.access(), "format": binding.format, "viewDimension": dimension }),
         ),
         BindingKind::Sampler => ("sampler", json!({ "type": "filtering" })),
         BindingKind::ComparisonSampler => ("sampler", json!({ "type": "comparison" })),

@@ -56,8 +56,8 @@ impl Layouts {
     /// a structure.
     pub fn spell(&self, ty: &Type) -> String {
         match ty {
-            Type::Scalar { scalar } => scalar_name(*scalar).into(),
-            Type::Vector { scalar, size } => format!("vec{size}<{}>", scalar_name(*scalar)),
+            Type::Scalar { scalar } => scalar.name().into(),
+            Type::Vector { scalar, size } => format!("vec{size}<{}>", scalar.name()),
             Type::Array {
                 element, length, ..
             } => format!("array<{}, {length}>", self.spell(element)),
@@ -197,17 +197,16 @@ fn has_double(layout: &Layout) -> bool {
     layout.fields.iter().any(|field| double(&field.ty))
 }
 
+/// The Rust type of a scalar in memory.
 fn scalar_name(scalar: Scalar) -> &'static str {
     match scalar {
-        Scalar::F32 => "f32",
-        Scalar::F64 => "f64",
-        Scalar::U32 => "u32",
-        Scalar::I32 => "i32",
+        Scalar::Bool => "u32",
+        other => other.name(),
     }
 }
 
 fn scalar_size(scalar: Scalar) -> u32 {
-    if scalar == Scalar::F64 { 8 } else { 4 }
+    scalar.bytes() as u32
 }
 
 /// Bytes that a type's values take, without padding after them.

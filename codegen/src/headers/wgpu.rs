@@ -167,6 +167,8 @@ fn ty(binding: &Binding, filters: bool) -> String {
             let multisampled = binding.is_multisampled();
             let sample_type = if binding.is_depth() {
                 "Depth".into()
+            } else if let Some(integers) = binding.integers() {
+                texture_format(integers)
             } else {
                 format!("Float {{ filterable: {} }}", filters && !multisampled)
             };
@@ -178,8 +180,13 @@ fn ty(binding: &Binding, filters: bool) -> String {
         }
         BindingKind::StorageTexture => {
             let format = texture_format(binding.format.as_deref().unwrap_or_default());
+            let access = match binding.access() {
+                "write-only" => "WriteOnly",
+                "read-only" => "ReadOnly",
+                _ => "ReadWrite",
+            };
             format!(
-                "wgpu::BindingType::StorageTexture {{ access: wgpu::StorageTextureAccess::WriteOnly, \
+                "wgpu::BindingType::StorageTexture {{ access: wgpu::StorageTextureAccess::{access}, \
                  format: wgpu::TextureFormat::{format}, view_dimension: wgpu::TextureViewDimension::{dimension} }}"
             )
         }

@@ -217,9 +217,9 @@ fn device_scope(module: &mut Module) {
     }
 }
 
-/// Says of storage textures that are never read that they are not: WGSL, GLSL ES and Metal ask
-/// for less then.
-pub fn write_only_textures(module: &mut Module) {
+/// Says of storage textures that are never read, or never written, that they are not: WGSL, GLSL ES
+/// and Metal ask for less then.
+pub fn accesses_of_textures(module: &mut Module) {
     let textures: Vec<Word> = module
         .types_global_values
         .iter()
@@ -230,20 +230,26 @@ pub fn write_only_textures(module: &mut Module) {
                 && is_storage_image(module, variable).unwrap_or(false)
         })
         .filter_map(|variable| variable.result_id)
-        .filter(|variable| !is_read(module, *variable))
         .collect();
     for texture in textures {
-        let non_readable = Operand::Decoration(Decoration::NonReadable);
-        let there = module.annotations.iter().any(|note| {
-            op(note) == Op::Decorate
-                && id(note, 0) == Some(texture)
-                && note.operands.get(1) == Some(&non_readable)
-        });
-        if !there {
-            let operands = vec![Operand::IdRef(texture), non_readable];
-            module
-                .annotations
-                .push(Instruction::new(Op::Decorate, None, None, operands));
+        for (decoration, by) in [
+            (Decoration::NonReadable, Op::ImageWrite),
+            (Decoration::NonWritable, Op::ImageRead),
+        ] {
+            if uses_otherwise(module, texture, by) {
+                continue;
+            }
+            let decoration = Operand::Decoration(decoration);
+            let there = module.annotations.iter().any(|note| {
+                op(note) == Op::Decorate
+                    && id(note, 0) == Some(texture)
+                    && note.operands.get(1) == Some(&decoration)
+            });
+            if !there {
+                let operands = vec![Operand::IdRef(texture), decoration];
+                let note = Instruction::new(Op::Decorate, None, None, operands);
+                module.annotations.push(note);
+            }
         }
     }
 }
@@ -254,8 +260,9 @@ fn is_storage_image(module: &Module, variable: &Instruction) -> Option<bool> {
     Some(op(image) == Op::TypeImage && literal(image, 5) == Some(2))
 }
 
-/// Whether anything but `OpImageWrite` and queries of the size uses the variable.
-fn is_read(module: &Module, variable: Word) -> bool {
+/// Whether anything but `access` and queries of the size uses the variable. If nothing else does, nor
+/// does `access`, it is written: it has one of the two decorations, not both.
+fn uses_otherwise(module: &Module, variable: Word, access: Op) -> bool {
     let body = || {
         module
             .functions
@@ -271,8 +278,11 @@ fn is_read(module: &Module, variable: Word) -> bool {
             return true;
         }
     }
-    body().any(|instruction| {
-        let harmless = matches!(op(instruction), Op::ImageWrite | Op::ImageQuerySize);
+    let mut accesses = access == Op::ImageWrite;
+    let otherwise = body().any(|instruction| {
+        let harmless = op(instruction) == access || op(instruction) == Op::ImageQuerySize;
+        accesses |= op(instruction) == access
+            && id(instruction, 0).is_some_and(|image| loaded.contains(&image));
         instruction
             .operands
             .iter()
@@ -281,7 +291,8 @@ fn is_read(module: &Module, variable: Word) -> bool {
                 matches!(operand, Operand::IdRef(id) if loaded.contains(id))
                     && !(harmless && place == 0)
             })
-    })
+    });
+    otherwise || !accesses
 }
 
 /// Drops source lines and names; the names are written anew from the kernel's description.

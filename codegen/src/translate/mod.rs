@@ -507,10 +507,11 @@ impl Ir {
             );
         }
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
-        if language == Language::Hlsl && old && self.has_wide(ScalarKind::Float) {
+        let wide = [ScalarKind::Float, ScalarKind::Uint, ScalarKind::Sint];
+        let wide = wide.iter().any(|kind| self.has_wide(*kind));
+        if language == Language::Hlsl && old && wide && self.stores_wide() {
             return Some(format!(
-                "HLSL loads 64-bit floating-point numbers from buffers from shader model 6.2 on, \
-                 not in {}",
+                "HLSL loads 64-bit numbers from buffers from shader model 6.2 on, not in {}",
                 options.shader_model
             ));
         }
@@ -560,6 +561,21 @@ impl Ir {
                 continue;
             };
             match class {
+                ImageClass::Storage { format, access }
+                    if language == Language::Wgsl
+                        && access.contains(StorageAccess::LOAD | StorageAccess::STORE)
+                        && !matches!(
+                            format,
+                            StorageFormat::R32Float
+                                | StorageFormat::R32Uint
+                                | StorageFormat::R32Sint
+                        ) =>
+                {
+                    return Some(format!(
+                        "WGSL reads and writes textures of r32float, r32uint and r32sint, not of \
+                         {format:?}: take a texture to read and one to write"
+                    ));
+                }
                 ImageClass::Storage { .. } if language == Language::Essl300 => {
                     return Some(format!("{language} has no storage textures"));
                 }
@@ -718,6 +734,25 @@ impl Ir {
             .global_variables
             .iter()
             .map(|(_, global)| (global, &self.module.types[global.ty].inner))
+    }
+
+    /// Whether a buffer holds 64-bit numbers.
+    fn stores_wide(&self) -> bool {
+        fn holds(module: &Module, ty: naga::Handle<naga::Type>) -> bool {
+            match &module.types[ty].inner {
+                TypeInner::Scalar(scalar) | TypeInner::Vector { scalar, .. } => scalar.width == 8,
+                TypeInner::Array { base, .. } => holds(module, *base),
+                TypeInner::Struct { members, .. } => {
+                    members.iter().any(|member| holds(module, member.ty))
+                }
+                _ => false,
+            }
+        }
+        let globals = self.module.global_variables.iter();
+        globals
+            .map(|(_, global)| global)
+            .filter(|global| matches!(global.space, AddressSpace::Storage { .. }))
+            .any(|global| holds(&self.module, global.ty))
     }
 
     /// Whether any type, literal or conversion is of a 64-bit scalar.

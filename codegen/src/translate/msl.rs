@@ -102,6 +102,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let source = source
         .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
         .replace(" - 0 - ", " - ");
+    let source = fenced(&source);
     let source = job.open_constants(source)?;
     let source = if job.kernel.rounding == Rounding::Exact {
         exact(&source).ok_or_else(|| Failure {
@@ -154,6 +155,38 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     }))
 }
 
+/// Makes what a thread writes to a texture visible to its own reads, which naga leaves out
+/// (`tests/upstream/naga-msl-fence`).
+fn fenced(source: &str) -> String {
+    const ACCESS: &str = "metal::access::read_write> ";
+    let textures: Vec<&str> = source
+        .split(ACCESS)
+        .skip(1)
+        .filter_map(|rest| {
+            rest.split(|c: char| !c.is_alphanumeric() && c != '_')
+                .next()
+        })
+        .collect();
+    if textures.is_empty() {
+        return source.to_owned();
+    }
+    let mut text = String::new();
+    for line in source.split_inclusive('\n') {
+        text += line;
+        let statement = line.trim_start();
+        let indent = &line[..line.len() - statement.len()];
+        let written = textures.iter().find(|name| {
+            statement
+                .strip_prefix(**name)
+                .is_some_and(|rest| rest.starts_with(".write("))
+        });
+        if let Some(name) = written {
+            text += &format!("{indent}{name}.fence();\n");
+        }
+    }
+    text
+}
+
 /// Forbids contraction and reordering in all that follows the last header. `safe` by itself still
 /// lets a statement's product and sum become one operation.
 fn exact(source: &str) -> Option<String> {
@@ -161,4 +194,20 @@ fn exact(source: &str) -> Option<String> {
     let include = source.rfind("#include ")?;
     let end = include + source[include..].find('\n')? + 1;
     Some([&source[..end], PRAGMAS, &source[end..]].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fenced;
+
+    #[test]
+    fn what_is_written_is_fenced_where_it_is_read_too() {
+        let text = "  metal::texture2d<int, metal::access::read_write> a [[texture(0)]]\n\
+                    , metal::texture2d<int, metal::access::write> b [[texture(1)]]\n\
+                    {\n    a.write(x, y);\n    b.write(x, y);\n}\n";
+        let wanted = text.replace("a.write(x, y);\n", "a.write(x, y);\n    a.fence();\n");
+        assert_eq!(fenced(text), wanted);
+        let plain = text.replace("read_write", "read");
+        assert_eq!(fenced(&plain), plain);
+    }
 }

@@ -448,7 +448,7 @@ impl AddDraw<'_> {
             vertex: named,
             fragment: named_fragment,
         } = self;
-        if shape.size.contains(&0) || shape.format.texel().is_uint() {
+        if shape.size.contains(&0) || shape.format.texel().is_integer() {
             let what = if shape.format == Format::Depth32 {
                 "depth"
             } else {

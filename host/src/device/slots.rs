@@ -5,7 +5,7 @@ use std::fmt;
 
 use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{
-    Kernel, Layout, Output, Role, Scalar, TexelFormat, TextureKind, Type,
+    Channels, Kernel, Layout, Output, Role, Scalar, TexelAccess, TexelFormat, TextureKind, Type,
 };
 
 use super::error::{DeviceError, Result};
@@ -49,12 +49,14 @@ pub enum Use<'a> {
     Varying(u32, &'a Type),
     /// A buffer that is written, one element for each invocation.
     Output(&'a Layout),
-    /// A texture that is written.
+    /// A texture of which any texel is read or written.
     StorageTexture {
         /// Its format.
         format: TexelFormat,
         /// 2 or 3.
         dimensions: u32,
+        /// What is done with its texels.
+        access: TexelAccess,
     },
     /// What a vertex or fragment stage returns; an argument on the native device only.
     Interface(&'a Type),
@@ -85,15 +87,15 @@ impl Use<'_> {
     /// Whether the kernel writes it.
     #[must_use]
     pub const fn is_written(&self) -> bool {
-        matches!(
-            self,
+        match self {
             Self::ElementMut(_)
-                | Self::StorageMut { .. }
-                | Self::Atomic { .. }
-                | Self::Output(_)
-                | Self::StorageTexture { .. }
-                | Self::Interface(_)
-        )
+            | Self::StorageMut { .. }
+            | Self::Atomic { .. }
+            | Self::Output(_)
+            | Self::Interface(_) => true,
+            Self::StorageTexture { access, .. } => access.writes(),
+            _ => false,
+        }
     }
 
     /// Size of an element in bytes, for what lies in a buffer.
@@ -116,7 +118,13 @@ impl Use<'_> {
             Self::Texture(_) => "a texture",
             Self::Sampler { comparison: false } => "a sampler that does not compare",
             Self::Sampler { comparison: true } => "a sampler that compares",
-            Self::StorageTexture { .. } => "a texture to write",
+            Self::StorageTexture { access, .. } => {
+                if access.writes() {
+                    "a texture to write"
+                } else {
+                    "a texture"
+                }
+            }
             Self::Uniform(_)
             | Self::Element(_)
             | Self::Storage(_)
@@ -134,10 +142,7 @@ impl Use<'_> {
 /// Bytes of a scalar.
 #[must_use]
 pub const fn scalar_bytes(scalar: Scalar) -> usize {
-    match scalar {
-        Scalar::F64 => 8,
-        Scalar::F32 | Scalar::U32 | Scalar::I32 => 4,
-    }
+    scalar.bytes()
 }
 
 /// Bytes of a value, tightly packed where it is a vector.
@@ -200,11 +205,13 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                 binding,
                 format,
                 dimensions,
+                access,
             } => (
                 Some(*binding),
                 Use::StorageTexture {
                     format: *format,
                     dimensions: *dimensions,
+                    access: *access,
                 },
             ),
             Role::Sampler {
@@ -240,6 +247,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                 Use::StorageTexture {
                     format: *format,
                     dimensions: *dimensions,
+                    access: TexelAccess::Write,
                 },
             ),
             Output::Position => (None, Use::Interface(&POSITION)),
@@ -416,10 +424,18 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
             Ok(())
         }
         (Use::Texture(kind), Given::Texture { shape, .. }) => check_texture(kind, shape),
-        (Use::StorageTexture { format, dimensions }, Given::Texture { shape, .. }) => {
+        (
+            Use::StorageTexture {
+                format,
+                dimensions,
+                access,
+            },
+            Given::Texture { shape, .. },
+        ) => {
+            let does = if access.writes() { "writes" } else { "reads" };
             if shape.format != Format::Texel(format) {
                 Err(format!(
-                    "its format is {}, but the kernel writes {}",
+                    "its format is {}, but the kernel {does} {}",
                     shape.format.name(),
                     format.name()
                 ))
@@ -432,7 +448,7 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
                 Err("it is multisampled".into())
             } else if shape.levels != 1 || shape.layers != 1 {
                 Err(format!(
-                    "it has {} levels and {} layers, but the kernel writes one",
+                    "it has {} levels and {} layers, but the kernel {does} one",
                     shape.levels, shape.layers
                 ))
             } else {
@@ -473,9 +489,14 @@ fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result
             shape.format.name()
         ));
     }
-    if shape.format.texel().is_uint() {
+    if shape.format.texel().numbers() != kind.channels() {
+        let reads = match kind.channels() {
+            Channels::Float => "floats",
+            Channels::Uint => "unsigned integers",
+            Channels::Sint => "signed integers",
+        };
         return Err(format!(
-            "its format is {}, but the kernel reads floats",
+            "its format is {}, but the kernel reads {reads}",
             shape.format.name()
         ));
     }

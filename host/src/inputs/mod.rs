@@ -15,8 +15,8 @@ use std::fmt;
 
 use fastrand::Rng;
 use hankel_dsl::native::describe::{
-    Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Stage, TexelFormat,
-    TextureKind,
+    Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Stage,
+    TexelFormat, TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
 use hankel_dsl::native::{Address, Compare, Filter, Sampler};
@@ -502,6 +502,9 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
             if kind.is_depth() && *format != TexelFormat::R32Float {
                 return Err(format!("depths are r32float, not {}", format.name()));
             }
+            if format.numbers() != kind.channels() {
+                return Err(format!("its format is {}", format.name()));
+            }
             if kind.is_multisampled() != (*samples > 1) {
                 return Err(format!("it has {samples} samples in each texel"));
             }
@@ -536,10 +539,11 @@ fn about<'a>(kernel: &'a Kernel, name: &str) -> Option<&'a Param> {
 
 /// Whether what it holds before the run matters.
 const fn is_input(role: &Use<'_>) -> bool {
-    !matches!(
-        role,
-        Use::Atomic { .. } | Use::Output(_) | Use::Interface(_) | Use::StorageTexture { .. }
-    )
+    match role {
+        Use::Atomic { .. } | Use::Output(_) | Use::Interface(_) => false,
+        Use::StorageTexture { access, .. } => access.reads(),
+        _ => true,
+    }
 }
 
 /// Whether there is one element of it for each invocation.
@@ -690,8 +694,8 @@ fn decide(
 fn texels_of(kernel: &Kernel, name: &str, kind: TextureKind, otherwise: [u32; 3]) -> [u32; 3] {
     match about(kernel, name).and_then(|p| p.inputs.size) {
         Some(size) => size,
-        None if kind == TextureKind::Texture3d => VOLUME,
-        None if kind == TextureKind::Texture1d => [otherwise[0], 1, 1],
+        None if kind.dimensions() == 3 => VOLUME,
+        None if kind.dimensions() == 1 => [otherwise[0], 1, 1],
         None if kind.is_cube() => [FACE, FACE, 1],
         None => [otherwise[0], otherwise[1], 1],
     }
@@ -725,17 +729,23 @@ fn input(
         }
         Use::Atomic { .. } => zeros(COUNTERS),
         Use::Interface(_) | Use::Output(_) => zeros(extents.elements),
-        Use::StorageTexture { format, dimensions } => {
+        Use::StorageTexture {
+            format,
+            dimensions,
+            access,
+        } => {
             let [width, height, _] = extents.size;
             let shape = if dimensions == 3 {
                 TextureShape::d3(extents.volume, format)
             } else {
                 TextureShape::d2(width, height, format)
             };
-            Input::Texture {
-                shape,
-                bytes: vec![0; shape.bytes()],
-            }
+            let bytes = if access.reads() {
+                values.texels(said, &shape)?
+            } else {
+                vec![0; shape.bytes()]
+            };
+            Input::Texture { shape, bytes }
         }
         Use::Texture(kind) => {
             let size = texels_of(kernel, &slot.name, kind, extents.size);
@@ -760,7 +770,11 @@ fn input(
                 } else if kind.is_multisampled() {
                     Format::Texel(TexelFormat::R32Float)
                 } else {
-                    Format::Texel(TexelFormat::Rgba32Float)
+                    Format::Texel(match kind.channels() {
+                        Channels::Float => TexelFormat::Rgba32Float,
+                        Channels::Uint => TexelFormat::Rgba32Uint,
+                        Channels::Sint => TexelFormat::Rgba32Sint,
+                    })
                 },
             };
             let bytes = values.texels(said, &shape)?;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use fastrand::Rng;
-use hankel_dsl::glam::Vec4;
-use hankel_dsl::native::describe::{Domain, Inputs, Scalar, TexelFormat};
+use hankel_dsl::glam::{UVec4, Vec4};
+use hankel_dsl::native::describe::{Channels, Domain, Inputs, Scalar, TexelFormat};
 
 use super::{Class, InputError};
 use crate::device::{Format, TextureShape};
@@ -83,7 +83,9 @@ impl Values {
         for (leaf, domain) in leaves {
             let (component, of) = leaf.component;
             let number = match (leaf.scalar, domain) {
-                (Scalar::U32 | Scalar::I32, _) => self.integer(leaf.scalar, domain.as_ref()),
+                (Scalar::U32 | Scalar::I32 | Scalar::U64 | Scalar::I64 | Scalar::Bool, _) => {
+                    self.integer(leaf.scalar, domain.as_ref())
+                }
                 (_, Some(Domain::UnitVector)) if self.class != Class::Hostile => {
                     if component == 0 {
                         unit = self.unit_vector(of);
@@ -195,6 +197,10 @@ impl Values {
     fn integer(&mut self, scalar: Scalar, domain: Option<&Domain>) -> Number {
         let (mut a, mut b) = match scalar {
             Scalar::I32 => (i64::from(i32::MIN), i64::from(i32::MAX)),
+            Scalar::I64 => (i64::MIN, i64::MAX),
+            // Those above are made of two below.
+            Scalar::U64 => (0, i64::MAX),
+            Scalar::Bool => (0, 1),
             _ => (0, i64::from(u32::MAX)),
         };
         let value = match domain {
@@ -223,8 +229,36 @@ impl Values {
         // Both fit: `a` and `b` do.
         match scalar {
             Scalar::I32 => Number::I32(value as i32),
+            Scalar::I64 => Number::I64(value),
+            // Without a domain, the upper half as often as the lower.
+            Scalar::U64 if domain.is_none() && self.rng.bool() => Number::U64(!(value as u64)),
+            Scalar::U64 => Number::U64(value as u64),
             _ => Number::U32(value as u32),
         }
+    }
+
+    /// The samples of a texture of integers.
+    fn integer_texels(
+        &mut self,
+        inputs: &Inputs,
+        shape: &TextureShape,
+    ) -> Result<Vec<u8>, InputError> {
+        let format = shape.format.texel();
+        let domain = held(format, self.resolved(inputs.domain.clone())?);
+        let scalar = match format.numbers() {
+            Channels::Sint => Scalar::I32,
+            _ => Scalar::U32,
+        };
+        let mut bytes = vec![0; shape.bytes()];
+        for texel in bytes.chunks_exact_mut(format.bytes()) {
+            let channels = [(); 4].map(|()| match self.integer(scalar, Some(&domain)) {
+                Number::I32(x) => x as u32,
+                Number::U32(x) => x,
+                _ => 0,
+            });
+            format.store_integer(texel, UVec4::from_array(channels));
+        }
+        Ok(bytes)
     }
 
     /// The samples of a texture.
@@ -232,6 +266,9 @@ impl Values {
     /// # Errors
     /// As of [`Values::elements`].
     pub fn texels(&mut self, inputs: &Inputs, shape: &TextureShape) -> Result<Vec<u8>, InputError> {
+        if shape.format.texel().is_integer() {
+            return self.integer_texels(inputs, shape);
+        }
         let depth = shape.format == Format::Depth32;
         let domain = self.resolved(inputs.domain.clone())?.unwrap_or(TEXELS);
         let format: TexelFormat = shape.format.texel();
@@ -247,6 +284,27 @@ impl Values {
             format.store(texel, v);
         }
         Ok(bytes)
+    }
+}
+
+/// Numbers that a format's channels can hold, and that a domain has.
+fn held(format: TexelFormat, domain: Option<Domain>) -> Domain {
+    let bits = 8 * format.channel_bytes() as i32;
+    let (least, most) = match format.numbers() {
+        Channels::Sint => (-(2.0_f64.powi(bits - 1)), 2.0_f64.powi(bits - 1) - 1.0),
+        _ => (0.0, 2.0_f64.powi(bits) - 1.0),
+    };
+    match domain {
+        Some(Domain::Values { values }) => Domain::Values {
+            values: values.iter().map(|v| v.clamp(least, most)).collect(),
+        },
+        Some(Domain::Range { least: a, most: b } | Domain::Magnitude { least: a, most: b }) => {
+            Domain::Range {
+                least: a.clamp(least, most),
+                most: b.clamp(least, most),
+            }
+        }
+        _ => Domain::Range { least, most },
     }
 }
 

@@ -71,6 +71,8 @@ pub enum Kind {
     Unorm16,
     /// A step of an 8-bit normalised channel.
     Unorm8,
+    /// A channel of 8 or 16 bits of this format.
+    Integer(TexelFormat),
 }
 
 impl Kind {
@@ -79,7 +81,16 @@ impl Kind {
     pub const fn of(format: TexelFormat) -> Self {
         match format {
             TexelFormat::R32Float | TexelFormat::Rgba32Float => Self::Scalar(Scalar::F32),
-            TexelFormat::R32Uint | TexelFormat::Rgba32Uint => Self::Scalar(Scalar::U32),
+            TexelFormat::R32Uint | TexelFormat::Rg32Uint | TexelFormat::Rgba32Uint => {
+                Self::Scalar(Scalar::U32)
+            }
+            TexelFormat::R32Sint | TexelFormat::Rg32Sint | TexelFormat::Rgba32Sint => {
+                Self::Scalar(Scalar::I32)
+            }
+            TexelFormat::Rgba16Uint
+            | TexelFormat::Rgba16Sint
+            | TexelFormat::Rgba8Uint
+            | TexelFormat::Rgba8Sint => Self::Integer(format),
             TexelFormat::Rgba16Float => Self::Half,
             TexelFormat::Rgba16Unorm => Self::Unorm16,
             TexelFormat::Rgba8Unorm => Self::Unorm8,
@@ -93,6 +104,7 @@ impl Kind {
             Self::Scalar(s) => crate::device::slots::scalar_bytes(s),
             Self::Half | Self::Unorm16 => 2,
             Self::Unorm8 => 1,
+            Self::Integer(format) => format.channel_bytes(),
         }
     }
 
@@ -107,10 +119,14 @@ impl Kind {
                     (Number::F64(a), Number::F64(b)) => a.total_cmp(&b),
                     (Number::U32(a), Number::U32(b)) => a.cmp(&b),
                     (Number::I32(a), Number::I32(b)) => a.cmp(&b),
+                    (Number::U64(a), Number::U64(b)) => a.cmp(&b),
+                    (Number::I64(a), Number::I64(b)) => a.cmp(&b),
                     _ => Ordering::Equal,
                 }
             }
-            Self::Half | Self::Unorm16 | Self::Unorm8 => a[..self.bytes()].cmp(&b[..self.bytes()]),
+            Self::Half | Self::Unorm16 | Self::Unorm8 | Self::Integer(_) => {
+                a[..self.bytes()].cmp(&b[..self.bytes()])
+            }
         }
     }
 
@@ -130,6 +146,8 @@ impl Kind {
                     (Number::F64(a), Number::F64(b)) => ulp_f64(a, b),
                     (Number::U32(a), Number::U32(b)) => a.abs_diff(b).into(),
                     (Number::I32(a), Number::I32(b)) => a.abs_diff(b).into(),
+                    (Number::U64(a), Number::U64(b)) => a.abs_diff(b),
+                    (Number::I64(a), Number::I64(b)) => a.abs_diff(b),
                     _ => u64::MAX,
                 };
                 Distance::new(ulp, a.to_f64(), b.to_f64())
@@ -160,6 +178,16 @@ impl Kind {
                     f64::from(a) / 65535.0,
                     f64::from(b) / 65535.0,
                 )
+            }
+            Self::Integer(format) => {
+                let read = |bytes: &[u8]| {
+                    let mut texel = [0; 16];
+                    let own = &bytes[..format.channel_bytes()];
+                    texel[..own.len()].copy_from_slice(own);
+                    format.load_integer(&texel).x as i32
+                };
+                let (a, b) = (read(a), read(b));
+                Distance::new(a.abs_diff(b).into(), a.into(), b.into())
             }
             Self::Unorm8 => {
                 let read = |v: &[u8]| v.first().copied().unwrap_or(0);
@@ -271,10 +299,19 @@ mod tests {
         let d =
             Kind::Scalar(Scalar::I32).compare(&(-7i32).to_le_bytes(), &4i32.to_le_bytes(), false);
         assert_eq!((d.ulp, d.absolute), (11, 11.0));
+        // Wide ones differ where floats do not tell them apart.
+        let wide = u64::MAX - 1;
+        let d =
+            Kind::Scalar(Scalar::U64).compare(&u64::MAX.to_le_bytes(), &wide.to_le_bytes(), false);
+        assert_eq!(d.ulp, 1);
         let d = Kind::Unorm16.compare(&65535u16.to_le_bytes(), &65533u16.to_le_bytes(), false);
         assert_eq!((d.ulp, d.a), (2, 1.0));
         let d = Kind::Unorm8.compare(&[0], &[255], false);
         assert_eq!((d.ulp, d.absolute), (255, 1.0));
+        let d = Kind::Integer(TexelFormat::Rgba8Sint).compare(&[0xff], &[2], false);
+        assert_eq!((d.ulp, d.a), (3, -1.0));
+        let d = Kind::Integer(TexelFormat::Rgba16Uint).compare(&[0xff, 0xff], &[0, 0xff], false);
+        assert_eq!((d.ulp, d.a), (255, 65535.0));
         // 1.0 and the next half float.
         let d = Kind::Half.compare(&0x3c00u16.to_le_bytes(), &0x3c01u16.to_le_bytes(), false);
         assert_eq!((d.ulp, d.a, d.absolute), (1, 1.0, 1.0 / 1024.0));

@@ -229,7 +229,10 @@ fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), Execut
         Scalar::F32 => "f32",
         Scalar::U32 => "u32",
         Scalar::I32 => "i32",
-        Scalar::F64 => return Err(bad(kernel, "64-bit values do not pass between stages")),
+        Scalar::F64 | Scalar::U64 | Scalar::I64 => {
+            return Err(bad(kernel, "64-bit values do not pass between stages"));
+        }
+        Scalar::Bool => return Err(bad(kernel, "truth values do not pass between stages")),
     };
     let text = if size == 1 {
         name.to_string()
@@ -347,10 +350,12 @@ fn fragment(
             (Scalar::F32, 4) => TexelFormat::Rgba32Float,
             (Scalar::U32, 1) => TexelFormat::R32Uint,
             (Scalar::U32, 4) => TexelFormat::Rgba32Uint,
+            (Scalar::I32, 1) => TexelFormat::R32Sint,
+            (Scalar::I32, 4) => TexelFormat::Rgba32Sint,
             _ => {
                 return Err(bad(
                     kernel,
-                    "no target format holds its output; return f32, u32, Vec4 or UVec4",
+                    "no target format holds its output; return f32, u32, i32, Vec4, UVec4 or IVec4",
                 ));
             }
         };

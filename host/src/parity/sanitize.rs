@@ -77,11 +77,10 @@ pub fn meets(kernel: &Kernel) -> bool {
             ..
         }
     );
-    let shared = |param: &Param| {
-        matches!(
-            param.role,
-            Role::StorageMut { .. } | Role::Atomic { .. } | Role::StorageTexture { .. }
-        )
+    let shared = |param: &Param| match param.role {
+        Role::StorageMut { .. } | Role::Atomic { .. } => true,
+        Role::StorageTexture { access, .. } => access.writes(),
+        _ => false,
     };
     cooperative || kernel.params.iter().any(shared)
 }

@@ -118,6 +118,7 @@ extern crate std;
 extern crate self as hankel_dsl;
 
 mod atomics;
+mod data;
 pub mod math;
 mod memory;
 #[cfg(not(target_arch = "spirv"))]
@@ -131,6 +132,7 @@ mod unroll;
 mod workgroup;
 
 pub use atomics::{AtomicInteger, Atomics};
+pub use data::{Bool, PackedVec3};
 pub use glam;
 pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
 pub use memory::Buffer;
@@ -143,10 +145,12 @@ pub use stage::{
     fwidth, fwidth_coarse, fwidth_fine,
 };
 pub use storage::{StorageMut, Stored};
-pub use storage_texture::{Format, StorageTexture2d, StorageTexture3d, format};
+pub use storage_texture::{
+    Access, Format, Readable, StorageTexture2d, StorageTexture3d, Writable, access, format,
+};
 pub use texture::{
-    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler, Texel,
-    Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
+    Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,
+    Texel, Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
     TextureCubeArray,
 };
 pub use workgroup::{Shared, SharedAtomics, barrier, storage_barrier};

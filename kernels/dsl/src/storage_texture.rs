@@ -1,18 +1,21 @@
-//! Textures of which any texel may be written.
+//! Textures of which any texel may be read, written, or both.
 
 use core::marker::PhantomData;
 
-use glam::{UVec2, UVec3, UVec4, Vec4};
+use glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec4};
 
 use crate::Texel;
 #[cfg(not(target_arch = "spirv"))]
-use crate::native::{describe::TexelFormat, exec::Texels};
+use crate::native::{
+    describe::{TexelAccess, TexelFormat},
+    exec::{Channels, Texels},
+};
 #[cfg(target_arch = "spirv")]
 use crate::texture::image;
 
 /// Formats of storage textures, as types.
 pub mod format {
-    use super::{Format, UVec4, Vec4};
+    use super::{Format, IVec2, IVec4, UVec2, UVec4, Vec4};
 
     macro_rules! formats {
         ($($(#[doc = $doc:literal])* $name:ident, $texel:ty, $flat:ident, $volume:ident;)*) => { $(
@@ -57,8 +60,68 @@ pub mod format {
         R32Uint, u32, Storage2dR32Uint, Storage3dR32Uint;
         /// Four 32-bit unsigned integers.
         Rgba32Uint, UVec4, Storage2dRgba32Uint, Storage3dRgba32Uint;
+        /// One 32-bit signed integer.
+        R32Sint, i32, Storage2dR32Sint, Storage3dR32Sint;
+        /// Four 32-bit signed integers.
+        Rgba32Sint, IVec4, Storage2dRgba32Sint, Storage3dRgba32Sint;
+        /// Two 32-bit unsigned integers.
+        Rg32Uint, UVec2, Storage2dRg32Uint, Storage3dRg32Uint;
+        /// Two 32-bit signed integers.
+        Rg32Sint, IVec2, Storage2dRg32Sint, Storage3dRg32Sint;
+        /// Four 16-bit unsigned integers. What does not fit must not be written.
+        Rgba16Uint, UVec4, Storage2dRgba16Uint, Storage3dRgba16Uint;
+        /// Four 16-bit signed integers. What does not fit must not be written.
+        Rgba16Sint, IVec4, Storage2dRgba16Sint, Storage3dRgba16Sint;
+        /// Four 8-bit unsigned integers. What does not fit must not be written.
+        Rgba8Uint, UVec4, Storage2dRgba8Uint, Storage3dRgba8Uint;
+        /// Four 8-bit signed integers. What does not fit must not be written.
+        Rgba8Sint, IVec4, Storage2dRgba8Sint, Storage3dRgba8Sint;
     }
 }
+
+/// What a kernel does with a storage texture, as types.
+pub mod access {
+    #[cfg(not(target_arch = "spirv"))]
+    use super::TexelAccess;
+    use super::{Access, Readable, Writable};
+
+    macro_rules! accesses {
+        ($($(#[doc = $doc:literal])* $name:ident: $($can:ident),*;)*) => { $(
+            $(#[doc = $doc])*
+            #[derive(Clone, Copy, Debug)]
+            pub enum $name {}
+
+            impl Access for $name {
+                #[cfg(not(target_arch = "spirv"))]
+                const ACCESS: TexelAccess = TexelAccess::$name;
+            }
+            $(impl $can for $name {})*
+        )* };
+    }
+
+    accesses! {
+        /// Texels are written.
+        Write: Writable;
+        /// Texels are read.
+        Read: Readable;
+        /// Texels are read and written. WGSL has this for [`R32Float`](super::format::R32Float),
+        /// [`R32Uint`](super::format::R32Uint) and [`R32Sint`](super::format::R32Sint).
+        ReadWrite: Readable, Writable;
+    }
+}
+
+/// One of those in [`access`](mod@access).
+pub trait Access: Copy {
+    /// Its description.
+    #[cfg(not(target_arch = "spirv"))]
+    const ACCESS: TexelAccess;
+}
+
+/// An access that reads.
+pub trait Readable: Access {}
+
+/// An access that writes.
+pub trait Writable: Access {}
 
 /// A format of a storage texture: one of those in [`format`](mod@format).
 pub trait Format: Copy {
@@ -85,15 +148,15 @@ macro_rules! textures {
     ($($(#[doc = $doc:literal])* $name:ident, $image:ident, $size:ident, $at:ty, $whole:expr, $sized:expr;)*) => { $(
         $(#[doc = $doc])*
         #[derive(Clone, Copy)]
-        pub struct $name<'a, F: Format>(
+        pub struct $name<'a, F: Format, A: Access = access::Write>(
             #[cfg(target_arch = "spirv")] &'a F::$image,
             #[cfg(not(target_arch = "spirv"))] Texels<'a>,
-            PhantomData<F>,
+            PhantomData<(F, A)>,
         );
 
         #[cfg(target_arch = "spirv")]
         #[allow(missing_docs, reason = "documented on the host's side")]
-        impl<'a, F: Format> $name<'a, F> {
+        impl<'a, F: Format, A: Access> $name<'a, F, A> {
             #[doc(hidden)]
             #[inline(always)]
             pub fn new(image: &'a F::$image) -> Self {
@@ -104,14 +167,25 @@ macro_rules! textures {
                 F::$size(self.0)
             }
             #[inline(always)]
-            pub fn store(self, at: $at, value: F::Value) {
+            pub fn store(self, at: $at, value: F::Value)
+            where
+                A: Writable,
+            {
                 // SAFETY: the caller's contract; exports with bounds checks test it again.
                 unsafe { image::write(self.0, at, Texel::channels(value)) }
+            }
+            #[inline(always)]
+            pub fn load(self, at: $at) -> F::Value
+            where
+                A: Readable,
+            {
+                // SAFETY: the caller's contract; exports with bounds checks test it again.
+                Texel::of(unsafe { image::read(self.0, at) })
             }
         }
 
         #[cfg(not(target_arch = "spirv"))]
-        impl<'a, F: Format> $name<'a, F> {
+        impl<'a, F: Format, A: Access> $name<'a, F, A> {
             #[doc(hidden)]
             #[must_use]
             pub fn new(texels: Texels<'a>) -> Self {
@@ -124,22 +198,40 @@ macro_rules! textures {
                 let sized: fn(UVec3) -> $at = $sized;
                 sized(UVec3::from_array(self.0.size()))
             }
-            /// Writes the texel at `at`, which must lie inside. A shader does not test that, unless
-            /// it was exported with bounds checks; the native device does, and reports the kernel.
-            /// No two invocations write the same texel: which comes last is undefined.
-            #[inline]
             #[track_caller]
-            pub fn store(self, at: $at, value: F::Value)
-            where
-                F::Value: Texel<Channels: crate::native::exec::Channels>,
-            {
+            fn inside(self, at: $at) -> UVec3 {
                 let whole: fn($at) -> UVec3 = $whole;
                 let (at, size) = (whole(at), UVec3::from_array(self.0.size()));
                 assert!(
                     at.cmplt(size).all(),
                     "texel {at} is out of range: the texture has {size}"
                 );
-                self.0.store(at, value);
+                at
+            }
+            /// Writes the texel at `at`, which must lie inside. A shader does not test that, unless
+            /// it was exported with bounds checks; the native device does, and reports the kernel.
+            /// An integer must fit the format: what becomes of one that does not differs.
+            /// No two invocations write the same texel: which comes last is undefined.
+            #[inline]
+            #[track_caller]
+            pub fn store(self, at: $at, value: F::Value)
+            where
+                A: Writable,
+                F::Value: Texel<Channels: Channels>,
+            {
+                self.0.store(self.inside(at), value);
+            }
+            /// The texel at `at`, which must lie inside. An invocation sees what it wrote itself; what
+            /// others of the same run wrote must not be read, as no barrier orders texels.
+            #[inline]
+            #[must_use]
+            #[track_caller]
+            pub fn load(self, at: $at) -> F::Value
+            where
+                A: Readable,
+                F::Value: Texel<Channels: Channels>,
+            {
+                self.0.load(self.inside(at))
             }
         }
     )* };
@@ -147,8 +239,8 @@ macro_rules! textures {
 
 textures! {
     /// A texture of two dimensions of which any texel may be written: `StorageTexture2d<'_,
-    /// Rgba16Float>`.
+    /// Rgba16Float>`; or read, or both: `StorageTexture2d<'_, R32Uint, ReadWrite>`.
     StorageTexture2d, Flat, flat_size, UVec2, |at| at.extend(0), |size| size.truncate();
-    /// A texture of three dimensions of which any texel may be written.
+    /// The same in three dimensions.
     StorageTexture3d, Volume, volume_size, UVec3, |at| at, |size| size;
 }

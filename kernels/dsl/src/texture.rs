@@ -4,7 +4,9 @@
 //! Every texture of a kind is declared once, in [`textures`]; what its methods compute is declared
 //! once for each side: `spirv` and `host`.
 
-use glam::{UVec2, UVec3, Vec2, Vec3, Vec4};
+use core::marker::PhantomData;
+
+use glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
 #[cfg(not(target_arch = "spirv"))]
 use crate::native;
@@ -72,6 +74,12 @@ pub mod image {
     pub type DepthTexture2d = Image!(2D, type=f32, sampled, depth);
     pub type DepthTexture2dArray = Image!(2D, type=f32, sampled, arrayed, depth);
     pub type DepthTextureCube = Image!(cube, type=f32, sampled, depth);
+    pub type UintTexture2d = Image!(2D, type=u32, sampled);
+    pub type UintTexture2dArray = Image!(2D, type=u32, sampled, arrayed);
+    pub type UintTexture3d = Image!(3D, type=u32, sampled);
+    pub type SintTexture2d = Image!(2D, type=i32, sampled);
+    pub type SintTexture2dArray = Image!(2D, type=i32, sampled, arrayed);
+    pub type SintTexture3d = Image!(3D, type=i32, sampled);
 
     // One for each texel format that a kernel can write.
     pub type Storage2dR32Float = Image!(2D, format = r32f, sampled = false);
@@ -81,6 +89,14 @@ pub mod image {
     pub type Storage2dRgba8Unorm = Image!(2D, format = rgba8, sampled = false);
     pub type Storage2dR32Uint = Image!(2D, format = r32ui, sampled = false);
     pub type Storage2dRgba32Uint = Image!(2D, format = rgba32ui, sampled = false);
+    pub type Storage2dR32Sint = Image!(2D, format = r32i, sampled = false);
+    pub type Storage2dRgba32Sint = Image!(2D, format = rgba32i, sampled = false);
+    pub type Storage2dRg32Uint = Image!(2D, format = rg32ui, sampled = false);
+    pub type Storage2dRg32Sint = Image!(2D, format = rg32i, sampled = false);
+    pub type Storage2dRgba16Uint = Image!(2D, format = rgba16ui, sampled = false);
+    pub type Storage2dRgba16Sint = Image!(2D, format = rgba16i, sampled = false);
+    pub type Storage2dRgba8Uint = Image!(2D, format = rgba8ui, sampled = false);
+    pub type Storage2dRgba8Sint = Image!(2D, format = rgba8i, sampled = false);
     pub type Storage3dR32Float = Image!(3D, format = r32f, sampled = false);
     pub type Storage3dRgba32Float = Image!(3D, format = rgba32f, sampled = false);
     pub type Storage3dRgba16Float = Image!(3D, format = rgba16f, sampled = false);
@@ -88,6 +104,34 @@ pub mod image {
     pub type Storage3dRgba8Unorm = Image!(3D, format = rgba8, sampled = false);
     pub type Storage3dR32Uint = Image!(3D, format = r32ui, sampled = false);
     pub type Storage3dRgba32Uint = Image!(3D, format = rgba32ui, sampled = false);
+    pub type Storage3dR32Sint = Image!(3D, format = r32i, sampled = false);
+    pub type Storage3dRgba32Sint = Image!(3D, format = rgba32i, sampled = false);
+    pub type Storage3dRg32Uint = Image!(3D, format = rg32ui, sampled = false);
+    pub type Storage3dRg32Sint = Image!(3D, format = rg32i, sampled = false);
+    pub type Storage3dRgba16Uint = Image!(3D, format = rgba16ui, sampled = false);
+    pub type Storage3dRgba16Sint = Image!(3D, format = rgba16i, sampled = false);
+    pub type Storage3dRgba8Uint = Image!(3D, format = rgba8ui, sampled = false);
+    pub type Storage3dRgba8Sint = Image!(3D, format = rgba8i, sampled = false);
+
+    /// Reads all four channels, whatever the format keeps of them.
+    ///
+    /// # Safety
+    /// `image` is a storage image, `at` a texel of it, `channels` four numbers of its kind.
+    #[inline(always)]
+    pub unsafe fn read<I, C, V: Default>(image: &I, at: C) -> V {
+        let mut channels = V::default();
+        // SAFETY: the caller's.
+        unsafe {
+            asm!(
+                "%image = OpLoad _ {image}",
+                "%at = OpLoad _ {at}",
+                "%channels = OpImageRead typeof*{channels} %image %at",
+                "OpStore {channels} %channels",
+                image = in(reg) image, at = in(reg) &at, channels = in(reg) &mut channels,
+            );
+        }
+        channels
+    }
 }
 /// Declares textures, and makes them of what the macros bind.
 macro_rules! textures {
@@ -119,14 +163,8 @@ macro_rules! textures {
 textures! {
     /// A filterable texture of one dimension; it has one level.
     Texture1d;
-    /// A filterable texture of two dimensions.
-    Texture2d;
-    /// Layers of filterable textures of two dimensions.
-    Texture2dArray;
     /// A texture of two dimensions with several samples in each texel.
     Texture2dMultisampled;
-    /// A filterable texture of three dimensions.
-    Texture3d;
     /// Six filterable textures of two dimensions on the faces of a cube, sampled by a direction.
     TextureCube;
     /// Cubes in an array.
@@ -137,6 +175,94 @@ textures! {
     DepthTexture2dArray;
     /// Such depths on the faces of a cube.
     DepthTextureCube;
+}
+
+/// What the channels of a texture are: `f32`, `u32` or `i32`.
+pub trait Channel: Copy {
+    /// All four channels of a texel.
+    type Texel: Copy;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
+    type Texture2d;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
+    type Texture2dArray;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
+    type Texture3d;
+    #[cfg(not(target_arch = "spirv"))]
+    #[doc(hidden)]
+    fn load(texture: &native::TextureRef<'_>, at: [u32; 3], layer: u32, level: u32) -> Self::Texel;
+}
+
+macro_rules! channels {
+    ($($number:ty: $texel:ty, $flat:ident, $array:ident, $volume:ident, $load:expr;)*) => { $(
+        impl Channel for $number {
+            type Texel = $texel;
+            #[cfg(target_arch = "spirv")]
+            type Texture2d = image::$flat;
+            #[cfg(target_arch = "spirv")]
+            type Texture2dArray = image::$array;
+            #[cfg(target_arch = "spirv")]
+            type Texture3d = image::$volume;
+            #[cfg(not(target_arch = "spirv"))]
+            #[inline]
+            fn load(
+                texture: &native::TextureRef<'_>,
+                at: [u32; 3],
+                layer: u32,
+                level: u32,
+            ) -> $texel {
+                $load(texture, at, layer, level)
+            }
+        }
+    )* };
+}
+
+channels! {
+    f32: Vec4, Texture2d, Texture2dArray, Texture3d,
+        |t, at, layer, level| native::sampling::load(t, at, layer, level, 0);
+    u32: UVec4, UintTexture2d, UintTexture2dArray, UintTexture3d, native::sampling::load_integer;
+    i32: IVec4, SintTexture2d, SintTexture2dArray, SintTexture3d,
+        |t, at, layer, level| native::sampling::load_integer(t, at, layer, level).as_ivec4();
+}
+
+/// Declares textures of any numbers.
+macro_rules! textures_of {
+    ($($(#[doc = $doc:literal])* $name:ident;)*) => { $(
+        $(#[doc = $doc])*
+        #[derive(Clone, Copy)]
+        pub struct $name<'a, T: Channel = f32>(
+            #[cfg(target_arch = "spirv")] &'a T::$name,
+            #[cfg(not(target_arch = "spirv"))] native::TextureRef<'a>,
+            PhantomData<T>,
+        );
+
+        impl<'a, T: Channel> $name<'a, T> {
+            #[cfg(target_arch = "spirv")]
+            #[doc(hidden)]
+            #[inline(always)]
+            pub fn new(image: &'a T::$name) -> Self {
+                Self(image, PhantomData)
+            }
+            #[cfg(not(target_arch = "spirv"))]
+            #[doc(hidden)]
+            #[must_use]
+            pub fn new(texture: native::TextureRef<'a>) -> Self {
+                Self(texture, PhantomData)
+            }
+        }
+    )* };
+}
+
+textures_of! {
+    /// A texture of two dimensions: of floats, which can be filtered, or with a second argument of
+    /// integers: `Texture2d<'_, u32>`.
+    Texture2d;
+    /// Layers of such textures.
+    Texture2dArray;
+    /// A texture of three dimensions, of floats or integers.
+    Texture3d;
 }
 
 /// How a texture is filtered between texels, between levels, and beyond the edge.
@@ -184,8 +310,8 @@ mod spirv {
     /// `$size` is the type of a size, `$place` makes a coordinate for floats of what a method takes,
     /// `$texel` one for whole numbers.
     macro_rules! sizes {
-        ($($name:ident: $size:ty, $query:ty, $take:expr;)*) => { $(
-            impl $name<'_> {
+        ($($name:ty: $size:ty, $query:ty, $take:expr;)*) => { $(
+            impl $name {
                 #[inline(always)]
                 pub fn size(self) -> $size {
                     self.level_size(0)
@@ -203,37 +329,49 @@ mod spirv {
         )* };
     }
     sizes! {
-        Texture2d: UVec2, UVec2, |size| size;
-        Texture2dArray: UVec2, UVec3, UVec3::truncate;
-        Texture3d: UVec3, UVec3, |size| size;
-        TextureCube: UVec2, UVec2, |size| size;
-        TextureCubeArray: UVec2, UVec3, UVec3::truncate;
-        DepthTexture2d: UVec2, UVec2, |size| size;
-        DepthTexture2dArray: UVec2, UVec3, UVec3::truncate;
-        DepthTextureCube: UVec2, UVec2, |size| size;
+        Texture2d<'_>: UVec2, UVec2, |size| size;
+        Texture2d<'_, u32>: UVec2, UVec2, |size| size;
+        Texture2d<'_, i32>: UVec2, UVec2, |size| size;
+        Texture2dArray<'_>: UVec2, UVec3, UVec3::truncate;
+        Texture2dArray<'_, u32>: UVec2, UVec3, UVec3::truncate;
+        Texture2dArray<'_, i32>: UVec2, UVec3, UVec3::truncate;
+        Texture3d<'_>: UVec3, UVec3, |size| size;
+        Texture3d<'_, u32>: UVec3, UVec3, |size| size;
+        Texture3d<'_, i32>: UVec3, UVec3, |size| size;
+        TextureCube<'_>: UVec2, UVec2, |size| size;
+        TextureCubeArray<'_>: UVec2, UVec3, UVec3::truncate;
+        DepthTexture2d<'_>: UVec2, UVec2, |size| size;
+        DepthTexture2dArray<'_>: UVec2, UVec3, UVec3::truncate;
+        DepthTextureCube<'_>: UVec2, UVec2, |size| size;
     }
 
     macro_rules! loads {
-        ($($name:ident: $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $take:expr;)*) => { $(
-            impl $name<'_> {
+        ($($name:ty: $texel:ty => $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $take:expr;)*) => { $(
+            impl $name {
                 #[inline(always)]
                 pub fn load(self, $($arg: $ty),*) -> $value {
                     self.load_level($($arg,)* 0)
                 }
                 #[inline(always)]
                 pub fn load_level(self, $($arg: $ty,)* level: u32) -> $value {
-                    let texel: Vec4 = self.0.fetch_with_lod($at, level);
+                    let texel: $texel = self.0.fetch_with_lod($at, level);
                     $take(texel)
                 }
             }
         )* };
     }
     loads! {
-        Texture2d: Vec4, (at: UVec2), at, |texel| texel;
-        Texture2dArray: Vec4, (at: UVec2, layer: u32), at.extend(layer), |texel| texel;
-        Texture3d: Vec4, (at: UVec3), at, |texel| texel;
-        DepthTexture2d: f32, (at: UVec2), at, |texel: Vec4| texel.x;
-        DepthTexture2dArray: f32, (at: UVec2, layer: u32), at.extend(layer), |texel: Vec4| texel.x;
+        Texture2d<'_>: Vec4 => Vec4, (at: UVec2), at, |texel| texel;
+        Texture2d<'_, u32>: UVec4 => UVec4, (at: UVec2), at, |texel| texel;
+        Texture2d<'_, i32>: IVec4 => IVec4, (at: UVec2), at, |texel| texel;
+        Texture2dArray<'_>: Vec4 => Vec4, (at: UVec2, layer: u32), at.extend(layer), |texel| texel;
+        Texture2dArray<'_, u32>: UVec4 => UVec4, (at: UVec2, layer: u32), at.extend(layer), |texel| texel;
+        Texture2dArray<'_, i32>: IVec4 => IVec4, (at: UVec2, layer: u32), at.extend(layer), |texel| texel;
+        Texture3d<'_>: Vec4 => Vec4, (at: UVec3), at, |texel| texel;
+        Texture3d<'_, u32>: UVec4 => UVec4, (at: UVec3), at, |texel| texel;
+        Texture3d<'_, i32>: IVec4 => IVec4, (at: UVec3), at, |texel| texel;
+        DepthTexture2d<'_>: Vec4 => f32, (at: UVec2), at, |texel: Vec4| texel.x;
+        DepthTexture2dArray<'_>: Vec4 => f32, (at: UVec2, layer: u32), at.extend(layer), |texel: Vec4| texel.x;
     }
 
     macro_rules! samples {
@@ -285,6 +423,8 @@ mod spirv {
     gathers! {
         Texture2d: (uv: Vec2), uv;
         Texture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+        TextureCube: (direction: Vec3), direction;
+        TextureCubeArray: (direction: Vec3, cube: u32), direction.extend(cube as f32);
     }
 
     macro_rules! comparisons {
@@ -337,6 +477,7 @@ mod spirv {
     compared_gathers! {
         DepthTexture2d: (uv: Vec2), uv;
         DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+        DepthTextureCube: (direction: Vec3), direction;
     }
 
     impl Texture1d<'_> {
@@ -360,6 +501,10 @@ mod spirv {
             self.0.query_size()
         }
         #[inline(always)]
+        pub fn samples(self) -> u32 {
+            self.0.query_samples()
+        }
+        #[inline(always)]
         pub fn load(self, at: UVec2, sample: u32) -> Vec4 {
             self.0
                 .fetch_with(at, sample_with::sample_index(sample as i32))
@@ -370,12 +515,12 @@ mod spirv {
 #[cfg(not(target_arch = "spirv"))]
 mod host {
     use super::{
-        ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,
+        Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,
         Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
         TextureCubeArray, UVec2, UVec3, Vec2, Vec3, Vec4,
     };
     use crate::native::sampling::{self, Place};
-    use crate::native::{fragment, level_size};
+    use crate::native::{TextureRef, fragment, level_size};
     use core::panic::Location;
 
     const fn flat(uv: Vec2, layer: u32) -> Place {
@@ -410,18 +555,14 @@ mod host {
     }
 
     /// The level of detail of a fragment, from its neighbours.
-    fn detail(
-        texture: &crate::native::TextureRef<'_>,
-        place: Place,
-        at: &'static Location<'static>,
-    ) -> f32 {
+    fn detail(texture: &TextureRef<'_>, place: Place, at: &'static Location<'static>) -> f32 {
         let (dx, dy) = fragment::gradients(coordinates(place), at);
         sampling::detail(texture, place, dx, dy)
     }
 
     macro_rules! sizes {
-        ($($name:ident: $size:ty, $take:expr;)*) => { $(
-            impl $name<'_> {
+        ($(($($of:tt)*) $name:ty: $size:ty, $take:expr;)*) => { $(
+            impl $($of)* $name {
                 /// Texels of level 0 along each axis; of an array, those of a layer.
                 #[inline]
                 #[must_use]
@@ -445,19 +586,19 @@ mod host {
         )* };
     }
     sizes! {
-        Texture2d: UVec2, UVec3::truncate;
-        Texture2dArray: UVec2, UVec3::truncate;
-        Texture3d: UVec3, |size| size;
-        TextureCube: UVec2, UVec3::truncate;
-        TextureCubeArray: UVec2, UVec3::truncate;
-        DepthTexture2d: UVec2, UVec3::truncate;
-        DepthTexture2dArray: UVec2, UVec3::truncate;
-        DepthTextureCube: UVec2, UVec3::truncate;
+        (<T: Channel>) Texture2d<'_, T>: UVec2, UVec3::truncate;
+        (<T: Channel>) Texture2dArray<'_, T>: UVec2, UVec3::truncate;
+        (<T: Channel>) Texture3d<'_, T>: UVec3, |size| size;
+        () TextureCube<'_>: UVec2, UVec3::truncate;
+        () TextureCubeArray<'_>: UVec2, UVec3::truncate;
+        () DepthTexture2d<'_>: UVec2, UVec3::truncate;
+        () DepthTexture2dArray<'_>: UVec2, UVec3::truncate;
+        () DepthTextureCube<'_>: UVec2, UVec3::truncate;
     }
 
     macro_rules! loads {
-        ($($name:ident: $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $layer:expr, $take:expr;)*) => { $(
-            impl $name<'_> {
+        ($(($($of:tt)*) $name:ty: $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $layer:expr, $take:expr;)*) => { $(
+            impl $($of)* $name {
                 /// The texel at `at`, which must lie inside. (Natively the nearest one is read
                 /// otherwise; on a GPU it is the bounds-check policy's choice.)
                 #[inline]
@@ -469,17 +610,22 @@ mod host {
                 #[inline]
                 #[must_use]
                 pub fn load_level(self, $($arg: $ty,)* level: u32) -> $value {
-                    $take(sampling::load(&self.0, $at, $layer, level, 0))
+                    $take(&self.0, $at, $layer, level)
                 }
             }
         )* };
     }
     loads! {
-        Texture2d: Vec4, (at: UVec2), [at.x, at.y, 0], 0, |texel| texel;
-        Texture2dArray: Vec4, (at: UVec2, layer: u32), [at.x, at.y, 0], layer, |texel| texel;
-        Texture3d: Vec4, (at: UVec3), at.to_array(), 0, |texel| texel;
-        DepthTexture2d: f32, (at: UVec2), [at.x, at.y, 0], 0, |texel: Vec4| texel.x;
-        DepthTexture2dArray: f32, (at: UVec2, layer: u32), [at.x, at.y, 0], layer, |texel: Vec4| texel.x;
+        (<T: Channel>) Texture2d<'_, T>: T::Texel, (at: UVec2), [at.x, at.y, 0], 0, T::load;
+        (<T: Channel>) Texture2dArray<'_, T>: T::Texel, (at: UVec2, layer: u32), [at.x, at.y, 0], layer, T::load;
+        (<T: Channel>) Texture3d<'_, T>: T::Texel, (at: UVec3), at.to_array(), 0, T::load;
+        () DepthTexture2d<'_>: f32, (at: UVec2), [at.x, at.y, 0], 0, depth;
+        () DepthTexture2dArray<'_>: f32, (at: UVec2, layer: u32), [at.x, at.y, 0], layer, depth;
+    }
+
+    /// The depth in a texel.
+    fn depth(texture: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32) -> f32 {
+        sampling::load(texture, at, layer, level, 0).x
     }
 
     macro_rules! samples {
@@ -544,7 +690,7 @@ mod host {
             impl $name<'_> {
                 /// Channel `CHANNEL` (0 to 3) of the four texels of level 0 that a linear filter
                 /// reads: lower left, lower right, upper right, upper left, where the first row is
-                /// the upper one. Which four they are is rounded to 8 bits on hardware: stay away
+                /// the upper one; of a cube, on the face that the direction hits. Which four they are is rounded to 8 bits on hardware: stay away
                 /// from the middle of texels.
                 #[inline]
                 #[must_use]
@@ -558,6 +704,8 @@ mod host {
     gathers! {
         Texture2d: (uv: Vec2), flat(uv, 0);
         Texture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
+        TextureCube: (direction: Vec3), cube(direction, 0);
+        TextureCubeArray: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
     }
 
     macro_rules! comparisons {
@@ -620,6 +768,7 @@ mod host {
     compared_gathers! {
         DepthTexture2d: (uv: Vec2), flat(uv, 0);
         DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
+        DepthTextureCube: (direction: Vec3), cube(direction, 0);
     }
 
     impl Texture1d<'_> {
@@ -658,6 +807,12 @@ mod host {
         pub fn size(self) -> UVec2 {
             UVec3::from_array(self.0.size).truncate()
         }
+        /// Samples of a texel.
+        #[inline]
+        #[must_use]
+        pub fn samples(self) -> u32 {
+            self.0.samples
+        }
         /// One sample of the texel at `at`; both must exist.
         #[inline]
         #[must_use]
@@ -669,40 +824,38 @@ mod host {
 
 /// A value that a storage texture can hold in one texel.
 pub trait Texel: Copy {
-    /// All four channels; those that the value lacks are 0, alpha 1.
-    type Channels;
-    /// To all four channels.
+    /// All four channels.
+    type Channels: Default;
+    /// To all four channels; those that the value lacks are 0, alpha 1.
     fn channels(self) -> Self::Channels;
+    /// The value of these channels.
+    fn of(channels: Self::Channels) -> Self;
 }
 
-impl Texel for f32 {
-    type Channels = Vec4;
-    #[inline(always)]
-    fn channels(self) -> Vec4 {
-        Vec4::new(self, 0.0, 0.0, 1.0)
-    }
+macro_rules! texels {
+    ($($value:ty, $channels:ty: |$it:ident| $all:expr, |$them:ident| $first:expr;)*) => { $(
+        impl Texel for $value {
+            type Channels = $channels;
+            #[inline(always)]
+            fn channels(self) -> $channels {
+                let $it = self;
+                $all
+            }
+            #[inline(always)]
+            fn of($them: $channels) -> Self {
+                $first
+            }
+        }
+    )* };
 }
 
-impl Texel for Vec4 {
-    type Channels = Vec4;
-    #[inline(always)]
-    fn channels(self) -> Vec4 {
-        self
-    }
-}
-
-impl Texel for u32 {
-    type Channels = glam::UVec4;
-    #[inline(always)]
-    fn channels(self) -> glam::UVec4 {
-        glam::UVec4::new(self, 0, 0, 1)
-    }
-}
-
-impl Texel for glam::UVec4 {
-    type Channels = Self;
-    #[inline(always)]
-    fn channels(self) -> Self {
-        self
-    }
+texels! {
+    f32, Vec4: |x| Vec4::new(x, 0.0, 0.0, 1.0), |v| v.x;
+    Vec4, Vec4: |v| v, |v| v;
+    u32, UVec4: |x| UVec4::new(x, 0, 0, 1), |v| v.x;
+    UVec2, UVec4: |v| UVec4::new(v.x, v.y, 0, 1), |v| UVec2::new(v.x, v.y);
+    UVec4, UVec4: |v| v, |v| v;
+    i32, IVec4: |x| IVec4::new(x, 0, 0, 1), |v| v.x;
+    IVec2, IVec4: |v| IVec4::new(v.x, v.y, 0, 1), |v| IVec2::new(v.x, v.y);
+    IVec4, IVec4: |v| v, |v| v;
 }

@@ -1,6 +1,7 @@
 //! The sanitizer: a planted fault of each kind is found, with the lines and the invocations, and
 //! what is right is left alone.
 
+use hankel_dsl::access::ReadWrite;
 use hankel_dsl::format::R32Uint;
 use hankel_dsl::glam::UVec2;
 use hankel_dsl::native::sanitize::Order;
@@ -108,6 +109,18 @@ fn texel(#[index] i: u32, #[texture] marks: StorageTexture2d<'_, R32Uint>) {
     marks.store(UVec2::new(i / 2, 1), i);
 }
 
+/// Turns its own texel and reads its neighbour's, which the barrier does not order.
+#[kernel(compute, threads(8), range(8))]
+fn next_texel(#[index] i: u32, #[texture] marks: StorageTexture2d<'_, R32Uint, ReadWrite>) {
+    let own = UVec2::new(i, 0);
+    marks.store(own, !marks.load(own));
+    storage_barrier();
+    let next = marks.load(UVec2::new((i + 1) & 7, 0));
+    if next == 3 {
+        marks.store(own, next);
+    }
+}
+
 /// Writes beyond the end.
 #[kernel(compute, threads(8), range(8))]
 fn beyond(#[index] i: u32, #[storage] all: StorageMut<'_, u32>) {
@@ -127,6 +140,7 @@ hankel_dsl::kernels![
     unwritten,
     not_yet,
     texel,
+    next_texel,
     beyond
 ];
 
@@ -257,6 +271,30 @@ fn a_texel_has_one_writer() {
     });
     let message = result.unwrap_err().to_string();
     assert!(message.contains("element 4 of `marks`"), "{message}");
+}
+
+#[test]
+fn no_barrier_orders_texels() {
+    let entry = entries()
+        .into_iter()
+        .find(|e| e.kernel.name == "next_texel");
+    let mut bytes = [0_u32; 8];
+    let result = (entry.unwrap().run)(&mut Call {
+        args: vec![Arg::TextureMut(TextureMut {
+            size: [8, 1, 1],
+            format: hankel_dsl::native::describe::TexelFormat::R32Uint,
+            bytes: bytemuck::cast_slice_mut(&mut bytes),
+        })],
+        constants: vec![],
+        mode: Mode::sanitized(Order::Ascending),
+    });
+    let message = result.unwrap_err().to_string();
+    let place = line("let next = marks.load(UVec2::new((i + 1) & 7, 0));");
+    assert!(message.contains("no barrier orders texels"), "{message}");
+    assert!(
+        message.contains(&format!("sanitize.rs:{place}:")),
+        "{message}"
+    );
 }
 
 #[test]

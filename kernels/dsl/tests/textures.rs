@@ -1,13 +1,14 @@
 //! Textures that are written anywhere, and texels that are gathered, natively.
 #![allow(missing_docs)]
 
-use hankel_dsl::format::R32Uint;
-use hankel_dsl::glam::{UVec2, Vec2, Vec4};
+use hankel_dsl::access::Read;
+use hankel_dsl::format::{R32Uint, Rgba8Sint};
+use hankel_dsl::glam::{IVec4, UVec2, Vec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::{
     Address, Arg, Call, CallError, Entry, Filter, Mode, TextureMut, TextureRef,
 };
-use hankel_dsl::{Sampler, StorageTexture2d, Texture2d, kernel};
+use hankel_dsl::{Sampler, StorageMut, StorageTexture2d, Texture2d, kernel};
 
 /// Writes one texel, to where the uniform says.
 #[kernel(compute, threads(1), range(1))]
@@ -29,7 +30,27 @@ fn around(
     source.gather::<0>(sampler, at)
 }
 
-hankel_dsl::kernels![mark, around];
+/// The last texel of a level of integers, and a storage texture's texel that is only read.
+#[kernel(compute, threads(1), range(1))]
+fn integers(
+    #[texture] counts: Texture2d<'_, u32>,
+    #[texture] shorts: StorageTexture2d<'_, Rgba8Sint, Read>,
+    #[storage] out: StorageMut<'_, i32>,
+) {
+    out.set(
+        0,
+        counts.load_level(counts.level_size(1) - UVec2::ONE, 1).w as i32,
+    );
+    out.set(1, shorts.load(UVec2::new(1, 0)).y);
+}
+
+/// Writes a number to a channel of 8 bits.
+#[kernel(compute, threads(1))]
+fn short(#[element] x: i32, #[texture] shorts: StorageTexture2d<'_, Rgba8Sint>) {
+    shorts.store(UVec2::ZERO, IVec4::new(0, 0, 0, x));
+}
+
+hankel_dsl::kernels![mark, around, integers, short];
 
 fn run(name: &str, args: Vec<Arg<'_>>) -> Result<(), CallError> {
     let all: Vec<Entry> = entries();
@@ -70,6 +91,64 @@ fn a_texel_outside_is_reported() {
     // It is in memory, as the first texel of the next row.
     let message = marked(UVec2::new(3, 0)).unwrap_err().to_string();
     assert!(message.contains("[3, 0, 0] is out of range"), "{message}");
+}
+
+/// A texture in memory.
+fn texels(size: [u32; 3], levels: u32, format: TexelFormat, bytes: &[u8]) -> Arg<'_> {
+    Arg::Texture(TextureRef {
+        size,
+        levels,
+        layers: 1,
+        samples: 1,
+        format,
+        bytes,
+    })
+}
+
+#[test]
+fn integers_are_read_as_they_are_and_only_as_such() {
+    // 2 x 1 texels, then one.
+    let counts: Vec<u32> = (0..12).map(|i| u32::MAX - i).collect();
+    let shorts = [1_i8, 2, 3, 4, 5, -128, 7, 8];
+    let call = |format: TexelFormat| {
+        let mut out = [0_i32; 2];
+        let args = vec![
+            texels([2, 1, 1], 2, format, bytemuck::cast_slice(&counts)),
+            texels(
+                [2, 1, 1],
+                1,
+                TexelFormat::Rgba8Sint,
+                bytemuck::cast_slice(&shorts),
+            ),
+            Arg::BytesMut(bytemuck::cast_slice_mut(&mut out)),
+        ];
+        run("integers", args).map(|()| out)
+    };
+    assert_eq!(call(TexelFormat::Rgba32Uint), Ok([-12, -128]));
+    let message = call(TexelFormat::Rgba32Float).unwrap_err().to_string();
+    assert!(message.contains("reads uint channels"), "{message}");
+}
+
+#[test]
+fn what_a_format_does_not_hold_is_reported() {
+    let short = |x: i32| {
+        let mut texel = [0_i8; 4];
+        let args = vec![
+            Arg::Bytes(bytemuck::bytes_of(&x)),
+            Arg::TextureMut(TextureMut {
+                size: [1, 1, 1],
+                format: TexelFormat::Rgba8Sint,
+                bytes: bytemuck::cast_slice_mut(&mut texel),
+            }),
+        ];
+        run("short", args).map(|()| texel[3])
+    };
+    assert_eq!(short(-128), Ok(-128));
+    let message = short(128).unwrap_err().to_string();
+    assert!(
+        message.contains("does not hold [0, 0, 0, 128]"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -81,7 +81,11 @@ impl Kernel {
             match self.output_format(i, variant) {
                 Some(format) => {
                     let format = format_ident!("{}", format.variant);
-                    quote!(let #ident = args.texels(#text, describe::TexelFormat::#format)?;)
+                    quote!(let #ident = args.texels(
+                        #text,
+                        describe::TexelFormat::#format,
+                        describe::TexelAccess::Write,
+                    )?;)
                 }
                 None => {
                     let ty = self.concrete(&self.outputs[i], variant);

@@ -5,7 +5,7 @@ use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 
 use crate::general::{Form, own};
-use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant, texture_type};
 use crate::shader::{output_name, sampler_type, storage_texture_type};
 use crate::stage::{Passed, Returned};
 use crate::twin;
@@ -198,11 +198,19 @@ impl Kernel {
                     Role::Texture(kind) => {
                         quote!(Texture { binding: #b, texture: describe::TextureKind::#kind })
                     }
-                    Role::StorageTexture { dimensions, format } => quote!(StorageTexture {
-                        binding: #b,
-                        format: <#format as ::hankel_dsl::Format>::FORMAT,
-                        dimensions: #dimensions,
-                    }),
+                    Role::StorageTexture {
+                        dimensions,
+                        format,
+                        access,
+                    } => {
+                        let access = access_type(access.as_ref());
+                        quote!(StorageTexture {
+                            binding: #b,
+                            format: <#format as ::hankel_dsl::Format>::FORMAT,
+                            dimensions: #dimensions,
+                            access: <#access as ::hankel_dsl::Access>::ACCESS,
+                        })
+                    }
                     Role::Sampler { comparison } => {
                         quote!(Sampler { binding: #b, comparison: #comparison })
                     }
@@ -316,11 +324,20 @@ impl Kernel {
                 Role::Texture(kind) => {
                     quote!(let #name = args.texture(#text, describe::TextureKind::#kind)?;)
                 }
-                Role::StorageTexture { dimensions, format } => {
+                Role::StorageTexture {
+                    dimensions,
+                    format,
+                    access,
+                } => {
                     let ty = storage_texture_type(*dimensions);
+                    let access = access_type(access.as_ref());
                     quote! {
-                        let #name = #ty::<#format>::new(
-                            args.texels(#text, <#format as ::hankel_dsl::Format>::FORMAT)?,
+                        let #name = #ty::<#format, #access>::new(
+                            args.texels(
+                                #text,
+                                <#format as ::hankel_dsl::Format>::FORMAT,
+                                <#access as ::hankel_dsl::Access>::ACCESS,
+                            )?,
                         );
                     }
                 }
@@ -368,7 +385,10 @@ impl Kernel {
                 Role::StorageMut { .. } | Role::StorageTexture { .. } | Role::Atomic { .. } => {
                     quote!(#name)
                 }
-                Role::Texture(kind) => quote!(::hankel_dsl::#kind::new(#name)),
+                Role::Texture(kind) => {
+                    let ty = texture_type(kind);
+                    quote!(#ty::new(#name))
+                }
                 Role::Sampler { comparison } => {
                     let ty = sampler_type(*comparison);
                     quote!(#ty::new(#name))
@@ -586,4 +606,9 @@ impl Kernel {
             #map
         }
     }
+}
+
+/// What is done with a storage texture: writing, if nothing is said.
+fn access_type(said: Option<&syn::Type>) -> TokenStream {
+    said.map_or_else(|| quote!(::hankel_dsl::access::Write), |said| quote!(#said))
 }

@@ -95,35 +95,23 @@ pub struct Format {
     pub variant: &'static str,
 }
 
-const FORMATS: [Format; 7] = [
-    Format {
-        name: "r32float",
-        variant: "R32Float",
-    },
-    Format {
-        name: "rgba32float",
-        variant: "Rgba32Float",
-    },
-    Format {
-        name: "rgba16float",
-        variant: "Rgba16Float",
-    },
-    Format {
-        name: "rgba16unorm",
-        variant: "Rgba16Unorm",
-    },
-    Format {
-        name: "rgba8unorm",
-        variant: "Rgba8Unorm",
-    },
-    Format {
-        name: "r32uint",
-        variant: "R32Uint",
-    },
-    Format {
-        name: "rgba32uint",
-        variant: "Rgba32Uint",
-    },
+/// The variants of `TexelFormat`; a format's name is the same in lower case.
+const FORMATS: [(&str, &str); 15] = [
+    ("r32float", "R32Float"),
+    ("rgba32float", "Rgba32Float"),
+    ("rgba16float", "Rgba16Float"),
+    ("rgba16unorm", "Rgba16Unorm"),
+    ("rgba8unorm", "Rgba8Unorm"),
+    ("r32uint", "R32Uint"),
+    ("rgba32uint", "Rgba32Uint"),
+    ("r32sint", "R32Sint"),
+    ("rgba32sint", "Rgba32Sint"),
+    ("rg32uint", "Rg32Uint"),
+    ("rg32sint", "Rg32Sint"),
+    ("rgba16uint", "Rgba16Uint"),
+    ("rgba16sint", "Rgba16Sint"),
+    ("rgba8uint", "Rgba8Uint"),
+    ("rgba8sint", "Rgba8Sint"),
 ];
 
 #[derive(Clone)]
@@ -181,11 +169,13 @@ pub enum Role {
         scalar: Type,
         unordered: bool,
     },
-    /// The type's name, which is also that of its kind and of its image.
+    /// The name of its kind and of its image.
     Texture(Ident),
     StorageTexture {
         dimensions: u32,
         format: Type,
+        /// None if it says nothing.
+        access: Option<Type>,
     },
     Sampler {
         comparison: bool,
@@ -266,7 +256,60 @@ const TEXTURES: [&str; 10] = [
     "DepthTextureCube",
 ];
 
+/// Those that may hold integers, `Texture2d<'_, u32>`.
+const TEXTURES_OF: [&str; 3] = ["Texture2d", "Texture2dArray", "Texture3d"];
+
+/// The kind of a texture: its type's name, which begins with what its integers are.
+fn texture_kind(ty: &Type) -> Option<Ident> {
+    let name = &last_segment(ty)?.ident;
+    let of_integers = TEXTURES_OF.iter().any(|it| name == it);
+    let number = argument(ty, &name.to_string());
+    let number = number
+        .as_ref()
+        .map(last_segment)
+        .map(|it| it.map(|it| it.ident.to_string()));
+    let before = match number {
+        None => "",
+        Some(Some(number)) if of_integers => match number.as_str() {
+            "f32" => "",
+            "u32" => "Uint",
+            "i32" => "Sint",
+            _ => return None,
+        },
+        _ => return None,
+    };
+    let known = TEXTURES.iter().any(|it| name == it);
+    known.then(|| format_ident!("{before}{name}"))
+}
+
+/// The DSL's type of a texture of a kind.
+pub fn texture_type(kind: &Ident) -> TokenStream {
+    let name = kind.to_string();
+    for (before, number) in [("Uint", "u32"), ("Sint", "i32")] {
+        if let Some(name) = name.strip_prefix(before) {
+            let (name, number) = (format_ident!("{name}"), format_ident!("{number}"));
+            return quote!(::hankel_dsl::#name::<#number>);
+        }
+    }
+    if TEXTURES_OF.contains(&name.as_str()) {
+        return quote!(::hankel_dsl::#kind::<f32>);
+    }
+    quote!(::hankel_dsl::#kind)
+}
+
 impl Role {
+    /// Whether the kernel writes it: not a storage texture that says `Read`.
+    pub fn is_written(&self) -> bool {
+        match self {
+            Self::Atomic { .. } | Self::ElementMut(_) | Self::StorageMut { .. } => true,
+            Self::StorageTexture { access, .. } => {
+                let access = access.as_ref().and_then(last_segment);
+                access.is_none_or(|it| it.ident != "Read")
+            }
+            _ => false,
+        }
+    }
+
     /// What its numbers are, for attributes about them.
     fn holder(&self) -> Holder {
         match self {
@@ -277,7 +320,7 @@ impl Role {
             Self::Texture(kind) => Holder::Texture {
                 dimensions: match kind.to_string().as_str() {
                     "Texture1d" => 1,
-                    "Texture3d" => 3,
+                    "Texture3d" | "UintTexture3d" | "SintTexture3d" => 3,
                     _ => 2,
                 },
                 levels: kind != "Texture1d" && kind != "Texture2dMultisampled",
@@ -520,15 +563,7 @@ impl Kernel {
             );
         }
         if compute.is_some() && self.outputs.is_empty() {
-            let writes = self.params.iter().any(|p| {
-                matches!(
-                    p.role,
-                    Role::Atomic { .. }
-                        | Role::ElementMut(_)
-                        | Role::StorageMut { .. }
-                        | Role::StorageTexture { .. }
-                )
-            });
+            let writes = self.params.iter().any(|p| p.role.is_written());
             if !writes {
                 return error(
                     span,
@@ -732,17 +767,15 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 unordered: unordered(&role)?,
             }
         }
-        "texture" if argument(ty, "StorageTexture2d").is_some() => Role::StorageTexture {
-            dimensions: 2,
-            format: argument(ty, "StorageTexture2d").unwrap_or_else(|| ty.clone()),
-        },
-        "texture" if argument(ty, "StorageTexture3d").is_some() => Role::StorageTexture {
-            dimensions: 3,
-            format: argument(ty, "StorageTexture3d").unwrap_or_else(|| ty.clone()),
-        },
+        "texture" if argument(ty, "StorageTexture2d").is_some() => {
+            storage_texture(ty, "StorageTexture2d", 2)
+        }
+        "texture" if argument(ty, "StorageTexture3d").is_some() => {
+            storage_texture(ty, "StorageTexture3d", 3)
+        }
         "texture" => match last_segment(ty) {
-            Some(it) if TEXTURES.iter().any(|name| it.ident == name) => {
-                Role::Texture(it.ident.clone())
+            Some(_) if texture_kind(ty).is_some() => {
+                Role::Texture(texture_kind(ty).unwrap_or_else(|| name.clone()))
             }
             _ => {
                 let names: Vec<_> = TEXTURES
@@ -823,14 +856,30 @@ pub fn last_segment(ty: &Type) -> Option<&syn::PathSegment> {
 
 /// `T` of `NAME<'_, T>`.
 pub fn argument(ty: &Type, name: &str) -> Option<Type> {
-    let segment = last_segment(ty).filter(|s| s.ident == name)?;
-    let syn::PathArguments::AngleBracketed(args) = &segment.arguments else {
-        return None;
+    arguments(ty, name).into_iter().next()
+}
+
+/// `A`, `B` of `NAME<'_, A, B>`.
+fn arguments(ty: &Type, name: &str) -> Vec<Type> {
+    let segment = last_segment(ty).filter(|s| s.ident == name);
+    let Some(syn::PathArguments::AngleBracketed(args)) = segment.map(|it| &it.arguments) else {
+        return Vec::new();
     };
-    args.args.iter().find_map(|a| match a {
+    let types = args.args.iter().filter_map(|a| match a {
         syn::GenericArgument::Type(t) => Some(t.clone()),
         _ => None,
-    })
+    });
+    types.collect()
+}
+
+/// The role of `NAME<'_, FORMAT, ACCESS>`.
+fn storage_texture(ty: &Type, name: &str, dimensions: u32) -> Role {
+    let mut arguments = arguments(ty, name).into_iter();
+    Role::StorageTexture {
+        dimensions,
+        format: arguments.next().unwrap_or_else(|| ty.clone()),
+        access: arguments.next(),
+    }
 }
 
 fn shared(ty: &Type) -> syn::Result<Role> {
@@ -975,14 +1024,16 @@ impl Parse for Args {
 }
 
 fn format(name: &Ident) -> syn::Result<Format> {
-    let known = FORMATS.into_iter().find(|known| name == known.name);
-    known.ok_or_else(|| {
-        let names: Vec<_> = FORMATS.iter().map(|f| f.name).collect();
-        syn::Error::new(
-            name.span(),
-            format!("a format is one of {}", names.join(", ")),
-        )
-    })
+    let known = FORMATS.into_iter().find(|known| name == known.0);
+    known
+        .map(|(name, variant)| Format { name, variant })
+        .ok_or_else(|| {
+            let names: Vec<_> = FORMATS.iter().map(|f| f.0).collect();
+            syn::Error::new(
+                name.span(),
+                format!("a format is one of {}", names.join(", ")),
+            )
+        })
 }
 
 /// A path as the kernel's own module, one below, sees it.

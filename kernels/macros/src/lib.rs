@@ -43,8 +43,8 @@ use syn::parse_macro_input;
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
-/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube` |
-/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of `format` |
+/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube`; of integers: `Texture2d<'_, u32>`, `Texture2dArray<'_, i32>`, `Texture3d<'_, u32>` |
+/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
 /// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` for depths |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |

@@ -4,7 +4,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use crate::general::{Form, own};
-use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant, texture_type};
 
 impl Kernel {
     pub fn expand_shader(&self) -> TokenStream {
@@ -129,7 +129,7 @@ impl Kernel {
                 Role::Texture(kind) => {
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::image::#kind,)
                 }
-                Role::StorageTexture { dimensions, format } => {
+                Role::StorageTexture { dimensions, format, .. } => {
                     let shape = storage_shape(*dimensions);
                     quote! {
                         #[spirv(descriptor_set = 0, binding = #here)]
@@ -219,7 +219,10 @@ impl Kernel {
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
                 Role::StorageMut { .. } => quote!(::hankel_dsl::StorageMut::new(&*#name)),
                 Role::Atomic { .. } => quote!(::hankel_dsl::Atomics::new(&*#name)),
-                Role::Texture(kind) => quote!(::hankel_dsl::#kind::new(#name)),
+                Role::Texture(kind) => {
+                    let ty = texture_type(kind);
+                    quote!(#ty::new(#name))
+                }
                 Role::StorageTexture { dimensions, .. } => {
                     let ty = storage_texture_type(*dimensions);
                     quote!(#ty::new(#name))

@@ -691,7 +691,7 @@ impl Context {
                 0,
                 texture.target == glow::TEXTURE_3D,
                 0,
-                glow::WRITE_ONLY,
+                glow::READ_WRITE,
                 texture.texel.internal
             )
         );

@@ -31,6 +31,12 @@ pub(super) fn in_text(name: &str) -> Result<&'static str, String> {
         "rgba8unorm" => "rgba8",
         "r32uint" => "r32ui",
         "rgba32uint" => "rgba32ui",
+        "r32sint" => "r32i",
+        "rgba32sint" => "rgba32i",
+        "rgba16uint" => "rgba16ui",
+        "rgba16sint" => "rgba16i",
+        "rgba8uint" => "rgba8ui",
+        "rgba8sint" => "rgba8i",
         _ => return Err(format!("GLSL ES has no images of format {name}")),
     })
 }
@@ -58,9 +64,24 @@ impl Texel {
             "r32uint" => (glow::R32UI, glow::RED_INTEGER, glow::UNSIGNED_INT, 4),
             "rgba32uint" => (glow::RGBA32UI, glow::RGBA_INTEGER, glow::UNSIGNED_INT, 16),
             "rgba32sint" => (glow::RGBA32I, glow::RGBA_INTEGER, glow::INT, 16),
+            "r32sint" => (glow::R32I, glow::RED_INTEGER, glow::INT, 4),
+            "rgba16uint" => (glow::RGBA16UI, glow::RGBA_INTEGER, glow::UNSIGNED_SHORT, 8),
+            "rgba16sint" => (glow::RGBA16I, glow::RGBA_INTEGER, glow::SHORT, 8),
+            "rgba8uint" => (glow::RGBA8UI, glow::RGBA_INTEGER, glow::UNSIGNED_BYTE, 4),
+            "rgba8sint" => (glow::RGBA8I, glow::RGBA_INTEGER, glow::BYTE, 4),
             _ => return Err(format!("textures of format {name} are not known here")),
         };
         let (read_format, read_component, read_bytes) = match component {
+            // Integers are read as integers of 32 bits, of either sign.
+            glow::SHORT | glow::BYTE => (glow::RGBA_INTEGER, glow::INT, 16),
+            _ if format == glow::RGBA_INTEGER => {
+                let wide = if component == glow::INT {
+                    glow::INT
+                } else {
+                    glow::UNSIGNED_INT
+                };
+                (glow::RGBA_INTEGER, wide, 16)
+            }
             glow::FLOAT | glow::HALF_FLOAT => (glow::RGBA, glow::FLOAT, 16),
             glow::UNSIGNED_INT | glow::INT => (glow::RGBA_INTEGER, component, 16),
             _ => (glow::RGBA, component, bytes),
@@ -82,6 +103,11 @@ impl Texel {
             for float in pixel.chunks_exact(4) {
                 let float = f32::from_le_bytes([float[0], float[1], float[2], float[3]]);
                 to.extend(half(float).to_le_bytes());
+            }
+        } else if self.format == glow::RGBA_INTEGER && self.bytes < pixel.len() {
+            // The lower bytes of each channel.
+            for channel in pixel.chunks_exact(4) {
+                to.extend(&channel[..self.bytes / 4]);
             }
         } else {
             // One channel is the first of the four.

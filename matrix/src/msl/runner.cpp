@@ -147,7 +147,12 @@ extern "C" void msl_fail(const char *why) {
 
 // ---- textures ----
 
-enum Format { r32float, rgba32float, rgba16float, rgba16unorm, rgba8unorm, r32uint, rgba32uint };
+enum Format {
+    r32float, rgba32float, rgba16float, rgba16unorm, rgba8unorm,
+    // Integers.
+    r32uint, rgba32uint, r32sint, rgba32sint, rg32uint, rg32sint, rgba16uint, rgba16sint,
+    rgba8uint, rgba8sint
+};
 
 namespace {
 struct FormatOf {
@@ -159,7 +164,11 @@ constexpr FormatOf formats[] = {
     {"r32float", r32float, 4},       {"rgba32float", rgba32float, 16},
     {"rgba16float", rgba16float, 8}, {"rgba16unorm", rgba16unorm, 8},
     {"rgba8unorm", rgba8unorm, 4},   {"r32uint", r32uint, 4},
-    {"rgba32uint", rgba32uint, 16},
+    {"rgba32uint", rgba32uint, 16},  {"r32sint", r32sint, 4},
+    {"rgba32sint", rgba32sint, 16},  {"rg32uint", rg32uint, 8},
+    {"rg32sint", rg32sint, 8},       {"rgba16uint", rgba16uint, 8},
+    {"rgba16sint", rgba16sint, 8},   {"rgba8uint", rgba8uint, 4},
+    {"rgba8sint", rgba8sint, 4},
 };
 } // namespace
 
@@ -173,7 +182,14 @@ struct msl_texture {
     unsigned samples;
     unsigned char *texels;
 
-    bool is_integer() const { return format == r32uint || format == rgba32uint; }
+    bool is_integer() const { return format >= r32uint; }
+    bool is_signed() const {
+        return format == r32sint || format == rgba32sint || format == rg32sint ||
+               format == rgba16sint || format == rgba8sint;
+    }
+    unsigned channels() const {
+        return format == r32uint || format == r32sint ? 1 : format == rg32uint || format == rg32sint ? 2 : 4;
+    }
     unsigned of_level(unsigned lod, int d) const {
         return lod < 32 && size[d] >> lod > 0 ? size[d] >> lod : 1;
     }
@@ -231,8 +247,7 @@ void load(const msl_texture &t, const unsigned *at, unsigned layer, unsigned sam
         for (int i = 0; i < 4; i++)
             out[i] = float(texel[i]) / 255.0f;
         break;
-    case r32uint:
-    case rgba32uint:
+    default:
         msl_fail("a texture of integers is read as one of floats");
     }
 }
@@ -260,7 +275,16 @@ void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned layer, uns
     if (!t->has(at, layer, sample, lod))
         return;
     out[3] = 1;
-    memcpy(out, t->texel(at, layer, sample, lod), t->texel_bytes);
+    const unsigned char *texel = t->texel(at, layer, sample, lod);
+    unsigned size = t->texel_bytes / t->channels();
+    for (unsigned i = 0; i < t->channels(); i++) {
+        out[i] = 0;
+        memcpy(&out[i], texel + i * size, size);
+        // The sign of a shorter number.
+        unsigned shift = 32 - 8 * size;
+        if (t->is_signed())
+            out[i] = unsigned(int(out[i] << shift) >> shift);
+    }
 }
 
 void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const float *value) {
@@ -294,8 +318,12 @@ void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const flo
 void msl_store_uint(msl_texture *t, const unsigned *at, unsigned lod, const unsigned *value) {
     if (!t->is_integer())
         msl_fail("integers are written to a texture of floats");
-    if (t->has(at, 0, 0, lod))
-        memcpy(t->texel(at, 0, 0, lod), value, t->texel_bytes);
+    if (!t->has(at, 0, 0, lod))
+        return;
+    unsigned char *texel = t->texel(at, 0, 0, lod);
+    unsigned size = t->texel_bytes / t->channels();
+    for (unsigned i = 0; i < t->channels(); i++)
+        memcpy(texel + i * size, &value[i], size);
 }
 }
 

@@ -64,6 +64,7 @@ fn texture(written: bool, n: u32, format: &'static str, size: [u32; 3], bytes: V
             Role::StorageTexture {
                 format: format.into(),
                 dimensions: 2,
+                access: "write-only".into(),
             }
         } else {
             Role::Texture {

@@ -5,7 +5,7 @@ import { WIDTH, captured, filling, points, taken, typeName } from "./wgsl.mjs";
 /** Bytes of a texel. */
 const TEXEL_BYTES = {
     r32float: 4, rgba32float: 16, rgba16float: 8, rgba16unorm: 8, rgba8unorm: 4, r32uint: 4,
-    rgba32uint: 16, depth32float: 4,
+    rgba32uint: 16, depth32float: 4, rgba16uint: 8, rgba16sint: 8, rgba8uint: 4, rgba8sint: 4,
 };
 
 /** The levels of a texture's argument: texels along each axis, and where its bytes lie. */
@@ -294,12 +294,12 @@ class Maker {
                 case "write":
                     return { ...entry, buffer: { type: "storage" } };
                 case "texture": {
-                    const isFloat = !arg.format.endsWith("uint");
+                    const integer = /[us]int$/.exec(arg.format)?.[0];
                     const isFine = isFiltered && arg.samples === 1 && filters(arg.format) &&
                         arg.format !== "depth32float";
                     const float = isFine ? "float" : "unfilterable-float";
                     return { ...entry, texture: {
-                        sampleType: role.depth ? "depth" : isFloat ? float : "uint",
+                        sampleType: role.depth ? "depth" : integer ?? float,
                         viewDimension: role.view,
                         multisampled: role.multisampled,
                     } };
@@ -314,7 +314,7 @@ class Maker {
                         throw new Error(`the device lacks ${TIER}`);
                     }
                     return { ...entry, storageTexture: {
-                        access: "write-only",
+                        access: role.access,
                         format: role.format,
                         viewDimension: `${role.dimensions}d`,
                     } };
@@ -405,9 +405,10 @@ class Maker {
                 const { format, dimensions, size, samples, levels, layers } = arg;
                 const texel = TEXEL_BYTES[format];
                 if (!texel) throw new Error(`format \`${format}\` is not known`);
-                const isWritten = role.kind === "storage_texture";
+                const isStored = role.kind === "storage_texture";
+                const isWritten = isStored && role.access !== "read-only";
                 const filler = fillers.get(i);
-                const usage = (isWritten
+                const usage = (isStored
                     ? GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC
                     : GPUTextureUsage.TEXTURE_BINDING) |
                     (filler ? GPUTextureUsage.RENDER_ATTACHMENT : GPUTextureUsage.COPY_DST);
@@ -429,7 +430,7 @@ class Maker {
                     }
                 });
                 if (isWritten) reads.set(i, readTexture(texture, arg.length));
-                const dimension = isWritten ? `${role.dimensions}d` : role.view;
+                const dimension = isStored ? `${role.dimensions}d` : role.view;
                 return { binding, resource: texture.createView({ dimension }) };
             }
             const isUniform = role.kind === "uniform";
@@ -448,7 +449,7 @@ class Maker {
     inOrder(reads, one) {
         const written = ["atomic", "write", "storage_texture", "position", "passed", "depth", "target"];
         return this.job.slots.flatMap(({ name, role }, i) => {
-            if (!written.includes(role.kind)) return [];
+            if (!written.includes(role.kind) || role.access === "read-only") return [];
             if (reads.has(i)) return [reads.get(i)];
             // The text does not use it: it stays as it was.
             const arg = one.args[i];

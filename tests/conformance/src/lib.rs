@@ -10,12 +10,14 @@ use hankel_dsl::{
     lit,
 };
 
+pub mod data;
 pub mod general;
 pub mod layers;
 pub mod math;
 pub mod sampling;
 pub mod shadow;
 pub mod stage;
+pub mod texels;
 pub mod texture;
 pub mod workgroup;
 
@@ -64,6 +66,25 @@ hankel_dsl::kernels![
     texture::spread,
     texture::corners,
     texture::gathered,
+    data::switched,
+    data::wide,
+    data::signed_wide,
+    data::packed,
+    texels::whole,
+    texels::counted_texels,
+    texels::signed_texels,
+    texels::pairs,
+    texels::signed_pairs,
+    texels::single,
+    texels::fade,
+    texels::tally,
+    texels::turn,
+    texels::blurred,
+    texels::edges,
+    texels::face_corners,
+    texels::faces,
+    texels::faces_lit,
+    texels::sample_count,
     sampling::levels,
     sampling::level_count,
     sampling::trilinear,

@@ -154,6 +154,7 @@ fn to_hlsl((module, info): &(naga::Module, ModuleInfo)) -> String {
 
 fn to_msl((module, info): &(naga::Module, ModuleInfo)) -> String {
     let options = msl::Options {
+        lang_version: (2, 4),
         fake_missing_bindings: true,
         force_loop_bounding: false,
         ..msl::Options::default()

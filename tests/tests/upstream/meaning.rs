@@ -91,6 +91,15 @@ fn naga_counts_bits_in_low_precision() {
 }
 
 #[test]
+fn naga_reads_what_a_thread_wrote_to_a_texture_without_a_fence() {
+    let source = to_msl(&wgsl("naga-msl-fence"));
+    assert!(
+        source.contains(".write(") && !source.contains("fence"),
+        "mended: drop `fenced` in codegen/src/translate/msl.rs\n{source}"
+    );
+}
+
+#[test]
 fn naga_reads_unordered_comparisons_as_ordered() {
     let wgsl = to_wgsl(&read_by_naga("naga-unordered"));
     assert!(

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hankel_dsl::native::describe::{
-    Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage, Type,
+    Channels, Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage, TexelAccess, Type,
 };
 
 use super::super::error::{DeviceError, Result};
@@ -158,7 +158,15 @@ impl VulkanDevice {
             Shader::SpirvThroughNaga(code) => {
                 let written: Vec<u32> = slots
                     .iter()
-                    .filter(|s| matches!(s.role, Use::StorageTexture { .. }))
+                    .filter(|s| {
+                        matches!(
+                            s.role,
+                            Use::StorageTexture {
+                                access: TexelAccess::Write,
+                                ..
+                            }
+                        )
+                    })
                     .filter_map(|s| s.binding)
                     .collect();
                 let code = words::specialise(code, &numbered)
@@ -412,8 +420,12 @@ impl VulkanDevice {
                 let sample_type = if kind.is_depth() {
                     wgpu::TextureSampleType::Depth
                 } else {
-                    wgpu::TextureSampleType::Float {
-                        filterable: texture.filterable,
+                    match kind.channels() {
+                        Channels::Float => wgpu::TextureSampleType::Float {
+                            filterable: texture.filterable,
+                        },
+                        Channels::Uint => wgpu::TextureSampleType::Uint,
+                        Channels::Sint => wgpu::TextureSampleType::Sint,
                     }
                 };
                 let ty = wgpu::BindingType::Texture {
@@ -427,17 +439,40 @@ impl VulkanDevice {
                 });
                 (ty, Resource::View(view))
             }
-            Use::StorageTexture { format, .. } => {
+            Use::StorageTexture { format, access, .. } => {
                 let Bind::Texture(id) = bind else {
                     return Err(refuse("it must be a texture"));
                 };
                 let texture = self.image(*id)?;
-                if !texture.usage.contains(wgpu::TextureUsages::STORAGE_BINDING) {
-                    let feature = format!("writing {} textures", format.name());
+                let can = self
+                    .adapter
+                    .get_texture_format_features(resources::format(Format::Texel(format)))
+                    .flags;
+                let (access, flag, does) = match access {
+                    TexelAccess::Write => (
+                        wgpu::StorageTextureAccess::WriteOnly,
+                        wgpu::TextureFormatFeatureFlags::STORAGE_WRITE_ONLY,
+                        "writing",
+                    ),
+                    TexelAccess::Read => (
+                        wgpu::StorageTextureAccess::ReadOnly,
+                        wgpu::TextureFormatFeatureFlags::STORAGE_READ_ONLY,
+                        "storage of",
+                    ),
+                    TexelAccess::ReadWrite => (
+                        wgpu::StorageTextureAccess::ReadWrite,
+                        wgpu::TextureFormatFeatureFlags::STORAGE_READ_WRITE,
+                        "reading and writing",
+                    ),
+                };
+                if !texture.usage.contains(wgpu::TextureUsages::STORAGE_BINDING)
+                    || !can.contains(flag)
+                {
+                    let feature = format!("{does} {} textures", format.name());
                     return Err(self.missing(&feature, kernel));
                 }
                 let ty = wgpu::BindingType::StorageTexture {
-                    access: wgpu::StorageTextureAccess::WriteOnly,
+                    access,
                     format: resources::format(Format::Texel(format)),
                     view_dimension: if texture.shape.dimensions == 3 {
                         wgpu::TextureViewDimension::D3
@@ -894,21 +929,24 @@ impl VulkanDevice {
                 )));
             };
             let format = self.image(colour.texture)?.shape.format;
-            let uint = matches!(
-                ty,
-                Type::Scalar {
-                    scalar: Scalar::U32
-                } | Type::Vector {
-                    scalar: Scalar::U32,
-                    ..
-                }
-            );
-            if format.texel().is_uint() != uint {
+            let numbers = match ty {
+                Type::Scalar { scalar } | Type::Vector { scalar, .. } => match scalar {
+                    Scalar::U32 => Channels::Uint,
+                    Scalar::I32 => Channels::Sint,
+                    _ => Channels::Float,
+                },
+                _ => Channels::Float,
+            };
+            if format.texel().numbers() != numbers {
                 return Err(bad(format!(
                     "colour target {location} is {}, but kernel `{}` writes {}",
                     format.name(),
                     fragment.name,
-                    if uint { "unsigned integers" } else { "floats" }
+                    match numbers {
+                        Channels::Float => "floats",
+                        Channels::Uint => "unsigned integers",
+                        Channels::Sint => "signed integers",
+                    }
                 )));
             }
         }

@@ -1,6 +1,6 @@
 //! Buffers and textures of the Vulkan device, and what goes to and from them.
 
-use hankel_dsl::native::describe::{TexelFormat, TextureKind};
+use hankel_dsl::native::describe::{Channels, TexelFormat, TextureKind};
 use hankel_dsl::native::{Address, Compare, Filter, Sampler};
 
 use super::super::error::{DeviceError, Result};
@@ -67,24 +67,26 @@ pub fn format(format: Format) -> wgpu::TextureFormat {
         Format::Texel(TexelFormat::Rgba8Unorm) => wgpu::TextureFormat::Rgba8Unorm,
         Format::Texel(TexelFormat::R32Uint) => wgpu::TextureFormat::R32Uint,
         Format::Texel(TexelFormat::Rgba32Uint) => wgpu::TextureFormat::Rgba32Uint,
+        Format::Texel(TexelFormat::R32Sint) => wgpu::TextureFormat::R32Sint,
+        Format::Texel(TexelFormat::Rgba32Sint) => wgpu::TextureFormat::Rgba32Sint,
+        Format::Texel(TexelFormat::Rg32Uint) => wgpu::TextureFormat::Rg32Uint,
+        Format::Texel(TexelFormat::Rg32Sint) => wgpu::TextureFormat::Rg32Sint,
+        Format::Texel(TexelFormat::Rgba16Uint) => wgpu::TextureFormat::Rgba16Uint,
+        Format::Texel(TexelFormat::Rgba16Sint) => wgpu::TextureFormat::Rgba16Sint,
+        Format::Texel(TexelFormat::Rgba8Uint) => wgpu::TextureFormat::Rgba8Uint,
+        Format::Texel(TexelFormat::Rgba8Sint) => wgpu::TextureFormat::Rgba8Sint,
     }
 }
 
 /// How a kernel sees a texture.
 pub fn view_dimension(kind: TextureKind) -> wgpu::TextureViewDimension {
-    match kind {
-        TextureKind::Texture1d => wgpu::TextureViewDimension::D1,
-        TextureKind::Texture2d
-        | TextureKind::Texture2dMultisampled
-        | TextureKind::DepthTexture2d => wgpu::TextureViewDimension::D2,
-        TextureKind::Texture2dArray | TextureKind::DepthTexture2dArray => {
-            wgpu::TextureViewDimension::D2Array
-        }
-        TextureKind::Texture3d => wgpu::TextureViewDimension::D3,
-        TextureKind::TextureCube | TextureKind::DepthTextureCube => {
-            wgpu::TextureViewDimension::Cube
-        }
-        TextureKind::TextureCubeArray => wgpu::TextureViewDimension::CubeArray,
+    match (kind.dimensions(), kind.is_cube(), kind.is_array()) {
+        (1, ..) => wgpu::TextureViewDimension::D1,
+        (3, ..) => wgpu::TextureViewDimension::D3,
+        (_, false, false) => wgpu::TextureViewDimension::D2,
+        (_, false, true) => wgpu::TextureViewDimension::D2Array,
+        (_, true, false) => wgpu::TextureViewDimension::Cube,
+        (_, true, true) => wgpu::TextureViewDimension::CubeArray,
     }
 }
 
@@ -461,16 +463,14 @@ impl VulkanDevice {
         let depth = shape.format == Format::Depth32;
         let (result, scalar) = if depth {
             ("@builtin(frag_depth) f32", ".x")
-        } else if shape.format.texel().is_uint() {
-            ("@location(0) vec4<u32>", "")
         } else {
-            ("@location(0) vec4<f32>", "")
+            match shape.format.texel().numbers() {
+                Channels::Float => ("@location(0) vec4<f32>", ""),
+                Channels::Uint => ("@location(0) vec4<u32>", ""),
+                Channels::Sint => ("@location(0) vec4<i32>", ""),
+            }
         };
-        let ty = if shape.format.texel().is_uint() {
-            "u32"
-        } else {
-            "f32"
-        };
+        let ty = channel_type(shape.format);
         let text = format!(
             "@group(0) @binding(0) var<storage, read> samples: array<vec4<{ty}>>;\n\
              @vertex fn corner(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {{\n\
@@ -574,11 +574,7 @@ impl VulkanDevice {
         };
         let values = shape.bytes() / shape.format.texel().bytes() * 16;
         let memory = self.make_buffer("samples", values)?;
-        let ty = if shape.format.texel().is_uint() {
-            "u32"
-        } else {
-            "f32"
-        };
+        let ty = channel_type(shape.format);
         let (kind, load) = if shape.format == Format::Depth32 {
             (
                 "texture_depth_multisampled_2d".to_string(),
@@ -650,10 +646,19 @@ fn shape_name(shape: &TextureShape) -> String {
     format!("{} with {} samples", shape.format.name(), shape.samples)
 }
 
+/// WGSL's type of a channel.
+fn channel_type(format: Format) -> &'static str {
+    match format.texel().numbers() {
+        Channels::Float => "f32",
+        Channels::Uint => "u32",
+        Channels::Sint => "i32",
+    }
+}
+
 /// Texels as four 32-bit channels each.
 fn to_vec4(format: Format, bytes: &[u8]) -> Vec<u8> {
     let texel = format.texel();
-    let wide = if texel.is_uint() {
+    let wide = if texel.is_integer() {
         TexelFormat::Rgba32Uint
     } else {
         TexelFormat::Rgba32Float
@@ -663,8 +668,8 @@ fn to_vec4(format: Format, bytes: &[u8]) -> Vec<u8> {
         .chunks_exact(texel.bytes())
         .zip(out.chunks_exact_mut(16))
     {
-        if texel.is_uint() {
-            wide.store_uint(to, texel.load_uint(from));
+        if texel.is_integer() {
+            wide.store_integer(to, texel.load_integer(from));
         } else {
             wide.store(to, texel.load(from));
         }
@@ -675,7 +680,7 @@ fn to_vec4(format: Format, bytes: &[u8]) -> Vec<u8> {
 /// The inverse of [`to_vec4`].
 fn from_vec4(format: Format, values: &[u8]) -> Vec<u8> {
     let texel = format.texel();
-    let wide = if texel.is_uint() {
+    let wide = if texel.is_integer() {
         TexelFormat::Rgba32Uint
     } else {
         TexelFormat::Rgba32Float
@@ -685,8 +690,8 @@ fn from_vec4(format: Format, values: &[u8]) -> Vec<u8> {
         .chunks_exact(16)
         .zip(out.chunks_exact_mut(texel.bytes()))
     {
-        if texel.is_uint() {
-            texel.store_uint(to, wide.load_uint(from));
+        if texel.is_integer() {
+            texel.store_integer(to, wide.load_integer(from));
         } else {
             texel.store(to, wide.load(from));
         }

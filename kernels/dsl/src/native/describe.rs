@@ -307,7 +307,7 @@ pub enum Role {
         /// Shape and texel type.
         texture: TextureKind,
     },
-    /// A texture of which any texel may be written.
+    /// A texture of which any texel may be read, written, or both.
     StorageTexture {
         /// Number in set 0.
         binding: u32,
@@ -315,6 +315,9 @@ pub enum Role {
         format: TexelFormat,
         /// 2 or 3.
         dimensions: u32,
+        /// What is done with its texels.
+        #[serde(default, skip_serializing_if = "TexelAccess::is_write")]
+        access: TexelAccess,
     },
     /// A sampler.
     Sampler {
@@ -366,6 +369,48 @@ pub enum Role {
     },
 }
 
+/// What a kernel does with the texels of a storage texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TexelAccess {
+    /// Writes them.
+    #[default]
+    Write,
+    /// Reads them.
+    Read,
+    /// Reads and writes them.
+    ReadWrite,
+}
+
+impl TexelAccess {
+    /// Whether texels are read.
+    #[must_use]
+    pub const fn reads(self) -> bool {
+        matches!(self, Self::Read | Self::ReadWrite)
+    }
+
+    /// Whether texels are written.
+    #[must_use]
+    pub const fn writes(self) -> bool {
+        matches!(self, Self::Write | Self::ReadWrite)
+    }
+
+    /// Whether texels are only written: what a description says nothing of.
+    const fn is_write(&self) -> bool {
+        matches!(self, Self::Write)
+    }
+
+    /// WebGPU's word: `write-only`, `read-only`, `read-write`.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Write => "write-only",
+            Self::Read => "read-only",
+            Self::ReadWrite => "read-write",
+        }
+    }
+}
+
 /// What the device knows of an invocation. Ids and counts have as many dimensions as the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -414,11 +459,23 @@ pub enum TextureKind {
     DepthTexture2dArray,
     /// Such depths on the faces of a cube.
     DepthTextureCube,
+    /// Two dimensions of unsigned integers, not filtered.
+    UintTexture2d,
+    /// Layers of two dimensions of unsigned integers.
+    UintTexture2dArray,
+    /// Three dimensions of unsigned integers.
+    UintTexture3d,
+    /// Two dimensions of signed integers, not filtered.
+    SintTexture2d,
+    /// Layers of two dimensions of signed integers.
+    SintTexture2dArray,
+    /// Three dimensions of signed integers.
+    SintTexture3d,
 }
 
 impl TextureKind {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 16] = [
         Self::Texture1d,
         Self::Texture2d,
         Self::Texture2dArray,
@@ -429,9 +486,15 @@ impl TextureKind {
         Self::DepthTexture2d,
         Self::DepthTexture2dArray,
         Self::DepthTextureCube,
+        Self::UintTexture2d,
+        Self::UintTexture2dArray,
+        Self::UintTexture3d,
+        Self::SintTexture2d,
+        Self::SintTexture2dArray,
+        Self::SintTexture3d,
     ];
 
-    /// The type's name in Rust.
+    /// The type in Rust, without the lifetime.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -445,6 +508,12 @@ impl TextureKind {
             Self::DepthTexture2d => "DepthTexture2d",
             Self::DepthTexture2dArray => "DepthTexture2dArray",
             Self::DepthTextureCube => "DepthTextureCube",
+            Self::UintTexture2d => "Texture2d<u32>",
+            Self::UintTexture2dArray => "Texture2dArray<u32>",
+            Self::UintTexture3d => "Texture3d<u32>",
+            Self::SintTexture2d => "Texture2d<i32>",
+            Self::SintTexture2dArray => "Texture2dArray<i32>",
+            Self::SintTexture3d => "Texture3d<i32>",
         }
     }
 
@@ -453,9 +522,16 @@ impl TextureKind {
     pub const fn view(self) -> &'static str {
         match self {
             Self::Texture1d => "1d",
-            Self::Texture2d | Self::Texture2dMultisampled | Self::DepthTexture2d => "2d",
-            Self::Texture2dArray | Self::DepthTexture2dArray => "2d-array",
-            Self::Texture3d => "3d",
+            Self::Texture2d
+            | Self::Texture2dMultisampled
+            | Self::DepthTexture2d
+            | Self::UintTexture2d
+            | Self::SintTexture2d => "2d",
+            Self::Texture2dArray
+            | Self::DepthTexture2dArray
+            | Self::UintTexture2dArray
+            | Self::SintTexture2dArray => "2d-array",
+            Self::Texture3d | Self::UintTexture3d | Self::SintTexture3d => "3d",
             Self::TextureCube | Self::DepthTextureCube => "cube",
             Self::TextureCubeArray => "cube-array",
         }
@@ -466,7 +542,7 @@ impl TextureKind {
     pub const fn dimensions(self) -> u32 {
         match self {
             Self::Texture1d => 1,
-            Self::Texture3d => 3,
+            Self::Texture3d | Self::UintTexture3d | Self::SintTexture3d => 3,
             _ => 2,
         }
     }
@@ -476,8 +552,22 @@ impl TextureKind {
     pub const fn is_array(self) -> bool {
         matches!(
             self,
-            Self::Texture2dArray | Self::TextureCubeArray | Self::DepthTexture2dArray
+            Self::Texture2dArray
+                | Self::TextureCubeArray
+                | Self::DepthTexture2dArray
+                | Self::UintTexture2dArray
+                | Self::SintTexture2dArray
         )
+    }
+
+    /// What its channels are as a kernel sees them: floats, or integers of one sign.
+    #[must_use]
+    pub const fn channels(self) -> Channels {
+        match self {
+            Self::UintTexture2d | Self::UintTexture2dArray | Self::UintTexture3d => Channels::Uint,
+            Self::SintTexture2d | Self::SintTexture2dArray | Self::SintTexture3d => Channels::Sint,
+            _ => Channels::Float,
+        }
     }
 
     /// Whether its layers are faces of cubes.
@@ -618,6 +708,37 @@ pub enum Scalar {
     U32,
     /// 32-bit signed integer.
     I32,
+    /// 64-bit unsigned integer.
+    U64,
+    /// 64-bit signed integer.
+    I64,
+    /// A truth value: 32 bits that are 0 or 1.
+    Bool,
+}
+
+impl Scalar {
+    /// Its name in Rust; a truth value's as it is in general.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+            Self::U32 => "u32",
+            Self::I32 => "i32",
+            Self::U64 => "u64",
+            Self::I64 => "i64",
+            Self::Bool => "bool",
+        }
+    }
+
+    /// Bytes in memory.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::F64 | Self::U64 | Self::I64 => 8,
+            Self::F32 | Self::U32 | Self::I32 | Self::Bool => 4,
+        }
+    }
 }
 
 /// Where the parts of a value lie, in bytes (std430).
@@ -671,6 +792,45 @@ pub enum TexelFormat {
     R32Uint,
     /// Four 32-bit unsigned integers.
     Rgba32Uint,
+    /// One 32-bit signed integer.
+    R32Sint,
+    /// Four 32-bit signed integers.
+    Rgba32Sint,
+    /// Two 32-bit unsigned integers.
+    Rg32Uint,
+    /// Two 32-bit signed integers.
+    Rg32Sint,
+    /// Four 16-bit unsigned integers.
+    Rgba16Uint,
+    /// Four 16-bit signed integers.
+    Rgba16Sint,
+    /// Four 8-bit unsigned integers.
+    Rgba8Uint,
+    /// Four 8-bit signed integers.
+    Rgba8Sint,
+}
+
+/// What the channels of a texel are in a shader, whatever their bits in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channels {
+    /// `f32`.
+    Float,
+    /// `u32`.
+    Uint,
+    /// `i32`.
+    Sint,
+}
+
+impl Channels {
+    /// As WebGPU ends the names of formats: `float`, `uint`, `sint`.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Float => "float",
+            Self::Uint => "uint",
+            Self::Sint => "sint",
+        }
+    }
 }
 
 /// How closely a backend must agree with the native scalar run: an element passes when it is

@@ -2,6 +2,7 @@
 //! invocations.
 
 use core::any::Any;
+use core::ops::Range;
 use core::panic::Location;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,11 +11,11 @@ use std::{format, vec};
 
 use bytemuck::Pod;
 use fearless_simd::Simd;
-use glam::{UVec2, UVec3, UVec4, Vec4};
+use glam::{IVec4, UVec2, UVec3, UVec4, Vec4};
 use rayon::prelude::*;
 
 use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef, texture_bytes};
-use super::describe::{TexelFormat, TextureKind};
+use super::describe::{TexelAccess, TexelFormat, TextureKind};
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
 use super::sanitize::{self, Access, Space};
@@ -120,12 +121,16 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// The texels of a texture that is written among other things.
+    /// The texels of a storage texture.
     pub fn texels(
         &mut self,
         name: &'static str,
         format: TexelFormat,
+        access: TexelAccess,
     ) -> Result<Texels<'a>, CallError> {
+        if !access.writes() {
+            return self.constant_texels(name, format);
+        }
         let TextureMut {
             size,
             format,
@@ -136,8 +141,39 @@ impl<'a> Args<'a> {
         Ok(Texels {
             size,
             format,
-            words,
+            memory: Memory::Shared(words),
         })
+    }
+
+    /// The texels of a storage texture that is only read.
+    fn constant_texels(
+        &mut self,
+        name: &'static str,
+        format: TexelFormat,
+    ) -> Result<Texels<'a>, CallError> {
+        let Some(Arg::Texture(t)) = self.args.next() else {
+            return Err(CallError::Kind {
+                name,
+                expected: "a texture",
+            });
+        };
+        let problem = if t.format != format {
+            format!(
+                "it is {}, the kernel reads {}",
+                t.format.name(),
+                format.name()
+            )
+        } else if t.levels != 1 || t.layers != 1 || t.samples != 1 {
+            "it has several levels, layers or samples, but the kernel reads one".into()
+        } else {
+            check_size(name, t.size, format, t.bytes.len())?;
+            return Ok(Texels {
+                size: t.size,
+                format,
+                memory: Memory::Constant(t.bytes),
+            });
+        };
+        Err(CallError::Texture { name, problem })
     }
 
     /// A texture to be read.
@@ -160,6 +196,14 @@ impl<'a> Args<'a> {
             let problem = format!(
                 "{}x{}x{} texels with {} samples are of the wrong shape",
                 t.size[0], t.size[1], t.size[2], t.samples
+            );
+            return Err(CallError::Texture { name, problem });
+        }
+        if t.format.numbers() != kind.channels() {
+            let problem = format!(
+                "it is {}, the kernel reads {} channels",
+                t.format.name(),
+                kind.channels().word()
             );
             return Err(CallError::Texture { name, problem });
         }
@@ -238,12 +282,21 @@ fn shared_words<'a>(
     Ok(unsafe { core::slice::from_raw_parts(words.as_mut_ptr().cast::<AtomicU32>(), words.len()) })
 }
 
-/// A texture of which any texel may be written at any time.
+/// A texture of which any texel may be read and written at any time.
 #[derive(Clone, Copy)]
 pub struct Texels<'a> {
     size: [u32; 3],
     format: TexelFormat,
-    words: &'a [AtomicU32],
+    memory: Memory<'a>,
+}
+
+/// Where the texels of a storage texture lie.
+#[derive(Clone, Copy)]
+enum Memory<'a> {
+    /// Written by anybody at any time.
+    Shared(&'a [AtomicU32]),
+    /// Only read.
+    Constant(&'a [u8]),
 }
 
 impl Texels<'_> {
@@ -256,18 +309,51 @@ impl Texels<'_> {
     #[inline]
     #[track_caller]
     pub fn store<T: Texel<Channels: Channels>>(self, at: UVec3, texel: T) {
-        let [width, height, _] = self.size.map(|n| n as usize);
-        let i = (at.z as usize * height + at.y as usize) * width + at.x as usize;
-        let count = self.format.bytes() / 4;
         let mut texel_words = [0_u32; 4];
-        texel
-            .channels()
-            .store(self.format, bytemuck::cast_slice_mut(&mut texel_words));
-        let slots = &self.words[i * count..][..count];
-        sanitize::look(Space::Storage, Access::Write, slots, Location::caller());
+        let bytes = &mut bytemuck::cast_slice_mut(&mut texel_words)[..self.format.bytes()];
+        texel.channels().store(self.format, bytes);
+        let Memory::Shared(words) = self.memory else {
+            // Its type has no `store`.
+            return;
+        };
+        let slots = &words[self.words_of(at)];
+        sanitize::look(Space::Texture, Access::Write, slots, Location::caller());
         for (word, slot) in texel_words.iter().zip(slots) {
             slot.store(*word, Relaxed);
         }
+    }
+
+    /// The texel at `at`, which lies inside.
+    #[inline]
+    #[track_caller]
+    pub fn load<T: Texel<Channels: Channels>>(self, at: UVec3) -> T {
+        let range = self.words_of(at);
+        let words = match self.memory {
+            Memory::Shared(words) => words,
+            Memory::Constant(bytes) => {
+                let own = &bytes[4 * range.start..4 * range.end];
+                return T::of(Channels::load(self.format, own));
+            }
+        };
+        let slots = &words[range];
+        sanitize::look(Space::Texture, Access::Read, slots, Location::caller());
+        let mut texel_words = [0_u32; 4];
+        for (word, slot) in texel_words.iter_mut().zip(slots) {
+            *word = slot.load(Relaxed);
+        }
+        T::of(Channels::load(
+            self.format,
+            bytemuck::cast_slice(&texel_words),
+        ))
+    }
+
+    /// The words of a texel.
+    #[inline]
+    fn words_of(self, at: UVec3) -> Range<usize> {
+        let [width, height, _] = self.size.map(|n| n as usize);
+        let i = (at.z as usize * height + at.y as usize) * width + at.x as usize;
+        let count = self.format.bytes() / 4;
+        i * count..(i + 1) * count
     }
 }
 
@@ -493,9 +579,11 @@ fn lane_chunk<S: Simd, B: LaneBody>(
 }
 
 /// All channels of a texel, as a texture stores them.
-pub trait Channels {
-    /// Writes them.
+pub trait Channels: Sized {
+    /// Writes them to the bytes of one texel.
     fn store(self, format: TexelFormat, bytes: &mut [u8]);
+    /// Reads them.
+    fn load(format: TexelFormat, bytes: &[u8]) -> Self;
 }
 
 impl Channels for Vec4 {
@@ -503,12 +591,43 @@ impl Channels for Vec4 {
     fn store(self, format: TexelFormat, bytes: &mut [u8]) {
         format.store(bytes, self);
     }
+    #[inline]
+    fn load(format: TexelFormat, bytes: &[u8]) -> Self {
+        format.load(bytes)
+    }
 }
 
 impl Channels for UVec4 {
     #[inline]
+    #[track_caller]
     fn store(self, format: TexelFormat, bytes: &mut [u8]) {
-        format.store_uint(bytes, self);
+        assert!(
+            format.holds(self),
+            "a texel of {} does not hold {self}: what becomes of it differs from device to device",
+            format.name()
+        );
+        format.store_integer(bytes, self);
+    }
+    #[inline]
+    fn load(format: TexelFormat, bytes: &[u8]) -> Self {
+        format.load_integer(bytes)
+    }
+}
+
+impl Channels for IVec4 {
+    #[inline]
+    #[track_caller]
+    fn store(self, format: TexelFormat, bytes: &mut [u8]) {
+        assert!(
+            format.holds(self.as_uvec4()),
+            "a texel of {} does not hold {self}: what becomes of it differs from device to device",
+            format.name()
+        );
+        format.store_integer(bytes, self.as_uvec4());
+    }
+    #[inline]
+    fn load(format: TexelFormat, bytes: &[u8]) -> Self {
+        format.load_integer(bytes).as_ivec4()
     }
 }
 

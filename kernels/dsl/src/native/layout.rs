@@ -9,13 +9,13 @@ use bytemuck::Pod;
 use glam::{IVec2, IVec3, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
 use super::describe::{Field, Inputs, Layout, Precision, Scalar, Type};
-use crate::Real;
+use crate::{Bool, Real};
 
 /// A value that a buffer can hold: the same bytes on the host and in a shader.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be in a buffer",
     note = "a structure needs `#[derive(Element)]` and `#[repr(C)]`",
-    note = "`bool`, `usize`, `f16` and enums have no place in a shader's memory; use `u32` or `f32`"
+    note = "`usize`, `f16` and enums have no place in a shader's memory: use `u32` or `f32`; for `bool`, use `Bool`"
 )]
 pub trait Element: Pod + Send + Sync {
     /// Alignment in bytes that a shader wants (std430).
@@ -49,15 +49,9 @@ pub trait Element: Pod + Send + Sync {
 
 /// The Rust name of a type that is no structure.
 fn name(ty: &Type) -> String {
-    let scalar = |s: &Scalar| match s {
-        Scalar::F32 => "f32",
-        Scalar::F64 => "f64",
-        Scalar::U32 => "u32",
-        Scalar::I32 => "i32",
-    };
     match ty {
-        Type::Scalar { scalar: s } => scalar(s).into(),
-        Type::Vector { scalar: s, size } => format!("{}x{size}", scalar(s)),
+        Type::Scalar { scalar } => scalar.name().into(),
+        Type::Vector { scalar, size } => format!("{}x{size}", scalar.name()),
         Type::Array {
             element, length, ..
         } => format!("{}[{length}]", name(element)),
@@ -83,6 +77,9 @@ leaf! {
     f64, 8, Type::Scalar { scalar: Scalar::F64 };
     u32, 4, Type::Scalar { scalar: Scalar::U32 };
     i32, 4, Type::Scalar { scalar: Scalar::I32 };
+    u64, 8, Type::Scalar { scalar: Scalar::U64 };
+    i64, 8, Type::Scalar { scalar: Scalar::I64 };
+    Bool, 4, Type::Scalar { scalar: Scalar::Bool };
     Vec2, 8, Type::Vector { scalar: Scalar::F32, size: 2 };
     Vec3, 16, Type::Vector { scalar: Scalar::F32, size: 3 };
     Vec4, 16, Type::Vector { scalar: Scalar::F32, size: 4 };
@@ -93,6 +90,11 @@ leaf! {
     IVec3, 16, Type::Vector { scalar: Scalar::I32, size: 3 };
     IVec4, 16, Type::Vector { scalar: Scalar::I32, size: 4 };
 }
+
+// SAFETY: a transparent `u32`, of which every bit pattern is a value.
+unsafe impl bytemuck::Zeroable for Bool {}
+// SAFETY: see above.
+unsafe impl Pod for Bool {}
 
 impl<T: Element, const N: usize> Element for [T; N]
 where
@@ -264,6 +266,13 @@ macro_rules! scalar {
             type Over<L: Real> = i32;
             #[inline(always)]
             fn splat<L: Lane<Scalar = $float>>(self) -> i32 {
+                self
+            }
+        }
+        impl Splat<$float> for Bool {
+            type Over<L: Real> = Bool;
+            #[inline(always)]
+            fn splat<L: Lane<Scalar = $float>>(self) -> Bool {
                 self
             }
         }

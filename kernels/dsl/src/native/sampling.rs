@@ -11,7 +11,7 @@
 //!   a gradient may be taken as anything from its largest component to the sum of them, times the
 //!   root of 2.
 
-use glam::{Vec3, Vec4};
+use glam::{UVec4, Vec3, Vec4};
 
 use super::call::{Address, Filter, Sampler, TextureRef, level_size, texture_bytes};
 
@@ -41,12 +41,20 @@ impl<'a> Level<'a> {
         }
     }
 
+    /// The nearest texel that there is.
+    fn nearest(&self, at: [u32; 3]) -> [u32; 3] {
+        [0, 1, 2].map(|d| at[d].min(self.size[d] - 1))
+    }
+
     fn texel(&self, at: [u32; 3], sample: u32) -> Vec4 {
+        self.texture.format.load(self.bytes(at, sample))
+    }
+
+    fn bytes(&self, at: [u32; 3], sample: u32) -> &'a [u8] {
         let [width, height, _] = self.size.map(|n| n as usize);
         let texel = (at[2] as usize * height + at[1] as usize) * width + at[0] as usize;
         let index = texel * self.samples as usize + sample.min(self.samples - 1) as usize;
-        let format = self.texture.format;
-        format.load(&self.texture.bytes[self.start + index * format.bytes()..])
+        &self.texture.bytes[self.start + index * self.texture.format.bytes()..]
     }
 }
 
@@ -54,8 +62,14 @@ impl<'a> Level<'a> {
 #[inline]
 pub fn load(t: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32, sample: u32) -> Vec4 {
     let level = Level::of(t, level, layer);
-    let at = [0, 1, 2].map(|d| at[d].min(level.size[d] - 1));
-    level.texel(at, sample)
+    level.texel(level.nearest(at), sample)
+}
+
+/// The same of a texture of integers; signed ones come as their bits.
+#[inline]
+pub fn load_integer(t: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32) -> UVec4 {
+    let level = Level::of(t, level, layer);
+    t.format.load_integer(level.bytes(level.nearest(at), 0))
 }
 
 /// The coordinate of a texel that may lie beyond the edge ("Wrapping Operation").

@@ -8,8 +8,8 @@
 //!
 //! Two accesses to the same word race if different invocations make them, at least one writes, not
 //! both are atomic, and nothing orders them. A [`barrier`](crate::barrier) orders accesses to
-//! workgroup memory, a [`storage_barrier`](crate::storage_barrier) those to buffers and textures, both
-//! within one workgroup only. Nothing orders two workgroups of a dispatch. (SPIR-V, "Memory Model";
+//! workgroup memory, a [`storage_barrier`](crate::storage_barrier) those to buffers, both within one
+//! workgroup only. Nothing orders two workgroups of a dispatch, nor accesses to texels. (SPIR-V, "Memory Model";
 //! WGSL, "Memory Model".)
 //!
 //! Outside of a sanitized call all of this costs one load and one branch for each access.
@@ -126,10 +126,12 @@ impl Access {
 /// Which memory a word belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
-    /// Buffers and textures of a call.
+    /// Buffers of a call.
     Storage,
     /// Memory of a workgroup.
     Workgroup,
+    /// Textures of a call. No barrier orders them.
+    Texture,
 }
 
 /// An access that was made.
@@ -196,7 +198,7 @@ struct Session {
     at: UVec3,
     group: u32,
     /// Barriers that the workgroup has passed: for workgroup memory, for storage.
-    barriers: [u32; 2],
+    barriers: [u32; 3],
 }
 
 /// How many sessions there are, on any thread.
@@ -236,7 +238,7 @@ pub fn begin(mode: Mode) -> (Mode, Option<Open>) {
         memories: Vec::new(),
         at: UVec3::ZERO,
         group: 0,
-        barriers: [0; 2],
+        barriers: [0; 3],
     }));
     SESSIONS.fetch_add(1, Relaxed);
     (Mode::sanitized(order), Some(Open(())))
@@ -304,7 +306,7 @@ pub(super) fn name<T>(name: &'static str, memory: &[T], element: usize) {
 pub(super) fn begin_group(number: u32) {
     with(|session| {
         session.group = number;
-        session.barriers = [0; 2];
+        session.barriers = [0; 3];
         session.shared.clear();
     });
 }
@@ -373,7 +375,7 @@ impl Session {
     /// What is wrong with an access, which is remembered.
     fn fault(&mut self, space: Space, address: usize, made: Made) -> Option<String> {
         let words = match space {
-            Space::Storage => &mut self.storage,
+            Space::Storage | Space::Texture => &mut self.storage,
             Space::Workgroup => &mut self.shared,
         };
         let word = words.entry(address).or_default();
@@ -403,6 +405,9 @@ impl Session {
             }
             Space::Workgroup => "put a barrier() between the two",
             Space::Storage => "put a storage_barrier() between the two, or use Atomics",
+            Space::Texture => {
+                "no barrier orders texels: give each invocation its own, or use a StorageMut"
+            }
         };
         format!(
             "data race: {} {} {}, at {}, and {} {} it, at {}, in no certain order; {cure}",

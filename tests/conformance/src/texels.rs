@@ -1,0 +1,176 @@
+//! Textures of integers, storage textures that are read, and gathers from cubes.
+
+use hankel_dsl::access::{Read, ReadWrite};
+use hankel_dsl::format::{R32Float, R32Sint, R32Uint, Rgba8Sint, Rgba16Float};
+use hankel_dsl::glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec3, Vec4};
+use hankel_dsl::{
+    ComparisonSampler, DepthTextureCube, Sampler, StorageTexture2d, StorageTexture3d, Texture2d,
+    Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray, kernel,
+};
+
+/// Texels of integers, as they are: of all levels, of layers, of a volume.
+#[kernel(compute, threads(8, 8), range(61, 37), outputs(rgba32uint, rgba32sint))]
+pub fn whole(
+    #[index] at: UVec2,
+    #[texture]
+    #[levels(3)]
+    counts: Texture2d<'_, u32>,
+    #[texture]
+    #[layers(4)]
+    offsets: Texture2dArray<'_, i32>,
+    #[texture] volume: Texture3d<'_, u32>,
+) -> (UVec4, IVec4) {
+    let level = (at.x + at.y) % 3;
+    let size = counts.level_size(level);
+    let count = counts.load_level(UVec2::new(at.x % size.x, at.y % size.y), level);
+    let size = volume.size();
+    let inside = UVec3::new(at.x % size.x, at.y % size.y, (at.x ^ at.y) % size.z);
+    (count ^ volume.load(inside), offsets.load(at, at.x % 4))
+}
+
+/// Four unsigned integers that every format holds.
+#[kernel(compute, threads(8, 8), texture(rgba8uint, rgba16uint, rgba32uint))]
+pub fn counted_texels(#[index] at: UVec2) -> UVec4 {
+    UVec4::new(at.x, at.y, 255, (at.x ^ at.y) & 127)
+}
+
+/// Four signed integers that every format holds.
+#[kernel(compute, threads(8, 8), texture(rgba8sint, rgba16sint, rgba32sint))]
+pub fn signed_texels(#[index] at: UVec2) -> IVec4 {
+    let x = at.x as i32;
+    IVec4::new(x - 30, at.y as i32, -128, if x & 1 == 0 { -x } else { 127 })
+}
+
+/// Two integers.
+#[kernel(compute, threads(8, 8), texture(rg32uint))]
+pub fn pairs(#[index] at: UVec2) -> UVec2 {
+    at * UVec2::new(0x0101_0101, 3)
+}
+
+/// Two signed integers.
+#[kernel(compute, threads(8, 8), texture(rg32sint))]
+pub fn signed_pairs(#[index] at: UVec2) -> IVec2 {
+    IVec2::new(-(at.x as i32), at.y as i32 - 1000)
+}
+
+/// One signed integer.
+#[kernel(compute, threads(8, 8), texture(r32sint))]
+pub fn single(#[index] at: UVec2) -> i32 {
+    at.x as i32 - 2 * at.y as i32
+}
+
+/// Every texel halves, in place.
+#[kernel(compute, threads(8, 8), range(size))]
+pub fn fade(
+    #[index] at: UVec2,
+    #[uniform] size: &UVec2,
+    #[texture] light: StorageTexture2d<'_, R32Float, ReadWrite>,
+) {
+    let last = *size - UVec2::ONE;
+    light.store(last - at, light.load(last - at) * 0.5);
+}
+
+/// Each texel counts how many of its own bits a mask has, in place, in a volume.
+#[kernel(compute, threads(4, 4, 2), range(9, 5, 3))]
+pub fn tally(#[index] at: UVec3, #[texture] bits: StorageTexture3d<'_, R32Uint, ReadWrite>) {
+    let own = bits.load(at);
+    bits.store(at, (own & 0x0f0f_0f0f).count_ones() + (own ^ at.x));
+}
+
+/// Signed texels change their sign, in place, and those around the diagonal twice.
+#[kernel(compute, threads(8, 8), range(61, 37))]
+pub fn turn(#[index] at: UVec2, #[texture] numbers: StorageTexture2d<'_, R32Sint, ReadWrite>) {
+    numbers.store(at, !numbers.load(at));
+    if at.x == at.y {
+        let once = numbers.load(at);
+        numbers.store(at, !once);
+    }
+}
+
+/// The mean of a texel and its right neighbour, from a storage texture that is only read.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    parity(non_finite, why = "the largest halves overflow")
+)]
+pub fn blurred(
+    #[index] at: UVec2,
+    #[texture] source: StorageTexture2d<'_, Rgba16Float, Read>,
+) -> Vec4 {
+    let last = source.size().x - 1;
+    let right = if at.x < last { at.x + 1 } else { last };
+    source.load(at) * 0.5 + source.load(UVec2::new(right, at.y)) * 0.5
+}
+
+/// How far a texel of short integers is from its right neighbour.
+#[kernel(compute, threads(8, 8), texture(rgba32sint))]
+pub fn edges(
+    #[index] at: UVec2,
+    #[texture] source: StorageTexture2d<'_, Rgba8Sint, Read>,
+) -> IVec4 {
+    let last = source.size().x - 1;
+    let right = if at.x < last { at.x + 1 } else { last };
+    source.load(UVec2::new(right, at.y)) - source.load(at)
+}
+
+/// A direction to a corner between four texels of a face that has 16 on each side, away from the
+/// face's own edges.
+fn to_a_corner(at: UVec2) -> Vec3 {
+    let step = |n: u32| (n % 11) as f32 / 8.0 - 0.625;
+    let (s, t) = (step(at.x), step(at.y));
+    let major = if (at.x / 11) & 1 == 0 { 1.0 } else { -1.0 };
+    let axis = at.y / 11 % 3;
+    if axis == 0 {
+        Vec3::new(major, t, s)
+    } else if axis == 1 {
+        Vec3::new(s, major, t)
+    } else {
+        Vec3::new(t, s, major)
+    }
+}
+
+/// The third channels of the four texels around a corner on a cube's face.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn face_corners(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(16, 16)]
+    source: TextureCube<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    source.gather::<2>(sampler, to_a_corner(at))
+}
+
+/// The same of several cubes.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn faces(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(16, 16)]
+    #[layers(2)]
+    source: TextureCubeArray<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    source.gather::<0>(sampler, to_a_corner(at), (at.x + at.y) % 2)
+}
+
+/// Which of the four depths around a corner on a cube's face are behind the middle.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn faces_lit(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(16, 16)]
+    depths: DepthTextureCube<'_>,
+    #[sampler]
+    #[compare(less)]
+    sampler: ComparisonSampler,
+) -> Vec4 {
+    depths.gather_compare(sampler, to_a_corner(at), 0.5)
+}
+
+/// Samples of a texel.
+#[kernel(compute, threads(8, 8), texture(r32uint))]
+pub fn sample_count(#[index] at: UVec2, #[texture] source: Texture2dMultisampled<'_>) -> u32 {
+    source.samples() * 100 + (at.x + at.y) % source.samples()
+}
