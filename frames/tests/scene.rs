@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
-use hankel_frames::scene::{DepthRange, Geometry, Mesh, Procedural, Scene, SceneError, Shadow};
+use hankel_frames::scene::{
+    DepthRange, Fit, Geometry, Mesh, Procedural, Scene, SceneError, Shadow,
+};
 use hankel_frames::techniques::Technique;
 
 const LEAST: &str = r#"
@@ -70,6 +72,7 @@ fn every_field_is_read() {
         depth_range = "unit"
         format = "rgba16unorm"
         filter = 9
+        fit = "camera"
         moment_bias = 1e-4
         depth_bias = 0.001
         leak_cut = 0.1
@@ -93,6 +96,7 @@ fn every_field_is_read() {
             size: 512,
             map,
             filter: 9,
+            fit: Fit::Camera,
             moment_bias: 1e-4,
             depth_bias: 0.001,
             leak_cut: 0.1,

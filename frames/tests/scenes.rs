@@ -1,0 +1,55 @@
+//! The scenes in `scenes/`: each is read, drawn, and its shadow is nearer to the rays than none.
+
+use std::path::{Path, PathBuf};
+
+use hankel_frames::scene::{Fit, Scene};
+use hankel_frames::truth::{Arriving, by_technique, hard};
+
+fn files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let entries =
+        std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let paths = entries.map(|entry| entry.unwrap_or_else(|e| panic!("{e}")).path());
+    let mut files: Vec<PathBuf> = paths
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn every_scene_is_drawn_with_its_shadow() {
+    let files = files();
+    assert!(files.len() >= 10, "{files:?}");
+    for file in files {
+        let mut scene = Scene::read(&file).unwrap_or_else(|e| panic!("{e}"));
+        let mesh = scene.mesh().unwrap_or_else(|e| panic!("{e}"));
+        let name = file.file_stem().unwrap().to_string_lossy();
+        (scene.width, scene.height) = (64, 36);
+        scene.shadow.size = 512;
+        let truth = hard(&scene, &mesh, &mut |_| ());
+        let none = Arriving {
+            values: vec![1.0; truth.values.len()],
+            ..truth.clone()
+        };
+        let without = none.errors(&truth).unwrap().rms;
+        for fit in [Fit::Scene, Fit::Camera] {
+            scene.shadow.fit = fit;
+            let picture = by_technique(&scene, &mesh).unwrap_or_else(|e| panic!("{e}"));
+            let errors = picture.errors(&truth).unwrap();
+            println!(
+                "{name}, {}: {errors}; without shadow {without:.4}",
+                fit.name()
+            );
+            if name == "empty" {
+                assert!(without == 0.0 && errors.rms < 0.01, "{name}: {errors}");
+            } else {
+                assert!(without > 0.1, "{name}: {without}");
+                assert!(
+                    errors.rms < 0.6 * without,
+                    "{name}: {errors}, without {without}"
+                );
+            }
+        }
+    }
+}
