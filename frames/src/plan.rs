@@ -340,12 +340,6 @@ impl Search<'_> {
         by_technique_on(self.device, self.shaders, &scene, self.mesh)
     }
 
-    /// The lesser of two times: what else the machine did is in neither or in one.
-    fn seconds(&mut self, configuration: &Configuration) -> Result<f64> {
-        let first = self.sample(configuration)?.seconds();
-        Ok(first.min(self.sample(configuration)?.seconds()))
-    }
-
     /// Times a method with two sizes and filters.
     fn times(&mut self, of: &Configuration, choices: &Choices) -> Result<Times> {
         let ends = |all: &[u32]| {
@@ -375,7 +369,7 @@ impl Search<'_> {
                     filter: 1,
                     ..*of
                 };
-                times.plain[i] = self.seconds(&c)?;
+                times.plain[i] = self.sample(&c)?.seconds();
             }
             for (j, filter) in times.filters.into_iter().enumerate() {
                 if filter > 1 {
@@ -384,7 +378,7 @@ impl Search<'_> {
                         filter,
                         ..*of
                     };
-                    times.filtered[i][j] = self.seconds(&c)?;
+                    times.filtered[i][j] = self.sample(&c)?.seconds();
                 }
             }
         }
@@ -530,7 +524,7 @@ pub fn plan(
         return Ok(Err(Impossible {
             wanted,
             nearest: nearest.map(|(c, e)| (c.to_string(), e)),
-            rejected: why.told(wanted, None),
+            rejected: why.told(None),
         }));
     };
     let times = of_passes(&rounds[fastest]);
@@ -547,7 +541,7 @@ pub fn plan(
         times,
         bytes: chosen.bytes,
         summary: made.summary(),
-        rejected: why.told(wanted, Some((&chosen.configuration, seconds))),
+        rejected: why.told(Some(&chosen.configuration)),
         gain: gain(&configured, mesh),
         probed: why.probed,
         considered: configurations.len(),
@@ -606,7 +600,7 @@ impl Reasons {
     }
 
     /// For each method one sentence.
-    fn told(&self, wanted: Wanted, chosen: Option<(&Configuration, f64)>) -> Vec<Omission> {
+    fn told(&self, chosen: Option<&Configuration>) -> Vec<Omission> {
         let told = self.of.iter().map(|(method, reasons)| {
             let mut parts = Vec::new();
             let mut say = |count: usize, what: &str| {
@@ -638,16 +632,15 @@ impl Reasons {
                 count(|r| matches!(r, Reason::Memory)),
                 "beyond the memory budget",
             );
-            let is_chosen = chosen.is_some_and(|(c, _)| c.method() == *method);
+            let is_chosen = chosen.is_some_and(|c| c.method() == *method);
             let what = if is_chosen {
                 format!("{method} otherwise")
             } else {
                 method.clone()
             };
-            let why = format!("{} (budget {})", parts.join(", "), wanted.error);
             Omission {
                 what: what.into(),
-                why: why.into(),
+                why: parts.join(", ").into(),
             }
         });
         told.collect()

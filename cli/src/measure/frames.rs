@@ -2,7 +2,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use hankel_frames::{FrameError, Picture};
 use hankel_frames::measure::growth::growth;
 use hankel_frames::measure::{
     Ask, Choices, Configuration, Measurement, Session, Status, Subject, median, sample,
@@ -10,6 +9,7 @@ use hankel_frames::measure::{
 use hankel_frames::plan::{Wanted, plan};
 use hankel_frames::scene::Scene;
 use hankel_frames::truth::by_technique_on;
+use hankel_frames::{FrameError, Picture};
 use hankel_host::device::Device;
 use hankel_numerics::report::{
     Axis, Cell, Column, Gallery, Plot, Point, Report, Series, Style, Table, pareto_front,
