@@ -53,6 +53,9 @@ pub enum Command {
     /// Render a scene with shadows.
     #[cfg(feature = "frames")]
     Render(Render),
+    /// Find the fastest way to make a scene's shadows within an error.
+    #[cfg(feature = "frames")]
+    Plan(Plan),
     #[cfg(feature = "measure")]
     #[command(flatten)]
     Measure(crate::measure::Command),
@@ -475,6 +478,7 @@ Examples:
   hankel render scenes/hard.toml --out hard.png --backend vulkan
   hankel render scenes/scan.toml --out scan.png --compare
   hankel render scenes/hard.toml --out hard.png --errors
+  hankel render scenes/fence.toml --out fence.png --technique auto --error 0.05
 
 With --compare, OUT is the native picture; OUT-vulkan and OUT-difference are written beside it.")]
 pub struct Render {
@@ -495,6 +499,13 @@ pub struct Render {
     #[arg(long, value_name = "PERCENT", requires = "compare",
           value_parser = percentage)]
     pub limit: Option<f64>,
+    /// The technique, whatever the scene says; `auto`: the fastest within --error, as `hankel plan`
+    /// finds it for the backend, with its map's size, filter and format.
+    #[arg(long, value_name = "NAME", conflicts_with = "compare")]
+    pub technique: Option<String>,
+    /// With --technique auto: the greatest root mean square error of the light, against rays.
+    #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
+    pub error: Option<f64>,
     /// How much the difference picture is amplified.
     #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION)]
     pub amplify: u32,
@@ -503,6 +514,73 @@ pub struct Render {
     #[arg(long)]
     pub errors: bool,
     /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Ways to make shadows.
+#[cfg(feature = "frames")]
+#[derive(Debug, Args)]
+pub struct Choose {
+    /// Only this technique; several with commas between, or repeated [default: all].
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub technique: Vec<String>,
+    /// Texels along an edge of the map, 16 to 4096; several with commas between
+    /// [default: 256,512,1024,2048].
+    #[arg(long, value_name = "TEXELS", value_delimiter = ',',
+          value_parser = clap::value_parser!(u32).range(16..=4096))]
+    pub size: Vec<u32>,
+    /// Taps of the filter along an axis, odd, 1 (none) to 31; several with commas between
+    /// [default: 1,3,5,9].
+    #[arg(long, value_name = "TAPS", value_delimiter = ',', value_parser = taps)]
+    pub filter: Vec<u32>,
+    /// What the map holds: all of the scene, or what the camera sees; both with a comma between
+    /// [default: both].
+    #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
+    pub fit: Vec<Fitted>,
+}
+
+/// What a shadow map holds.
+#[cfg(feature = "frames")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Fitted {
+    /// All of the scene.
+    Scene,
+    /// What the camera sees, and its casters.
+    Camera,
+}
+
+#[cfg(feature = "frames")]
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel plan scenes/fence.toml --error 0.05
+  hankel plan scenes/fence.toml --error 0.05 --backend vulkan --time 20 --memory 30
+  hankel plan scenes/fence.toml --error 0.1 --technique hamburger,vsm --format json
+
+The error is the root mean square of the light that arrives (1 minus the shadow) against rays. The plan is
+found by probes on the backend: times of small maps, and pictures against rays through some of their pixels.
+
+Exit code 1: nothing is within the budgets.")]
+pub struct Plan {
+    /// Scene file (TOML). What it says of its shadow is not used.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// The greatest root mean square error.
+    #[arg(long, value_name = "ERROR", value_parser = budget)]
+    pub error: f64,
+    /// The greatest time of a frame in milliseconds.
+    #[arg(long, value_name = "MILLISECONDS", value_parser = positive)]
+    pub time: Option<f64>,
+    /// The most memory on the device in megabytes (10^6 bytes).
+    #[arg(long, value_name = "MEGABYTES", value_parser = positive)]
+    pub memory: Option<f64>,
+    /// Where the frame will run.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    #[command(flatten)]
+    pub choose: Choose,
+    /// How the plan is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 }
@@ -616,5 +694,32 @@ fn percentage(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if (0.0..=100.0).contains(&x) => Ok(x),
         _ => Err("give a number from 0 to 100".into()),
+    }
+}
+
+/// An odd number from 1 to 31.
+#[cfg(feature = "frames")]
+fn taps(text: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(taps) if (1..=31).contains(&taps) && taps % 2 == 1 => Ok(taps),
+        _ => Err("give an odd number from 1 to 31".into()),
+    }
+}
+
+/// An error of the light, which is from 0 to 1.
+#[cfg(feature = "frames")]
+pub fn budget(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x <= 1.0 => Ok(x),
+        _ => Err("give a number above 0, at most 1".into()),
+    }
+}
+
+/// A number above 0.
+#[cfg(feature = "frames")]
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("give a number above 0".into()),
     }
 }

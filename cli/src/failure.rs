@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 
 use hankel_codegen as codegen;
 #[cfg(feature = "frames")]
-use hankel_frames::{FrameError, scene::SceneError};
+use hankel_frames::{FrameError, measure::StoreError, scene::SceneError};
 use hankel_host::crates::CrateError;
 use hankel_host::device::DeviceError;
 use hankel_host::eval::EvalError;
@@ -229,6 +229,10 @@ impl From<FrameError> for Failure {
             FrameError::Device { source, .. } => blame_of(source),
             FrameError::Graph(_) | FrameError::NoShader { .. } => Blame::Kernel,
             FrameError::Write(error) => blame_of_output(error),
+            FrameError::Store(StoreError::Io { source, .. }) if !is_misplaced(source.kind()) => {
+                Blame::Machine
+            }
+            FrameError::Store(_) => Blame::Input,
         };
         Self::new(blame, &error, None)
     }

@@ -42,6 +42,8 @@ fn main() -> ExitCode {
         Command::Eval(a) => commands::eval::run(&a, quiet),
         #[cfg(feature = "frames")]
         Command::Render(a) => commands::render::run(&a, quiet),
+        #[cfg(feature = "frames")]
+        Command::Plan(a) => commands::plan::run(&a, quiet),
         #[cfg(feature = "measure")]
         Command::Measure(command) => measure::run(&command, quiet),
         Command::Toolchain(a) => commands::toolchain::run(&a, quiet),
@@ -75,7 +77,8 @@ fn threads() {
 
 /// Commands that are part of a Cargo feature, and the feature. Where it is there, so are they, and
 /// nobody asks.
-const LEFT_OUT: [(&str, &str); 4] = [
+const LEFT_OUT: [(&str, &str); 5] = [
+    ("plan", "frames"),
     ("render", "frames"),
     ("bench", "measure"),
     ("judge", "measure"),

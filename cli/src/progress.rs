@@ -48,6 +48,12 @@ impl Progress {
             .set_message(visible(what.trim()).chars().take(100).collect::<String>());
     }
 
+    /// Whether details are shown.
+    #[cfg(all(feature = "frames", feature = "measure"))]
+    pub fn is_seen(&self) -> bool {
+        !self.bar.is_hidden()
+    }
+
     /// `done` of `total`.
     fn position(&self, done: u64, total: Option<u64>) {
         match total {

@@ -44,6 +44,10 @@ pub const WORKER: &str = "kernel-worker";
 /// How long a crate may take to describe its kernels.
 const DESCRIBING: Duration = Duration::from_secs(60);
 
+/// SPIR-V by the names of entry points.
+#[cfg(any(feature = "frames", feature = "measure"))]
+pub type Words = BTreeMap<String, Vec<u32>>;
+
 /// A kernel crate.
 pub struct Session {
     /// What its kernels are. Only a crate that is linked into this program has native code here;
@@ -249,7 +253,7 @@ impl Session {
 
     /// SPIR-V of every entry point.
     #[cfg(any(feature = "frames", feature = "measure"))]
-    pub fn all_words(&self) -> Result<BTreeMap<String, Vec<u32>>> {
+    pub fn all_words(&self) -> Result<Words> {
         let bundle = self.bundle()?;
         let all: std::result::Result<_, _> = bundle
             .modules

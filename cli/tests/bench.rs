@@ -106,3 +106,74 @@ fn misuse_is_explained() {
         &["cannot write file", "should be a folder"],
     );
 }
+
+const SCENE: &str = "[geometry]\nprocedural = 'box'\n[camera]\neye = [3.0, 3.0, 4.0]\n\
+    target = [0.0, 0.5, 0.0]\n[light]\ndirection = [-1.0, -2.0, -0.5]\n";
+
+#[test]
+fn frames_are_measured_once() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("the folder can be written");
+    };
+    let read = |name: &str| {
+        let path = folder.path().join("report").join(name);
+        std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    };
+    write("one.toml", SCENE);
+    let line = "bench frames --scene one.toml --technique pcf --size 64,128 --filter 1,3 \
+                --output 32x18,64x36 --rounds 2 --out report";
+    let output = hankel(folder.path(), line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let page = read("frames.html");
+    for part in [
+        "<title>pcf, 64",
+        "Pareto front",
+        "frames-one-32x18-rays.png",
+        "-off.png",
+    ] {
+        assert!(page.contains(part), "no `{part}` in {page}");
+    }
+    let json: Value = serde_json::from_str(&read("frames.json")).expect("it is JSON");
+    let tables = json["tables"].as_array().expect("it has tables");
+    let rows = |id: &str| {
+        let table = tables
+            .iter()
+            .find(|t| t["id"] == id)
+            .unwrap_or_else(|| panic!("no {id}"));
+        table["rows"].as_array().expect("rows").clone()
+    };
+    // Two sizes, filters and fits, in two sizes of the picture.
+    assert_eq!(rows("configurations").len(), 16);
+    assert_eq!(read("frames-configurations.csv").lines().count(), 17);
+    // Two passes, each against texels, taps and pixels.
+    assert_eq!(rows("growth").len(), 6);
+    assert_eq!((rows("fit").len(), rows("doubling").len()), (2, 2));
+    let kept = read("measured.jsonl");
+
+    // Nothing is measured twice, and the plan is compared with what is there.
+    let output = hankel(folder.path(), &format!("{line} --error 0.000001 --quiet"));
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    assert_eq!(read("measured.jsonl"), kept);
+    assert!(read("frames-plans.csv").contains("none"));
+
+    fails(
+        folder.path(),
+        "bench frames --out report",
+        2,
+        &["no scene files in scenes/", "--scene"],
+    );
+    let line = "bench frames --scene one.toml --output 32 --out report";
+    fails(folder.path(), line, 2, &["320x180"]);
+    // The same name for something else.
+    write("one.toml", &SCENE.replace("3.0, 3.0", "3.0, 3.5"));
+    let line = "bench frames --scene one.toml --technique pcf --output 32x18 --out report";
+    fails(
+        folder.path(),
+        line,
+        2,
+        &["measured.jsonl was measured with", "another folder"],
+    );
+}

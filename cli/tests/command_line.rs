@@ -97,7 +97,9 @@ fn help_has_examples_and_exit_codes() {
         "parity",
         "eval",
         "judge",
+        "plan",
         "render",
+        "bench frames",
         "toolchain install",
     ] {
         let help = desk.hankel(&format!("{command} --help")).code(0).out();
@@ -772,6 +774,44 @@ fn a_scene_is_rendered_and_compared() {
     desk.write("bad.toml", &SCENE.replace("64", "0"));
     desk.hankel("render bad.toml --out b.png")
         .fails(2, &["bad.toml", "width"]);
+    assert!(!desk.path("b.png").exists());
+}
+
+#[test]
+fn a_scene_is_planned() {
+    let desk = Desk::new();
+    desk.write("scene.toml", SCENE);
+    let few = "--technique vsm,pcf --size 64,128 --filter 1,3 --fit camera";
+    let out = desk
+        .hankel(&format!("plan scene.toml --error 0.3 {few}"))
+        .code(0)
+        .out();
+    for part in [
+        "predicted: error 0.",
+        "fitted to what the camera sees",
+        "not pcf",
+    ] {
+        assert!(out.contains(part), "{part}: {out}");
+    }
+    let line = format!("plan scene.toml --error 0.3 --memory 0.001 {few} --format json");
+    let out = desk.hankel(&line).code(1).out();
+    assert!(out.contains("beyond the memory budget"), "{out}");
+    desk.hankel("plan scene.toml --error 0")
+        .fails(2, &["above 0"]);
+    desk.hankel("plan scene.toml --error 0.1 --technique magic")
+        .fails(2, &["no technique magic", "hamburger"]);
+    desk.hankel("plan scene.toml --error 0.1 --filter 4")
+        .fails(2, &["odd number"]);
+
+    desk.hankel("render scene.toml --out a.png --technique vsm")
+        .code(0);
+    assert!(desk.path("a.png").exists());
+    desk.hankel("render scene.toml --out b.png --technique auto")
+        .fails(2, &["belong together"]);
+    desk.hankel("render scene.toml --out b.png --technique magic")
+        .fails(2, &["no technique magic"]);
+    desk.hankel("render scene.toml --out b.png --technique auto --error 0.000001")
+        .fails(1, &["nothing has an error of at most", "nearest"]);
     assert!(!desk.path("b.png").exists());
 }
 

@@ -4,6 +4,7 @@ use hankel_host::device::DeviceError;
 use hankel_system::output::OutputError;
 
 use crate::graph::GraphError;
+use crate::measure::StoreError;
 use crate::scene::SceneError;
 
 /// Why there is no picture.
@@ -42,6 +43,9 @@ pub enum FrameError {
     /// A picture that cannot be written.
     #[error(transparent)]
     Write(#[from] OutputError),
+    /// A file of measurements.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// Pictures of different sizes.
     #[error("pictures of {left:?} and {right:?} pixels cannot be compared: render both alike")]
     Sizes {
@@ -53,7 +57,7 @@ pub enum FrameError {
 }
 
 /// [`Result`](std::result::Result) of this crate.
-pub type Result<T> = std::result::Result<T, FrameError>;
+pub type Result<T, E = FrameError> = std::result::Result<T, E>;
 
 /// A device's error with what was being done.
 pub(crate) fn during(what: &str) -> impl FnOnce(DeviceError) -> FrameError + '_ {

@@ -15,7 +15,7 @@ use crate::executor::{Clock, Executor, Memory, Progress, Run, Shaders, Timing};
 use crate::graph::{self, Graph, Handle, Summary};
 use crate::passes::Given;
 use crate::picture::{Difference, Picture};
-use crate::scene::{Camera, CameraView, LightView, Mesh, Scene};
+use crate::scene::{Camera, CameraView, Fit, LightView, Mesh, Scene};
 
 /// What is seen where nothing is: a pale sky, in linear light.
 const BACKGROUND: [f32; 3] = [0.5, 0.6, 0.72];
@@ -42,7 +42,14 @@ pub(crate) fn camera_view(scene: &Scene, camera: &Camera, mesh: &Mesh) -> Camera
 pub(crate) fn light_view(scene: &Scene, direction: Vec3, mesh: &Mesh) -> LightView {
     let shadow = &scene.shadow;
     // The filter and the sampler's interpolation stay inside of the map.
-    LightView::new(direction, mesh, shadow.size, shadow.filter / 2 + 1)
+    let margin = shadow.filter / 2 + 1;
+    match shadow.fit {
+        Fit::Scene => LightView::new(direction, mesh, shadow.size, margin),
+        Fit::Camera => {
+            let camera = camera_view(scene, &scene.camera, mesh);
+            LightView::fitted(direction, mesh, shadow.size, margin, &camera)
+        }
+    }
 }
 
 /// What a frame shows.
@@ -157,9 +164,14 @@ impl<'d> Frame<'d> {
     /// # Errors
     /// [`FrameError::Device`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        self.scene.camera = *camera;
         let view = camera_view(&self.scene, camera, self.mesh);
-        let camera = transform(view.clip_from_world);
-        self.executor.set(self.given.camera, &camera)
+        let transform = transform(view.clip_from_world);
+        self.executor.set(self.given.camera, &transform)?;
+        match self.scene.shadow.fit {
+            Fit::Scene => Ok(()),
+            Fit::Camera => self.set_light(self.scene.light),
+        }
     }
 
     /// Turns the light: `direction` is the way it goes, not zero.
@@ -167,6 +179,7 @@ impl<'d> Frame<'d> {
     /// # Errors
     /// [`FrameError::Device`].
     pub fn set_light(&mut self, direction: Vec3) -> Result<()> {
+        self.scene.light = direction;
         let view = light_view(&self.scene, direction, self.mesh);
         let uniform = light(&self.scene, &view, self.show);
         if self.show == Show::Light {

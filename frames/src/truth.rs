@@ -9,14 +9,15 @@
 //! All of it runs on this machine's processor.
 
 use hankel_dsl::glam::{DVec3, Vec3, Vec4};
-use hankel_host::device::NativeDevice;
+use hankel_host::device::{Device, NativeDevice};
 use hankel_shadows::depth::row_times_point;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{FrameError, Result};
-use crate::executor::{Clock, NoShaders, Progress, Quiet};
+use crate::executor::{Clock, NoShaders, Progress, Quiet, Shaders};
 use crate::frame::{Frame, Show, camera_view, light, light_view, transform};
 use crate::passes::gaussian;
+use crate::picture::Picture;
 use crate::scene::{Mesh, Scene};
 use crate::visibility::SAMPLES;
 use crate::visibility::cast::{Caster, Lens, Segment, in_bands};
@@ -34,7 +35,7 @@ pub struct Arriving {
 }
 
 /// How far a picture of the light is from the truth. A value of 1 is all light.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
     /// Root of the mean squared error.
     pub rms: f64,
@@ -78,6 +79,53 @@ impl Arriving {
     }
 }
 
+/// Colours of what is right, too light and too dark, in sRGB.
+const RIGHT: [u8; 3] = [255; 3];
+const TOO_LIGHT: [u8; 3] = [214, 96, 0];
+const TOO_DARK: [u8; 3] = [0, 92, 190];
+
+impl Arriving {
+    fn picture_of(&self, pixels: impl Iterator<Item = [u8; 3]>) -> Picture {
+        Picture {
+            width: self.width,
+            height: self.height,
+            pixels: pixels.collect(),
+        }
+    }
+
+    /// Light as shades of grey, evenly from 0 to 1.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
+        let grey = |v: &f32| [(v.clamp(0.0, 1.0) * 255.0).round() as u8; 3];
+        self.picture_of(self.values.iter().map(grey))
+    }
+
+    /// Where it differs from the truth: white where it does not, orange where it is too light, blue
+    /// where it is too dark; the stronger, the farther off.
+    ///
+    /// # Errors
+    /// [`FrameError::Sizes`] unless both have the same size.
+    pub fn off(&self, truth: &Self) -> Result<Picture> {
+        let sizes = [self, truth].map(|p| [p.width, p.height]);
+        if sizes[0] != sizes[1] {
+            return Err(FrameError::Sizes {
+                left: sizes[0],
+                right: sizes[1],
+            });
+        }
+        let colour = |(a, b): (&f32, &f32)| {
+            let off = (a - b).clamp(-1.0, 1.0);
+            let to = if off > 0.0 { TOO_LIGHT } else { TOO_DARK };
+            // Small errors are to be seen as well.
+            let share = off.abs().sqrt();
+            std::array::from_fn(|i| {
+                (f32::from(RIGHT[i]) * (1.0 - share) + f32::from(to[i]) * share).round() as u8
+            })
+        };
+        Ok(self.picture_of(self.values.iter().zip(&truth.values).map(colour)))
+    }
+}
+
 impl std::fmt::Display for Errors {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
@@ -93,8 +141,20 @@ impl std::fmt::Display for Errors {
 /// # Errors
 /// See [`FrameError`].
 pub fn by_technique(scene: &Scene, mesh: &Mesh) -> Result<Arriving> {
-    let mut device = NativeDevice::new();
-    let mut frame = Frame::new(&mut device, &NoShaders, scene, mesh, Show::Light)?;
+    by_technique_on(&mut NativeDevice::new(), &NoShaders, scene, mesh)
+}
+
+/// The same on a device.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn by_technique_on(
+    device: &mut dyn Device,
+    shaders: &dyn Shaders,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Result<Arriving> {
+    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Light)?;
     frame.run(Clock::Frame, &mut Quiet)?;
     Ok(Arriving {
         width: scene.width,
@@ -136,16 +196,52 @@ const GRID: u32 = 16;
 /// single-precision corners leave uncertain, many times over.
 const AWAY: f64 = 1e-5;
 
-/// The share of 256 rays through each pixel that meet nothing, or a place from which a ray reaches
-/// the light.
+/// What rays say of single pixels.
+pub struct Pixels {
+    caster: Caster,
+    lens: Lens,
+    /// To the light, as far as there may be something, and the first step of that way.
+    toward: DVec3,
+    away: DVec3,
+}
+
+impl Pixels {
+    /// For a scene's camera and light.
+    #[must_use]
+    pub fn of(scene: &Scene, mesh: &Mesh) -> Self {
+        let view = camera_view(scene, &scene.camera, mesh);
+        let diagonal = mesh.bounds().map_or(1.0, |b| f64::from(b.size().length()));
+        let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
+        Self {
+            caster: Caster::of(mesh),
+            lens: Lens::new(view.clip_from_world, scene.width, scene.height),
+            toward: toward * (2.0 * diagonal),
+            away: toward * (AWAY * diagonal),
+        }
+    }
+
+    /// The share of 256 rays through a pixel that meet nothing, or a place from which a ray reaches
+    /// the light.
+    #[must_use]
+    pub fn light(&self, pixel: [u32; 2]) -> f32 {
+        let is_lit = |i: u32| {
+            let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
+            let segment = self.lens.segment(pixel, at);
+            self.caster.first(&segment).is_none_or(|hit| {
+                let to_light = Segment::new(segment.at(hit.t) + self.away, self.toward);
+                self.caster.first(&to_light).is_none()
+            })
+        };
+        let lit = (0..GRID * GRID).filter(|i| is_lit(*i)).count();
+        lit as f32 / (GRID * GRID) as f32
+    }
+}
+
+/// [`Pixels::light`] of all pixels.
 #[must_use]
 pub fn hard(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
-    let caster = Caster::of(mesh);
+    let pixels = Pixels::of(scene, mesh);
     let (width, height) = (scene.width, scene.height);
-    let view = camera_view(scene, &scene.camera, mesh);
-    let lens = Lens::new(view.clip_from_world, width, height);
-    let diagonal = mesh.bounds().map_or(1.0, |b| f64::from(b.size().length()));
-    let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
     let mut values = vec![0.0; width as usize * height as usize];
     in_bands(
         &mut values,
@@ -153,17 +249,7 @@ pub fn hard(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arrivin
         advance,
         |y, row: &mut [f32]| {
             for (x, value) in row.iter_mut().enumerate() {
-                let mut lit = 0_u32;
-                for i in 0..GRID * GRID {
-                    let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
-                    let segment = lens.segment([x as u32, y as u32], at);
-                    lit += u32::from(caster.first(&segment).is_none_or(|hit| {
-                        let from = segment.at(hit.t) + toward * (AWAY * diagonal);
-                        let to_light = Segment::new(from, toward * (2.0 * diagonal));
-                        caster.first(&to_light).is_none()
-                    }));
-                }
-                *value = lit as f32 / (GRID * GRID) as f32;
+                *value = pixels.light([x as u32, y as u32]);
             }
         },
     );
@@ -306,6 +392,17 @@ mod tests {
         one_off[7] = 1.0;
         let errors = row(&one_off).errors(&row(&[0.0; 100])).unwrap();
         assert_eq!((errors.percentile_99, errors.worst), (0.0, 1.0));
+    }
+
+    #[test]
+    fn pictures_of_errors_tell_light_from_dark() {
+        let (light, truth) = (row(&[1.0, 0.0, 0.5]), row(&[0.0, 1.0, 0.5]));
+        assert_eq!(
+            light.off(&truth).unwrap().pixels,
+            [TOO_LIGHT, TOO_DARK, RIGHT]
+        );
+        assert_eq!(light.picture().pixels, [[255; 3], [0; 3], [128; 3]]);
+        assert!(light.off(&row(&[0.0])).is_err());
     }
 
     #[test]

@@ -7,7 +7,8 @@ use hankel_frames::scene::{CameraView, Procedural, Scene};
 use hankel_frames::techniques::Technique;
 use hankel_frames::visibility::cast::{Caster, Lens, Segment};
 use hankel_frames::{
-    FrameError, NoShaders, Picture, Progress, Quiet, Show, graph_of, render, render_on, techniques,
+    Clock, Frame, FrameError, NoShaders, Picture, Progress, Quiet, Show, graph_of, render,
+    render_on, techniques,
 };
 use hankel_host::device::{Backend, open};
 
@@ -363,4 +364,28 @@ fn a_missing_shader_is_named() {
         text.contains("light_depth") && text.contains("build the shaders"),
         "{text}"
     );
+}
+
+/// A map that is fitted to the camera's view moves with the camera, and the picture is that of a frame
+/// that was made for this camera.
+#[test]
+fn a_fitted_map_follows_the_camera() {
+    let before = scene("size = 128\nfilter = 3\nfit = 'camera'");
+    let mesh = before.mesh().unwrap_or_else(|e| panic!("{e}"));
+    let mut after = before.clone();
+    after.camera.eye = Vec3::new(-1.5, 3.0, 2.0);
+    let mut device = open(Backend::Native).unwrap();
+    let show = Show::Picture;
+    let mut frame = Frame::new(&mut *device, &NoShaders, &before, &mesh, show).unwrap();
+    frame.run(Clock::Frame, &mut Quiet).unwrap();
+    let first = frame.picture().unwrap();
+    frame.set_camera(&after.camera).unwrap();
+    let run = frame.run(Clock::Frame, &mut Quiet).unwrap();
+    assert!(run.unchanged.is_empty(), "{run:?}");
+    let moved = frame.picture().unwrap();
+    assert_ne!(first, moved);
+    drop(frame);
+    let mut fresh = Frame::new(&mut *device, &NoShaders, &after, &mesh, show).unwrap();
+    fresh.run(Clock::Frame, &mut Quiet).unwrap();
+    assert_eq!(fresh.picture().unwrap(), moved);
 }

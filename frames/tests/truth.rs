@@ -94,13 +94,13 @@ fn lower_bounds_are_nowhere_darker_than_all_samples_filtered() {
 /// The kernel does in single precision what the truth does in double precision.
 #[test]
 fn filtering_comparisons_of_all_samples_is_the_truth() {
-    for filter in [1, 5] {
-        let shadow = format!("technique = 'pcf-gaussian'\nfilter = {filter}");
+    for (filter, fit) in [(1, "scene"), (5, "scene"), (5, "camera")] {
+        let shadow = format!("technique = 'pcf-gaussian'\nfilter = {filter}\nfit = '{fit}'");
         let (scene, mesh) = scene("yard", 256, &shadow);
         let truth = filtered(&scene, &mesh, &mut |_| ());
         let errors = technique(&scene, &mesh).errors(&truth).unwrap();
         // A place is rounded to 256 * 2^-24 texels.
-        assert!(errors.worst < 1e-4, "{filter}: {errors}");
+        assert!(errors.worst < 1e-4, "{filter}, {fit}: {errors}");
     }
 }
 

@@ -56,6 +56,41 @@ fn sample() -> Report {
 }
 
 #[test]
+fn a_plot_names_its_points_where_the_pointer_rests() {
+    let mut series = Series::new("s", Style::Dots, [(1.0, 2.0), (3.0, 4.0)]);
+    series.points[1].title = "the <second>".into();
+    let plot = Plot {
+        id: "p".into(),
+        caption: "c".into(),
+        x: Axis::linear("x"),
+        y: Axis::linear("y"),
+        series: vec![series],
+    };
+    let svg = plot.svg().unwrap();
+    assert_eq!(svg.matches("<title>").count(), 1);
+    // Over the second of the discs, within the picture, before its end.
+    let (_, disc) = svg
+        .split_once("fill-opacity=\"0\"><title>the &lt;second&gt;</title>")
+        .unwrap();
+    assert!(disc.trim_end().ends_with("</svg>"));
+    let x = |circle: &str| {
+        circle
+            .split("cx=\"")
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap()
+            .to_owned()
+    };
+    let circles: Vec<String> = svg
+        .match_indices("<circle")
+        .map(|(i, _)| x(&svg[i..]))
+        .collect();
+    assert_eq!(circles[1], *circles.last().unwrap(), "{svg}");
+}
+
+#[test]
 fn text_is_for_people() {
     let text = sample().to_string();
     for part in [

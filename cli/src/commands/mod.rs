@@ -11,6 +11,8 @@ pub mod list;
 pub mod new;
 pub mod parity;
 #[cfg(feature = "frames")]
+pub mod plan;
+#[cfg(feature = "frames")]
 pub mod render;
 pub mod sanitize;
 pub mod toolchain;

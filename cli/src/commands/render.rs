@@ -2,7 +2,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hankel_frames::graph::Summary;
-use hankel_frames::scene::{Geometry, Scene};
+use hankel_frames::measure::Choices;
+use hankel_frames::plan::Wanted;
+use hankel_frames::scene::{Geometry, Scene, Shadow};
 use hankel_frames::truth::{Measured, measure};
 use hankel_frames::{Difference, Memory, Picture, Rendering, Timing, compare, render};
 use hankel_host::device::Backend;
@@ -10,10 +12,14 @@ use hankel_system::output::{self, Output};
 use serde::Serialize;
 
 use crate::args::{Format, Render};
-use crate::failure::{Outcome, Result};
+use crate::commands::plan::{of_scene, technique};
+use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
 use crate::session::Session;
+
+/// The technique that a plan chooses.
+const AUTO: &str = "auto";
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -33,7 +39,30 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
-    let scene = Scene::read(&args.scene)?;
+    let mut scene = Scene::read(&args.scene)?;
+    let is_planned = match args.technique.as_deref() {
+        Some(AUTO) => true,
+        Some(name) => {
+            let technique = technique(name)?;
+            let Shadow {
+                size, filter, fit, ..
+            } = scene.shadow;
+            scene.shadow = Shadow {
+                size,
+                filter,
+                fit,
+                ..Shadow::of(technique, technique.maps[0])
+            };
+            false
+        }
+        None => false,
+    };
+    if is_planned != args.error.is_some() {
+        return Err(Failure::input(
+            "--technique auto and --error belong together",
+            "Write --technique auto --error 0.05, or a technique's name without --error.",
+        ));
+    }
     let pictures = if args.compare {
         let (vulkan, difference) = (beside(&args.out, "vulkan"), beside(&args.out, "difference"));
         vec![args.out.clone(), vulkan, difference]
@@ -48,6 +77,27 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
     // Whether they can be written shows before the long work starts.
     let outputs = output::create_all(&places, &inputs)?;
     let session = Session::linked(quiet);
+    if let Some(error) = args.error {
+        let wanted = Wanted {
+            error,
+            seconds: None,
+            bytes: None,
+        };
+        let quiet = quiet || args.format == Format::Json;
+        let (mesh, choices) = (scene.mesh()?, Choices::default());
+        match of_scene(&scene, &mesh, &choices, wanted, args.backend, quiet)? {
+            Ok(plan) => {
+                if !quiet {
+                    say!("{plan}");
+                }
+                scene = plan.scene;
+            }
+            Err(none) => {
+                print::note(format_args!("{none}"));
+                return Ok(Outcome::CheckFailed);
+            }
+        }
+    }
     let mut progress = Progress::new(quiet || args.format == Format::Json);
     if !args.compare {
         let backend = Backend::from(args.backend);

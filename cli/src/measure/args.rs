@@ -61,6 +61,9 @@ pub struct Bench {
 pub enum BenchCommand {
     /// Bounds and their derivatives: run time, error, and how near the machine's limits they are.
     Bounds(BenchBounds),
+    /// Frames: run time against the error of their shadows, in every configuration.
+    #[cfg(feature = "frames")]
+    Frames(BenchFrames),
     /// Measure for another process, which asks on the standard input stream.
     #[command(hide = true)]
     Worker,
@@ -104,6 +107,47 @@ pub struct BenchBounds {
     /// A look in seconds: fewer rows and rounds.
     #[arg(long)]
     pub quick: bool,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[cfg(feature = "frames")]
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel bench frames --out report
+  hankel bench frames --scene scenes/fence.toml --technique hamburger,pcf --size 512 --out report
+  hankel bench frames --output 160x90,320x180,640x360 --backend vulkan --out report
+  hankel bench frames --output 320x180 --error 0.1,0.05 --out report
+
+Every technique in every format, with every map size, filter and fit, on every scene in every size of the
+picture. OUT gets frames.html, frames.json, a CSV file for each table, pictures, and measured.jsonl, to which
+each finished measurement is added at once: the same command in the same folder goes on where it was ended.
+
+Exit code 1: with --error, a plan's error is beyond it, or its time beyond 1.15 of the least.")]
+pub struct BenchFrames {
+    /// Scene file (TOML); may be repeated [default: all in the folder scenes].
+    #[arg(long, value_name = "FILE")]
+    pub scene: Vec<PathBuf>,
+    #[command(flatten)]
+    pub choose: crate::args::Choose,
+    /// Pixels of the picture; several with commas between [default: each scene's].
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_delimiter = ',', value_parser = pixels)]
+    pub output: Vec<[u32; 2]>,
+    /// Rounds in which every configuration has its turn.
+    #[arg(long, value_name = "NUMBER", value_parser = rounds, default_value_t = 5)]
+    pub rounds: usize,
+    /// Where frames are drawn.
+    #[arg(long, value_enum, default_value_t)]
+    pub backend: Backend,
+    /// Also plan each scene within this error, and compare with the fastest configuration that was
+    /// measured; several with commas between.
+    #[arg(long, value_name = "ERROR", value_delimiter = ',', value_parser = crate::args::budget)]
+    pub error: Vec<f64>,
+    /// Folder for the report.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
     /// How the report is printed.
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
@@ -179,6 +223,18 @@ fn within(least: usize, most: usize, text: &str) -> Result<usize, String> {
         Ok(_) => Err(format!("from {least} to {most}")),
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// `320x180`, each from 1 to the most that a scene may have.
+#[cfg(feature = "frames")]
+fn pixels(text: &str) -> Result<[u32; 2], String> {
+    let most = hankel_frames::scene::Scene::MAX_OUTPUT;
+    let number = |text: &str| text.parse::<u32>().ok().filter(|n| (1..=most).contains(n));
+    let both = text.split_once('x');
+    let both = both.and_then(|(width, height)| Some([number(width)?, number(height)?]));
+    both.ok_or_else(|| {
+        format!("write two numbers from 1 to {most} with an x between, as in 320x180")
+    })
 }
 
 fn rounds(text: &str) -> Result<usize, String> {

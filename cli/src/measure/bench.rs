@@ -23,6 +23,8 @@ const WORKER: [&str; 2] = ["bench", "worker"];
 pub fn run(args: &Bench, quiet: bool) -> Result<Outcome> {
     match &args.command {
         BenchCommand::Bounds(args) => bounds(args, quiet),
+        #[cfg(feature = "frames")]
+        BenchCommand::Frames(args) => super::frames::run(args, quiet),
         BenchCommand::Worker => worker(),
     }
 }

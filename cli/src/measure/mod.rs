@@ -1,9 +1,11 @@
-//! The commands that measure bounds: `judge`, `bench` and `stress`. They are the Cargo feature
+//! The commands that measure bounds and frames: `judge`, `bench` and `stress`. They are the Cargo feature
 //! `measure`, since what they measure with takes longer to compile than all else.
 
 mod args;
 mod bench;
 mod failure;
+#[cfg(feature = "frames")]
+mod frames;
 mod judge;
 mod stress;
 

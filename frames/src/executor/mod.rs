@@ -18,7 +18,7 @@ use hankel_dsl::native::describe::{Range, Stage as KernelStage};
 use hankel_dsl::native::layout::Element;
 use hankel_host::device::slots;
 use hankel_host::device::{Arithmetic, Backend, Bind, BufferId, Device, Program, TextureId};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{FrameError, Result, during};
 use crate::graph::{Argument, Call, Graph, Handle, Origin, Pass, Shape, Target, Work};
@@ -75,7 +75,7 @@ pub enum Clock {
 }
 
 /// How long a part of the frame took.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Name of the part: a pass's label, `set-up`, or `read back`.
     pub name: String,

@@ -22,6 +22,7 @@
 //! format = "rgba16unorm"          # one of those that the technique has; its first without it
 //! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1]: likewise
 //! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
+//! fit = "scene"                   # the map holds all; or "camera": what the camera sees
 //! moment_bias = 6e-5              # each map has its default
 //! depth_bias = 0.0                # each technique has its default
 //! leak_cut = 0.02
@@ -124,6 +125,29 @@ impl DepthRange {
     }
 }
 
+/// What the shadow map holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fit {
+    /// All of the scene: the map stays as it is when the camera moves.
+    #[default]
+    Scene,
+    /// What the camera sees, and what may cast shadows on it: smaller texels, other ones whenever the
+    /// camera moves.
+    Camera,
+}
+
+impl Fit {
+    /// As scene files name it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scene => "scene",
+            Self::Camera => "camera",
+        }
+    }
+}
+
 /// How shadows are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shadow {
@@ -135,6 +159,8 @@ pub struct Shadow {
     pub map: Map,
     /// Taps of the Gaussian along an axis: odd, 1 (no filter) to [`Scene::MAX_FILTER`].
     pub filter: u32,
+    /// What the map holds.
+    pub fit: Fit,
     /// What is done so that rounding cannot make moments impossible, 0 to 0.1: how far they are pulled
     /// towards those of a harmless distribution, or what [`Map::moment_bias`] says of the technique.
     pub moment_bias: f32,
@@ -159,6 +185,7 @@ impl Shadow {
             size: 1024,
             map,
             filter: 7,
+            fit: Fit::Scene,
             moment_bias: map.moment_bias,
             depth_bias: technique.depth_bias,
             leak_cut: 0.02,

@@ -17,28 +17,66 @@ pub enum Procedural {
     Yard,
     /// One box on a square of ground: the smallest scene with a shadow.
     Box,
+    /// Two picket fences on open ground, one behind the other: thin casters side by side.
+    Fence,
+    /// A tree and hedges: thousands of leaves, many of which shade one place.
+    Foliage,
+    /// Poles with wires before a wall: casters thinner than a texel.
+    Wires,
+    /// Things that touch the ground, from boxes to sheets of a few millimetres.
+    Contact,
+    /// A lattice of thin bars and some plates, high above open ground: casters far from their shadows.
+    Far,
+    /// The inside of a room with one window with bars, a table and a chair: little light in much shadow.
+    Room,
+    /// Slatted floors one above the other: places that several layers of casters shade in part.
+    Layers,
+    /// A hall of columns on a long field, seen from one end: near and far shadows in one picture.
+    Columns,
+    /// Open ground: nothing casts a shadow but on itself.
+    Empty,
 }
 
 impl Procedural {
     /// The scene's triangles.
     #[must_use]
     pub fn mesh(self) -> Mesh {
+        let mut mesh = Mesh::default();
         match self {
-            Self::Yard => yard(),
+            Self::Yard => yard(&mut mesh),
             Self::Box => {
-                let mut mesh = Mesh::default();
-                mesh.quad([
-                    Vec3::new(-2.0, 0.0, 2.0),
-                    Vec3::new(2.0, 0.0, 2.0),
-                    Vec3::new(2.0, 0.0, -2.0),
-                    Vec3::new(-2.0, 0.0, -2.0),
-                ]);
+                ground(&mut mesh, 2.0, 2.0, PAINT);
                 mesh.aligned_block(Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 1.0, 0.5));
-                mesh.paint(PAINT);
-                mesh
             }
+            Self::Fence => {
+                ground(&mut mesh, 6.0, 5.0, SOIL);
+                for z in [-1.5, 1.5] {
+                    fence(&mut mesh, Vec3::new(-5.0, 0.0, z), Vec3::new(5.0, 0.0, z));
+                }
+            }
+            Self::Foliage => foliage(&mut mesh),
+            Self::Wires => {
+                ground(&mut mesh, 8.0, 7.0, SOIL);
+                mesh.aligned_block(Vec3::new(-8.0, 0.0, -3.4), Vec3::new(8.0, 4.0, -3.0));
+                mesh.paint(PAINT);
+                poles(&mut mesh);
+            }
+            Self::Contact => contact(&mut mesh),
+            Self::Far => far(&mut mesh),
+            Self::Room => room(&mut mesh),
+            Self::Layers => layers(&mut mesh),
+            Self::Columns => columns(&mut mesh),
+            Self::Empty => ground(&mut mesh, 5.0, 5.0, SOIL),
         }
+        mesh.paint(PAINT);
+        mesh
     }
+}
+
+/// A rectangle of ground around the origin, with the given half edges.
+fn ground(mesh: &mut Mesh, x: f32, z: f32, colour: Vec3) {
+    mesh.quad([[-x, z], [x, z], [x, -z], [-x, -z]].map(|[x, z]| Vec3::new(x, 0.0, z)));
+    mesh.paint(colour);
 }
 
 /// Numbers from 0 to 1 and what is made of them.
@@ -70,12 +108,14 @@ impl Chance {
 const WOOD: Vec3 = Vec3::new(0.4, 0.27, 0.16);
 const PAINT: Vec3 = Vec3::new(0.72, 0.7, 0.66);
 const METAL: Vec3 = Vec3::new(0.3, 0.31, 0.34);
+const SOIL: Vec3 = Vec3::new(0.46, 0.43, 0.38);
+const LEAVES: Vec3 = Vec3::new(0.22, 0.38, 0.1);
+const CLAY: Vec3 = Vec3::new(0.55, 0.33, 0.2);
 
-fn yard() -> Mesh {
-    let mut mesh = Mesh::default();
+fn yard(mesh: &mut Mesh) {
     // The yard is the top of a slab; the valley lies far below it.
     mesh.aligned_block(Vec3::new(-8.0, -0.6, -6.0), Vec3::new(8.0, 0.0, 6.0));
-    mesh.paint(Vec3::new(0.46, 0.43, 0.38));
+    mesh.paint(SOIL);
     mesh.quad([
         Vec3::new(-24.0, -9.0, 14.0),
         Vec3::new(24.0, -9.0, 14.0),
@@ -88,29 +128,20 @@ fn yard() -> Mesh {
         mesh.aligned_block(low, low + Vec3::new(3.2, height, 3.2));
     }
     mesh.paint(Vec3::new(0.5, 0.42, 0.4));
-    fence(
-        &mut mesh,
-        Vec3::new(-7.8, 0.0, -5.7),
-        Vec3::new(7.8, 0.0, -5.7),
-    );
-    fence(
-        &mut mesh,
-        Vec3::new(-7.7, 0.0, 2.5),
-        Vec3::new(-7.7, 0.0, -5.5),
-    );
+    fence(mesh, Vec3::new(-7.8, 0.0, -5.7), Vec3::new(7.8, 0.0, -5.7));
+    fence(mesh, Vec3::new(-7.7, 0.0, 2.5), Vec3::new(-7.7, 0.0, -5.5));
     mesh.paint(PAINT);
-    tree(&mut mesh, Vec3::new(-4.0, 0.0, -2.2), 1);
+    tree(mesh, Vec3::new(-4.0, 0.0, -2.2), 1);
     hedge(
-        &mut mesh,
+        mesh,
         Vec3::new(2.6, 0.0, -4.7),
         Vec3::new(7.2, 0.0, -4.7),
         2,
     );
-    mesh.paint(Vec3::new(0.22, 0.38, 0.1));
-    poles(&mut mesh);
+    mesh.paint(LEAVES);
+    poles(mesh);
     mesh.paint(METAL);
-    boxes(&mut mesh);
-    mesh
+    boxes(mesh);
 }
 
 /// Pickets and two rails between two points of the ground.
@@ -228,7 +259,7 @@ fn boxes(mesh: &mut Mesh) {
         );
         height += 2.0 * side;
     }
-    mesh.paint(Vec3::new(0.55, 0.33, 0.2));
+    mesh.paint(CLAY);
     mesh.block(
         Vec3::new(5.3, 0.3, 0.6),
         turned(-0.3, Vec3::new(0.9, 0.3, 0.35)),
@@ -262,20 +293,185 @@ fn boxes(mesh: &mut Mesh) {
     mesh.paint(Vec3::new(0.6, 0.16, 0.12));
 }
 
+fn foliage(mesh: &mut Mesh) {
+    ground(mesh, 7.0, 6.0, SOIL);
+    tree(mesh, Vec3::new(-1.6, 0.0, -0.6), 3);
+    hedge(
+        mesh,
+        Vec3::new(-5.0, 0.0, -4.0),
+        Vec3::new(5.0, 0.0, -4.0),
+        4,
+    );
+    hedge(mesh, Vec3::new(1.8, 0.0, 1.2), Vec3::new(5.0, 0.0, 0.2), 5);
+    mesh.paint(LEAVES);
+}
+
+/// The yard's boxes and balls, and sheets from 20 to 2 millimetres that lie on the ground.
+fn contact(mesh: &mut Mesh) {
+    ground(mesh, 6.0, 5.0, SOIL);
+    boxes(mesh);
+    for (i, thickness) in [0.02_f32, 0.01, 0.005, 0.002].into_iter().enumerate() {
+        let low = Vec3::new(-3.6 + 0.8 * i as f32, 0.0, -0.4 + 0.3 * i as f32);
+        mesh.aligned_block(low, low + Vec3::new(0.6, thickness, 0.45));
+    }
+    mesh.paint(PAINT);
+    // A stair of low steps, each of which shades the next.
+    for i in 0..10 {
+        let low = Vec3::new(-4.6 + 0.3 * i as f32, 0.0, -3.4);
+        mesh.aligned_block(low, low + Vec3::new(0.3, 0.04 * (i + 1) as f32, 1.6));
+    }
+    mesh.paint(METAL);
+}
+
+/// A lattice 40 m above the ground, and plates at 12 m.
+fn far(mesh: &mut Mesh) {
+    ground(mesh, 6.0, 6.0, SOIL);
+    for i in 0..9 {
+        let at = -4.0 + i as f32;
+        let (x, z) = (Vec3::X * 4.4, Vec3::Z * 4.4);
+        let (across, along) = (Vec3::new(0.0, 40.0, at), Vec3::new(at, 40.0, 0.0));
+        mesh.rod(across - x, across + x, 0.05, 6);
+        mesh.rod(along - z, along + z, 0.02, 6);
+    }
+    mesh.paint(METAL);
+    for (x, z, half) in [(-2.5, 1.5, 0.5), (0.5, -1.0, 0.25), (2.5, 2.0, 0.12)] {
+        let at = Vec3::new(x, 12.0, z);
+        mesh.aligned_block(
+            at - Vec3::new(half, 0.02, half),
+            at + Vec3::new(half, 0.02, half),
+        );
+    }
+    // Something near the ground, so that shadows of both kinds meet.
+    mesh.aligned_block(Vec3::new(-0.4, 0.0, 0.6), Vec3::new(0.4, 0.8, 1.4));
+    mesh.paint(CLAY);
+}
+
+/// 6 by 5 m, 3 m high, walls 20 cm thick; the window is in the wall at negative x.
+fn room(mesh: &mut Mesh) {
+    let mut wall = |low: [f32; 3], high: [f32; 3]| {
+        mesh.aligned_block(Vec3::from_array(low), Vec3::from_array(high));
+    };
+    wall([-3.2, -0.2, -2.7], [3.2, 0.0, 2.7]);
+    wall([-3.2, 3.0, -2.7], [3.2, 3.2, 2.7]);
+    wall([3.0, 0.0, -2.7], [3.2, 3.0, 2.7]);
+    wall([-3.0, 0.0, -2.7], [3.0, 3.0, -2.5]);
+    wall([-3.0, 0.0, 2.5], [3.0, 3.0, 2.7]);
+    // Around the window: 2 m wide, 1.4 m high.
+    wall([-3.2, 0.0, -2.7], [-3.0, 0.9, 2.7]);
+    wall([-3.2, 2.3, -2.7], [-3.0, 3.0, 2.7]);
+    wall([-3.2, 0.9, -2.7], [-3.0, 2.3, -1.0]);
+    wall([-3.2, 0.9, 1.0], [-3.0, 2.3, 2.7]);
+    mesh.paint(PAINT);
+    for z in [-0.5, 0.0, 0.5] {
+        mesh.rod(Vec3::new(-3.1, 0.9, z), Vec3::new(-3.1, 2.3, z), 0.025, 8);
+    }
+    mesh.rod(
+        Vec3::new(-3.1, 1.6, -1.0),
+        Vec3::new(-3.1, 1.6, 1.0),
+        0.02,
+        8,
+    );
+    mesh.paint(METAL);
+    table(mesh, Vec3::new(-0.6, 0.0, 0.1), [0.7, 0.4], 0.75);
+    table(mesh, Vec3::new(0.7, 0.0, 0.9), [0.22, 0.22], 0.45);
+    mesh.aligned_block(Vec3::new(0.88, 0.47, 0.68), Vec3::new(0.92, 0.95, 1.12));
+    mesh.paint(WOOD);
+    mesh.sphere(Vec3::new(-0.7, 0.9, 0.0), 0.12, 16);
+    mesh.paint(CLAY);
+}
+
+/// A table on four legs; `half` are half its edges.
+fn table(mesh: &mut Mesh, foot: Vec3, [x, z]: [f32; 2], height: f32) {
+    let top = foot + Vec3::Y * height;
+    mesh.aligned_block(top - Vec3::new(x, 0.02, z), top + Vec3::new(x, 0.02, z));
+    for (sx, sz) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+        let leg = foot + Vec3::new(sx * (x - 0.05), 0.0, sz * (z - 0.05));
+        mesh.rod(leg, leg + Vec3::Y * (height - 0.02), 0.025, 8);
+    }
+}
+
+/// Four floors of slats, turned against each other, on posts.
+fn layers(mesh: &mut Mesh) {
+    ground(mesh, 6.0, 6.0, SOIL);
+    for (floor, width) in [0.16_f32, 0.1, 0.22, 0.06].into_iter().enumerate() {
+        let turn = Quat::from_rotation_y(0.4 + 0.65 * floor as f32);
+        let height = 0.6 + 0.9 * floor as f32;
+        let count = (3.6 / (2.2 * width)) as u32;
+        for i in 0..count {
+            let at = (i as f32 + 0.5) / count as f32 * 3.6 - 1.8;
+            let half = [
+                turn * Vec3::X * 1.8,
+                Vec3::Y * 0.015,
+                turn * Vec3::Z * (width * 0.5),
+            ];
+            mesh.block(turn * Vec3::Z * at + Vec3::Y * height, half);
+        }
+    }
+    mesh.paint(WOOD);
+    for (x, z) in [(-1.4, -1.4), (-1.4, 1.4), (1.4, -1.4), (1.4, 1.4)] {
+        mesh.rod(Vec3::new(x, 0.0, z), Vec3::new(x, 3.4, z), 0.05, 10);
+    }
+    mesh.paint(METAL);
+}
+
+/// Two rows of columns, 60 m long, with beams on top of them.
+fn columns(mesh: &mut Mesh) {
+    ground(mesh, 14.0, 36.0, SOIL);
+    for side in [-3.0, 3.0] {
+        for i in 0..16 {
+            let foot = Vec3::new(side, 0.0, 30.0 - 4.0 * i as f32);
+            mesh.aligned_block(
+                foot - Vec3::new(0.5, 0.0, 0.5),
+                foot + Vec3::new(0.5, 0.25, 0.5),
+            );
+            mesh.rod(foot, foot + Vec3::Y * 5.0, 0.35, 20);
+        }
+        mesh.aligned_block(
+            Vec3::new(side - 0.5, 5.0, -31.0),
+            Vec3::new(side + 0.5, 5.5, 31.0),
+        );
+    }
+    for i in 0..16 {
+        let z = 30.0 - 4.0 * i as f32;
+        mesh.aligned_block(
+            Vec3::new(-3.5, 5.5, z - 0.15),
+            Vec3::new(3.5, 5.8, z + 0.15),
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const ALL: [Procedural; 11] = [
+        Procedural::Yard,
+        Procedural::Box,
+        Procedural::Fence,
+        Procedural::Foliage,
+        Procedural::Wires,
+        Procedural::Contact,
+        Procedural::Far,
+        Procedural::Room,
+        Procedural::Layers,
+        Procedural::Columns,
+        Procedural::Empty,
+    ];
+
     #[test]
-    fn the_yard_is_large_sound_and_always_the_same() {
-        let mesh = Procedural::Yard.mesh();
-        assert_eq!(mesh, Procedural::Yard.mesh());
-        assert!(mesh.triangles.len() > 15_000, "{}", mesh.triangles.len());
-        assert_eq!(mesh.positions.len(), mesh.normals.len());
-        assert_eq!(mesh.positions.len(), mesh.colours.len());
-        assert!(mesh.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-4));
-        let mut sound = mesh.clone();
-        sound.drop_degenerate();
-        assert_eq!(sound.triangles.len(), mesh.triangles.len());
+    fn scenes_are_sound_and_always_the_same() {
+        for scene in ALL {
+            let mesh = scene.mesh();
+            assert_eq!(mesh, scene.mesh(), "{scene:?}");
+            assert_eq!(mesh.positions.len(), mesh.normals.len(), "{scene:?}");
+            assert_eq!(mesh.positions.len(), mesh.colours.len(), "{scene:?}");
+            let is_unit = |n: &Vec3| (n.length() - 1.0).abs() < 1e-4;
+            assert!(mesh.normals.iter().all(is_unit), "{scene:?}");
+            let mut sound = mesh.clone();
+            sound.drop_degenerate();
+            assert_eq!(sound.triangles.len(), mesh.triangles.len(), "{scene:?}");
+        }
+        assert!(Procedural::Yard.mesh().triangles.len() > 15_000);
+        assert_eq!(Procedural::Empty.mesh().triangles.len(), 2);
     }
 }

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
-use super::{Camera, DepthRange, FAR_OFF, Geometry, Procedural, Scene, Shadow};
+use super::{Camera, DepthRange, FAR_OFF, Fit, Geometry, Procedural, Scene, Shadow};
 use crate::techniques::{self, Map, Technique};
 
 #[derive(Deserialize)]
@@ -55,6 +55,8 @@ struct ShadowText {
     depth_range: Option<Spanned<DepthRange>>,
     format: Option<Spanned<String>>,
     filter: Option<Spanned<i64>>,
+    #[serde(default)]
+    fit: Fit,
     moment_bias: Option<Spanned<f32>>,
     depth_bias: Option<Spanned<f32>>,
     leak_cut: Option<Spanned<f32>>,
@@ -343,6 +345,7 @@ impl Reader<'_> {
         Ok(Shadow {
             size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,
             filter,
+            fit: s.fit,
             moment_bias: self.number(
                 "shadow.moment_bias",
                 s.moment_bias,

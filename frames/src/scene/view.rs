@@ -2,7 +2,7 @@
 
 use hankel_dsl::glam::camera::rh::proj::directx::perspective;
 use hankel_dsl::glam::camera::rh::view::look_at_mat4;
-use hankel_dsl::glam::{Mat4, Vec3, Vec4};
+use hankel_dsl::glam::{DVec3, DVec4, Mat4, Vec3, Vec4};
 
 use super::Camera;
 use super::mesh::Mesh;
@@ -55,30 +55,122 @@ impl CameraView {
     }
 }
 
+/// Planes that bound clip space: a point is within where its product with none is negative.
+const CLIP: [DVec4; 6] = [
+    DVec4::new(1.0, 0.0, 0.0, 1.0),
+    DVec4::new(-1.0, 0.0, 0.0, 1.0),
+    DVec4::new(0.0, 1.0, 0.0, 1.0),
+    DVec4::new(0.0, -1.0, 0.0, 1.0),
+    DVec4::new(0.0, 0.0, 1.0, 0.0),
+    DVec4::new(0.0, 0.0, -1.0, 1.0),
+];
+
+impl CameraView {
+    /// The corners of what is left of a triangle within the view: at least three, or none.
+    fn clipped(&self, corners: [Vec3; 3]) -> Vec<DVec3> {
+        let clip = self.clip_from_world.as_dmat4();
+        let mut polygon: Vec<(DVec3, DVec4)> = corners
+            .iter()
+            .map(|p| (p.as_dvec3(), clip * p.as_dvec3().extend(1.0)))
+            .collect();
+        for plane in CLIP {
+            let mut within = Vec::with_capacity(polygon.len() + 1);
+            for (i, b) in polygon.iter().enumerate() {
+                let a = &polygon[(i + polygon.len() - 1) % polygon.len()];
+                let (da, db) = (plane.dot(a.1), plane.dot(b.1));
+                if (da < 0.0) != (db < 0.0) {
+                    let t = da / (da - db);
+                    within.push((a.0.lerp(b.0, t), a.1.lerp(b.1, t)));
+                }
+                if db >= 0.0 {
+                    within.push(*b);
+                }
+            }
+            polygon = within;
+        }
+        polygon.into_iter().map(|(p, _)| p).collect()
+    }
+}
+
+/// A box along three axes, empty at first.
+#[derive(Clone, Copy)]
+struct Extent {
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+impl Extent {
+    const NONE: Self = Self {
+        low: [f64::INFINITY; 3],
+        high: [f64::NEG_INFINITY; 3],
+    };
+
+    fn of(axes: &[DVec3; 3], points: impl IntoIterator<Item = DVec3>) -> Self {
+        let mut this = Self::NONE;
+        for p in points {
+            for (i, axis) in axes.iter().enumerate() {
+                let x = p.dot(*axis);
+                this.low[i] = this.low[i].min(x);
+                this.high[i] = this.high[i].max(x);
+            }
+        }
+        this
+    }
+
+    fn and(&mut self, other: &Self) {
+        for i in 0..3 {
+            self.low[i] = self.low[i].min(other.low[i]);
+            self.high[i] = self.high[i].max(other.high[i]);
+        }
+    }
+}
+
 impl LightView {
     /// The tightest box around the mesh that goes along the light, with `margin` texels of a map
     /// of `size` texels left free at each side for the filter.
     #[must_use]
     pub fn new(direction: Vec3, mesh: &Mesh, size: u32, margin: u32) -> Self {
-        let direction = direction.normalize();
-        // Texel rows along the world's axes where that can be: edges of buildings alias less.
-        let reference = if direction.y.abs() < 0.99 {
-            Vec3::Y
-        } else {
-            Vec3::Z
-        };
-        let right = direction.cross(reference).normalize();
-        let up = right.cross(direction);
-        let axes = [right, up, direction].map(|a| a.as_dvec3());
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for p in &mesh.positions {
-            for (i, axis) in axes.iter().enumerate() {
-                let x = p.as_dvec3().dot(*axis);
-                low[i] = low[i].min(x);
-                high[i] = high[i].max(x);
+        let axes = axes(direction);
+        let points = mesh.positions.iter().map(|p| p.as_dvec3());
+        Self::of(axes, Extent::of(&axes, points), size, margin)
+    }
+
+    /// The same around what a camera sees of the mesh, be it hidden or not. Towards the light the box
+    /// goes as far as what may cast shadows into it. Without anything that the camera sees, as
+    /// [`LightView::new`].
+    #[must_use]
+    pub fn fitted(
+        direction: Vec3,
+        mesh: &Mesh,
+        size: u32,
+        margin: u32,
+        camera: &CameraView,
+    ) -> Self {
+        let axes = axes(direction);
+        let mut seen = Extent::NONE;
+        for t in 0..mesh.triangles.len() {
+            seen.and(&Extent::of(&axes, camera.clipped(mesh.corners(t))));
+        }
+        if seen.low[0] > seen.high[0] {
+            return Self::new(direction, mesh, size, margin);
+        }
+        // With the filter's margin.
+        let free = f64::from(margin) / f64::from(size);
+        let reach = [0, 1].map(|i| (seen.high[i] - seen.low[i]) * (0.5 + 2.0 * free));
+        let middle = [0, 1].map(|i| 0.5 * (seen.high[i] + seen.low[i]));
+        for t in 0..mesh.triangles.len() {
+            let caster = Extent::of(&axes, mesh.corners(t).map(Vec3::as_dvec3));
+            let overlaps = |i: usize| {
+                caster.low[i] <= middle[i] + reach[i] && caster.high[i] >= middle[i] - reach[i]
+            };
+            if overlaps(0) && overlaps(1) {
+                seen.low[2] = seen.low[2].min(caster.low[2]);
             }
         }
+        Self::of(axes, seen, size, margin)
+    }
+
+    fn of(axes: [DVec3; 3], Extent { low, high }: Extent, size: u32, margin: u32) -> Self {
         // No extent, none to divide by; f32 coordinates tell nothing below their own step.
         let largest = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
         let at_least = f64::max(largest * 1e-3, f64::MIN_POSITIVE);
@@ -101,11 +193,25 @@ impl LightView {
         }
         Self {
             clip_from_world: Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose(),
-            direction,
+            direction: axes[2].as_vec3(),
             depth: extent[2] as f32,
             texel: [0, 1].map(|i| (extent[i] / f64::from(size)) as f32),
         }
     }
+}
+
+/// To the right in the map, up in it, and the way the light goes.
+fn axes(direction: Vec3) -> [DVec3; 3] {
+    let direction = direction.normalize();
+    // Texel rows along the world's axes where that can be: edges of buildings alias less.
+    let reference = if direction.y.abs() < 0.99 {
+        Vec3::Y
+    } else {
+        Vec3::Z
+    };
+    let right = direction.cross(reference).normalize();
+    let up = right.cross(direction);
+    [right, up, direction].map(|a| a.as_dvec3())
 }
 
 #[cfg(test)]
@@ -152,5 +258,61 @@ mod tests {
             let z = view.clip_from_world.project_point3(*p).z;
             assert!(z > 0.0 && z < 1.0, "{z}");
         }
+    }
+
+    #[test]
+    fn a_fitted_light_sees_what_the_camera_sees_and_its_casters() {
+        let mesh = Procedural::Columns.mesh();
+        let camera = Camera {
+            eye: Vec3::new(1.6, 4.0, 22.0),
+            target: Vec3::new(-0.6, 0.0, 13.0),
+            up: Vec3::Y,
+            fov: 20.0,
+        };
+        let view = CameraView::new(&camera, &mesh, 1.5);
+        let direction = Vec3::new(0.7, -0.6, -0.35);
+        let (whole, fitted) = (
+            LightView::new(direction, &mesh, 256, 4),
+            LightView::fitted(direction, &mesh, 256, 4, &view),
+        );
+        assert!(fitted.texel[0] * fitted.texel[1] < 0.5 * whole.texel[0] * whole.texel[1]);
+        assert!(fitted.depth <= whole.depth);
+        let lens = crate::visibility::cast::Lens::new(view.clip_from_world, 48, 32);
+        let caster = crate::visibility::cast::Caster::of(&mesh);
+        let mut seen = 0;
+        for i in 0..48 * 32 {
+            let segment = lens.segment([i % 48, i / 48], [0.5, 0.5]);
+            let Some(hit) = caster.first(&segment) else {
+                continue;
+            };
+            seen += 1;
+            let place = segment.at(hit.t).as_vec3();
+            let clip = fitted.clip_from_world.project_point3(place);
+            let inner = 1.0 - 8.0 / 256.0 + 1e-4;
+            assert!(
+                clip.x.abs() < inner && clip.y.abs() < inner,
+                "{place} {clip}"
+            );
+            assert!(clip.z > 0.0 && clip.z < 1.0, "{place} {clip}");
+            // What shades it lies within as well.
+            let toward = -direction.as_dvec3() * 100.0;
+            let away = segment.at(hit.t) + toward * 1e-6;
+            let to_light = crate::visibility::cast::Segment::new(away, toward);
+            if let Some(hit) = caster.first(&to_light) {
+                let clip = fitted
+                    .clip_from_world
+                    .project_point3(to_light.at(hit.t).as_vec3());
+                assert!(clip.z > 0.0, "{place} {clip}");
+            }
+        }
+        assert!(seen > 800, "{seen}");
+        // A camera that sees nothing.
+        let away = Camera {
+            eye: Vec3::new(1.6, 10.0, 22.0),
+            target: Vec3::new(1.6, 60.0, 23.0),
+            ..camera
+        };
+        let view = CameraView::new(&away, &mesh, 1.5);
+        assert_eq!(LightView::fitted(direction, &mesh, 256, 4, &view), whole);
     }
 }

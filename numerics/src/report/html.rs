@@ -17,6 +17,9 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .7rem; border-bottom: 1px solid #ddd; white-space: nowrap; text-align: right; }
 th.text, td.text { text-align: left; white-space: normal; }
 svg { max-width: 100%; height: auto; }
+.gallery { display: grid; grid-template-columns: repeat(auto-fill, minmax(20rem, 1fr)); gap: 1rem; }
+.gallery figure { margin: 0; }
+img { width: 100%; image-rendering: pixelated; border: 1px solid #ddd; }
 ";
 
 /// A page; `drawn` are the report's plots as SVG.
@@ -53,6 +56,19 @@ pub(super) fn page(report: &Report, drawn: &[String]) -> String {
             escape(&plot.id),
             escape(&plot.caption)
         ));
+    }
+    for gallery in &report.galleries {
+        line(format_args!(
+            "<figure>\n<figcaption>{}</figcaption>\n<div class=\"gallery\">",
+            escape(&gallery.caption)
+        ));
+        for (what, file) in &gallery.pictures {
+            let (what, file) = (escape(what), escape(file));
+            line(format_args!(
+                "<figure><img src=\"{file}\" alt=\"{what}\" loading=\"lazy\"><figcaption>{what}</figcaption></figure>"
+            ));
+        }
+        line(format_args!("</div>\n</figure>"));
     }
     for table in &report.tables {
         line(format_args!("{}", figure(table)));
@@ -93,7 +109,7 @@ fn figure(table: &Table) -> String {
     )
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

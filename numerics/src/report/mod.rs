@@ -2,7 +2,7 @@
 //!
 //! A [`Report`] is plain data. It is printed as text ([`Display`](std::fmt::Display)), written as
 //! JSON, one CSV file for each table, one SVG file for each plot, and one HTML page that needs
-//! nothing besides itself ([`Report::write`]).
+//! nothing besides itself, but for pictures ([`Report::write`]).
 
 mod html;
 mod pareto;
@@ -34,6 +34,18 @@ pub struct Report {
     pub tables: Vec<Table>,
     /// Some of them drawn.
     pub plots: Vec<Plot>,
+    /// Pictures in files beside the page.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub galleries: Vec<Gallery>,
+}
+
+/// Pictures to be looked at together. Their files are written by whoever makes the report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gallery {
+    /// What they show.
+    pub caption: String,
+    /// What each shows, and its file, relative to the page.
+    pub pictures: Vec<(String, String)>,
 }
 
 /// Points in a plane.
@@ -115,6 +127,7 @@ impl Series {
                     x,
                     y,
                     label: String::new(),
+                    title: String::new(),
                 })
                 .collect(),
         }
@@ -145,6 +158,9 @@ pub struct Point {
     /// Written next to it, if not empty.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub label: String,
+    /// Shown while the pointer rests on it, if not empty.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub title: String,
 }
 
 impl Report {
@@ -168,7 +184,7 @@ impl Report {
         self.tables.iter().find(|t| t.id == id)
     }
 
-    /// Appends another report's facts (those that are not there yet), notes, tables and plots.
+    /// Appends another report's facts (those that are not there yet), notes, tables, plots and pictures.
     pub fn append(&mut self, other: Self) {
         for fact in other.facts {
             if !self.facts.contains(&fact) {
@@ -178,6 +194,7 @@ impl Report {
         self.notes.extend(other.notes);
         self.tables.extend(other.tables);
         self.plots.extend(other.plots);
+        self.galleries.extend(other.galleries);
     }
 }
 

@@ -6,6 +6,7 @@ use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
+use super::html::escape;
 use super::{Axis, Plot, Point, Scale, Style};
 
 /// Why a plot was not drawn.
@@ -35,7 +36,9 @@ const COLOURS: [RGBColor; 8] = [
 ];
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+/// Where points with a title lie, and their titles.
+type Titles = Vec<((i32, i32), String)>;
+type Drawn = Result<Titles, DrawingAreaErrorKind<std::io::Error>>;
 
 impl Plot {
     /// The plot as a stand-alone SVG element, without a font: the viewer's own sans-serif is used.
@@ -61,10 +64,21 @@ impl Plot {
             }
         };
         drop(root);
-        drawn.map_err(|error| PlotError {
+        let titles = drawn.map_err(|error| PlotError {
             plot: self.id.clone(),
             problem: error.to_string(),
         })?;
+        // Nothing is seen of the discs but what viewers show when the pointer rests on them.
+        if let Some(end) = text.rfind("</svg>") {
+            let discs: String = titles
+                .iter()
+                .map(|((x, y), title)| {
+                    let title = escape(title);
+                    format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"7\" fill-opacity=\"0\"><title>{title}</title></circle>\n")
+                })
+                .collect();
+            text.insert_str(end, &discs);
+        }
         Ok(text)
     }
 
@@ -107,7 +121,16 @@ impl Plot {
             .label_style(("sans-serif", 14))
             .axis_desc_style(("sans-serif", 15))
             .draw()?;
+        let mut titles = Titles::new();
         for (i, series) in self.series.iter().enumerate() {
+            let titled = series
+                .points
+                .iter()
+                .filter(|p| !p.title.is_empty() && p.x.is_finite() && p.y.is_finite());
+            titles.extend(titled.map(|p| {
+                let at = (p.x.max(across.start), p.y.max(up.start));
+                (chart.backend_coord(&at), p.title.clone())
+            }));
             let colour = colour_of(i, series.style);
             let points: Vec<(f64, f64, &str)> = series
                 .points
@@ -158,7 +181,8 @@ impl Plot {
             let font = ("sans-serif", 14).into_font();
             legend.draw(&Text::new(series.name.clone(), (32, y - 8), font))?;
         }
-        root.present()
+        root.present()?;
+        Ok(titles)
     }
 }
 

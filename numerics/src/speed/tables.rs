@@ -475,6 +475,7 @@ impl Speed {
                     _ => "",
                 };
                 Point {
+                    title: String::new(),
                     x,
                     y,
                     label: format!("n={} {}{compensated} {}", e.n, e.precision, t.path),

@@ -1,0 +1,206 @@
+//! Run time against error: the ways to make a scene's shadows, each measured.
+//!
+//! [`Session`] measures every configuration of every scene: its light against [`truth::hard`], and its
+//! passes in rounds in which every configuration has its turn. What is finished is kept in a file, so a
+//! session that was ended goes on where it was. [`growth`] says how times grow.
+
+pub mod growth;
+mod session;
+mod store;
+
+use std::fmt;
+
+use hankel_host::device::Device;
+
+use crate::error::Result;
+use crate::executor::{Clock, Quiet, Shaders, Timing};
+use crate::frame::{Frame, Show};
+use crate::scene::{Fit, Mesh, Scene, Shadow};
+use crate::techniques::{self, Map, Technique};
+#[cfg(doc)]
+use crate::truth;
+
+pub use session::{Ask, Measurement, Session, Status, Subject};
+pub use store::StoreError;
+
+/// A way to make a scene's shadows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Configuration {
+    /// From depths to shadow.
+    pub technique: &'static Technique,
+    /// How its map is stored.
+    pub map: Map,
+    /// Texels along an edge of the map.
+    pub size: u32,
+    /// Taps of the filter along an axis.
+    pub filter: u32,
+    /// What the map holds.
+    pub fit: Fit,
+}
+
+impl Configuration {
+    /// The technique and its map, without sizes.
+    #[must_use]
+    pub fn method(&self) -> String {
+        let (format, range) = (self.map.format.name(), self.map.depth_range.name());
+        let mut name = self.technique.name.to_owned();
+        let of_format = |m: &&Map| m.format == self.map.format;
+        // Named only where there is a choice.
+        if self.technique.maps.len() > 1 {
+            name = format!("{name} {format}");
+        }
+        if self.technique.maps.iter().filter(of_format).count() > 1 {
+            name = format!("{name} {range}");
+        }
+        name
+    }
+
+    /// A scene with these shadows. What else the scene says of them, biases for example, was for
+    /// another technique: it is as the technique has it.
+    #[must_use]
+    pub fn on(&self, scene: &Scene) -> Scene {
+        Scene {
+            shadow: Shadow {
+                size: self.size,
+                filter: self.filter,
+                fit: self.fit,
+                ..Shadow::of(self.technique, self.map)
+            },
+            ..scene.clone()
+        }
+    }
+}
+
+impl fmt::Display for Configuration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {}², ", self.method(), self.size)?;
+        match self.filter {
+            1 => f.write_str("no filter")?,
+            taps => write!(f, "{taps} taps")?,
+        }
+        match self.fit {
+            Fit::Scene => Ok(()),
+            Fit::Camera => f.write_str(", fitted"),
+        }
+    }
+}
+
+/// What configurations are made of: every combination is one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choices {
+    /// Each with all its maps.
+    pub techniques: Vec<&'static Technique>,
+    /// Texels along an edge of the map.
+    pub sizes: Vec<u32>,
+    /// Taps along an axis.
+    pub filters: Vec<u32>,
+    /// What the map holds.
+    pub fits: Vec<Fit>,
+}
+
+impl Default for Choices {
+    /// All techniques, from 256² to 2048² texels, up to 9 x 9 taps, maps of the whole scene and fitted
+    /// ones.
+    fn default() -> Self {
+        Self {
+            techniques: techniques::ALL.to_vec(),
+            sizes: vec![256, 512, 1024, 2048],
+            filters: vec![1, 3, 5, 9],
+            fits: vec![Fit::Scene, Fit::Camera],
+        }
+    }
+}
+
+impl Choices {
+    /// All of them.
+    #[must_use]
+    pub fn configurations(&self) -> Vec<Configuration> {
+        let mut all = Vec::new();
+        for &technique in &self.techniques {
+            for &map in technique.maps {
+                for &size in &self.sizes {
+                    for &filter in &self.filters {
+                        for &fit in &self.fits {
+                            all.push(Configuration {
+                                technique,
+                                map,
+                                size,
+                                filter,
+                                fit,
+                            });
+                        }
+                    }
+                }
+            }
+        }
+        all
+    }
+}
+
+/// What a frame took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// Its passes, in order.
+    pub passes: Vec<Timing>,
+    /// Bytes on the device.
+    pub bytes: usize,
+}
+
+impl Sample {
+    /// All passes together.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.passes.iter().map(|p| p.seconds).sum()
+    }
+}
+
+/// The time of a frame whose passes all run, after one in which they have run already: the driver has
+/// compiled its shaders, and what is made once is there.
+///
+/// # Errors
+/// See [`crate::FrameError`].
+pub fn sample(
+    device: &mut dyn Device,
+    shaders: &dyn Shaders,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Result<Sample> {
+    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Picture)?;
+    frame.run(Clock::Frame, &mut Quiet)?;
+    let passes = frame.executor().steady(1)?;
+    Ok(Sample {
+        passes,
+        bytes: frame.executor().memory().bytes,
+    })
+}
+
+/// The middle of an odd number of values, the lower one of the two of an even number; 0 of none.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len().saturating_sub(1) / 2;
+    values.get(middle).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn names_tell_configurations_apart() {
+        let all = Choices::default().configurations();
+        let names: BTreeSet<String> = all.iter().map(ToString::to_string).collect();
+        assert_eq!(names.len(), all.len());
+        assert!(names.contains("hamburger rgba16unorm symmetric, 512², 3 taps, fitted"));
+        assert!(names.contains("pcf, 2048², no filter"));
+    }
+
+    #[test]
+    fn a_median_is_one_of_the_values() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.0);
+        assert_eq!(median(Vec::new()), 0.0);
+    }
+}

@@ -1,0 +1,353 @@
+//! Measuring many configurations, in a way that can be interrupted.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use hankel_host::device::Device;
+
+use super::store::{Line, Store, StoreError};
+use super::{Configuration, median, sample};
+use crate::error::Result;
+use crate::executor::{Shaders, Timing};
+use crate::scene::{Mesh, Scene};
+use crate::truth::{Arriving, Errors, by_technique_on, hard};
+
+/// A scene in one size of the picture.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The scene's name.
+    pub name: String,
+    /// What there is. Its shadow is not used.
+    pub scene: Scene,
+    /// Its triangles.
+    pub mesh: Mesh,
+}
+
+impl Subject {
+    /// Its name and size, which tell it from others of a session.
+    #[must_use]
+    pub fn key(&self) -> String {
+        format!("{} {}x{}", self.name, self.scene.width, self.scene.height)
+    }
+
+    /// What it holds, as a number (FNV-1a) that is another for another content.
+    fn fingerprint(&self) -> u64 {
+        let (camera, light) = (&self.scene.camera, self.scene.light);
+        let view = format!("{camera:?} {light:?}");
+        let mesh: &Mesh = &self.mesh;
+        let parts: [&[u8]; 3] = [
+            view.as_bytes(),
+            bytemuck::cast_slice(&mesh.positions),
+            bytemuck::cast_slice(mesh.indices()),
+        ];
+        let bytes = parts.into_iter().flatten();
+        bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
+}
+
+/// What is measured of each subject.
+#[derive(Clone, Debug)]
+pub struct Ask {
+    /// Each of them.
+    pub configurations: Vec<Configuration>,
+    /// How often each one's time is taken.
+    pub rounds: usize,
+}
+
+/// A measured configuration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measurement {
+    /// The scene's name.
+    pub scene: String,
+    /// Pixels of the picture.
+    pub output: [u32; 2],
+    /// What was measured.
+    pub configuration: Configuration,
+    /// Against [`crate::truth::hard`].
+    pub errors: Errors,
+    /// On the device.
+    pub bytes: usize,
+    /// The times of the passes in each round.
+    pub rounds: Vec<Vec<Timing>>,
+}
+
+impl Measurement {
+    /// The median over the rounds of all passes together.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        let whole = |passes: &Vec<Timing>| passes.iter().map(|p| p.seconds).sum();
+        median(self.rounds.iter().map(whole).collect())
+    }
+
+    /// The passes, in order, each with the median of its times.
+    #[must_use]
+    pub fn passes(&self) -> Vec<Timing> {
+        let names = self.rounds.first().into_iter().flatten().enumerate();
+        let of = |(i, first): (usize, &Timing)| Timing {
+            name: first.name.clone(),
+            seconds: median(self.rounds.iter().map(|r| r[i].seconds).collect()),
+        };
+        names.map(of).collect()
+    }
+}
+
+/// A kind of step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Truth,
+    Errors,
+    Round,
+}
+
+/// How far a session is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// What was done last.
+    pub what: String,
+    /// Steps that are done, those of an earlier process included.
+    pub done: usize,
+    /// All steps.
+    pub steps: usize,
+    /// How long the rest will take if it goes on like this; `None` before anything was done.
+    pub remaining: Option<Duration>,
+}
+
+/// Steps of each kind: how many there are, how many are done, and how long those of this process took.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    steps: usize,
+    done: usize,
+    timed: usize,
+    seconds: f64,
+}
+
+/// A file of measurements, and what is added to it.
+pub struct Session {
+    store: Store,
+    conditions: HashMap<String, String>,
+    truths: HashMap<String, Vec<f32>>,
+    errors: HashMap<(String, String), (Errors, usize)>,
+    rounds: HashMap<(String, String), Vec<Vec<Timing>>>,
+    tallies: [Tally; 3],
+}
+
+impl Session {
+    /// Opens a file of measurements, or makes it. `conditions` are names and values that must be the
+    /// same whenever something is added: the device, for example.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn open(file: &Path, conditions: &[(&str, String)]) -> Result<Self, StoreError> {
+        let (store, lines) = Store::open(file)?;
+        let mut this = Self {
+            store,
+            conditions: HashMap::new(),
+            truths: HashMap::new(),
+            errors: HashMap::new(),
+            rounds: HashMap::new(),
+            tallies: [Tally::default(); 3],
+        };
+        for line in lines {
+            this.learn(line);
+        }
+        for (name, value) in conditions {
+            this.require(name, value)?;
+        }
+        Ok(this)
+    }
+
+    fn learn(&mut self, line: Line) {
+        match line {
+            Line::Conditions { name, value } => {
+                self.conditions.insert(name, value);
+            }
+            Line::Truth { subject, values } => {
+                self.truths.insert(subject, values);
+            }
+            Line::Errors {
+                subject,
+                configuration,
+                errors,
+                bytes,
+            } => {
+                self.errors
+                    .insert((subject, configuration), (errors, bytes));
+            }
+            Line::Round {
+                subject,
+                configuration,
+                passes,
+            } => {
+                let of = self.rounds.entry((subject, configuration));
+                of.or_default().push(passes);
+            }
+        }
+    }
+
+    fn add(&mut self, line: Line) -> Result<(), StoreError> {
+        self.store.add(&line)?;
+        self.learn(line);
+        Ok(())
+    }
+
+    fn require(&mut self, name: &str, value: &str) -> Result<(), StoreError> {
+        match self.conditions.get(name) {
+            Some(was) if was == value => Ok(()),
+            Some(was) => Err(StoreError::Other {
+                file: self.store.path().to_path_buf(),
+                was: format!("{name} {was}"),
+                is: value.to_owned(),
+            }),
+            None => self.add(Line::Conditions {
+                name: name.to_owned(),
+                value: value.to_owned(),
+            }),
+        }
+    }
+
+    /// The light of a subject's pixels by rays, if it was measured.
+    #[must_use]
+    pub fn truth(&self, subject: &Subject) -> Option<Arriving> {
+        self.truths.get(&subject.key()).map(|values| Arriving {
+            width: subject.scene.width,
+            height: subject.scene.height,
+            values: values.clone(),
+        })
+    }
+
+    /// Says which subjects will be measured, for [`Status::remaining`].
+    pub fn expect(&mut self, subjects: &[Subject], ask: &Ask) {
+        self.tallies = [Tally::default(); 3];
+        for subject in subjects {
+            let key = subject.key();
+            let truth = usize::from(self.truths.contains_key(&key));
+            self.count(Kind::Truth, 1, truth);
+            for configuration in &ask.configurations {
+                let both = (key.clone(), configuration.to_string());
+                let known = usize::from(self.errors.contains_key(&both));
+                self.count(Kind::Errors, 1, known);
+                let rounds = self.rounds.get(&both).map_or(0, Vec::len);
+                self.count(Kind::Round, ask.rounds, rounds.min(ask.rounds));
+            }
+        }
+    }
+
+    const fn count(&mut self, kind: Kind, steps: usize, done: usize) {
+        let tally = &mut self.tallies[kind as usize];
+        tally.steps += steps;
+        tally.done += done;
+    }
+
+    fn finished(&mut self, kind: Kind, start: Instant, what: String) -> Status {
+        let tally = &mut self.tallies[kind as usize];
+        tally.done += 1;
+        tally.timed += 1;
+        tally.seconds += start.elapsed().as_secs_f64();
+        Status {
+            what,
+            done: self.tallies.iter().map(|t| t.done).sum(),
+            steps: self.tallies.iter().map(|t| t.steps).sum(),
+            remaining: self.remaining(),
+        }
+    }
+
+    /// Steps of a kind that has not been timed yet count as those of all kinds.
+    fn remaining(&self) -> Option<Duration> {
+        let timed: usize = self.tallies.iter().map(|t| t.timed).sum();
+        let seconds: f64 = self.tallies.iter().map(|t| t.seconds).sum();
+        let rest = self.tallies.iter().map(|t| {
+            let mean = match t.timed {
+                0 => seconds / timed as f64,
+                timed => t.seconds / timed as f64,
+            };
+            mean * t.steps.saturating_sub(t.done) as f64
+        });
+        (timed > 0).then(|| Duration::from_secs_f64(rest.sum()))
+    }
+
+    /// Measures what of a subject is not known yet, and gives all that was asked for. In each round
+    /// every configuration has its turn, in the order of the one before turned round.
+    ///
+    /// # Errors
+    /// [`crate::FrameError`]. What was measured until then is kept.
+    pub fn measure(
+        &mut self,
+        device: &mut dyn Device,
+        shaders: &dyn Shaders,
+        subject: &Subject,
+        ask: &Ask,
+        status: &mut dyn FnMut(&Status),
+    ) -> Result<Vec<Measurement>> {
+        let (scene, mesh, key) = (&subject.scene, &subject.mesh, subject.key());
+        let content = format!("{:016x}", subject.fingerprint());
+        self.require(&format!("the content of {key}:"), &content)?;
+        let truth = match self.truth(subject) {
+            Some(truth) => truth,
+            None => {
+                let start = Instant::now();
+                let truth = hard(scene, mesh, &mut |_| ());
+                self.add(Line::Truth {
+                    subject: key.clone(),
+                    values: truth.values.clone(),
+                })?;
+                status(&self.finished(Kind::Truth, start, format!("{key}: light by rays")));
+                truth
+            }
+        };
+        let name_of = |c: &Configuration| (key.clone(), c.to_string());
+        for configuration in &ask.configurations {
+            let (subject, name) = name_of(configuration);
+            if self.errors.contains_key(&(subject.clone(), name.clone())) {
+                continue;
+            }
+            let start = Instant::now();
+            let configured = configuration.on(scene);
+            let errors = by_technique_on(device, shaders, &configured, mesh)?.errors(&truth)?;
+            let bytes = sample(device, shaders, &configured, mesh)?.bytes;
+            let what = format!("{key}: errors of {name}");
+            self.add(Line::Errors {
+                subject,
+                configuration: name,
+                errors,
+                bytes,
+            })?;
+            status(&self.finished(Kind::Errors, start, what));
+        }
+        let mut order: Vec<&Configuration> = ask.configurations.iter().collect();
+        for round in 0..ask.rounds {
+            order.reverse();
+            for configuration in &order {
+                let both = name_of(configuration);
+                if self.rounds.get(&both).is_some_and(|r| r.len() > round) {
+                    continue;
+                }
+                let start = Instant::now();
+                let passes = sample(device, shaders, &configuration.on(scene), mesh)?.passes;
+                let (subject, configuration) = both;
+                let what = format!("{key}, round {}: {configuration}", round + 1);
+                self.add(Line::Round {
+                    subject,
+                    configuration,
+                    passes,
+                })?;
+                status(&self.finished(Kind::Round, start, what));
+            }
+        }
+        let known = ask.configurations.iter().filter_map(|configuration| {
+            let both = name_of(configuration);
+            let (errors, bytes) = *self.errors.get(&both)?;
+            Some(Measurement {
+                scene: subject.name.clone(),
+                output: [scene.width, scene.height],
+                configuration: *configuration,
+                errors,
+                bytes,
+                rounds: self.rounds.get(&both)?.clone(),
+            })
+        });
+        Ok(known.collect())
+    }
+}
