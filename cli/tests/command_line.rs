@@ -35,6 +35,8 @@ impl Desk {
         let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
             .args(line.split_whitespace())
             .current_dir(self.0.path())
+            // What this repository has compiled for the DSL serves here, too.
+            .env("CARGO_TARGET_DIR", root().join("target"))
             // No compiler, wherever the test runs.
             .env("HANKEL_CACHE", self.path("no-cache"))
             .env_remove("HANKEL_TOOLCHAIN")
@@ -843,7 +845,7 @@ fn a_new_crate_builds_at_once() {
     let test = Command::new("cargo")
         .args(["test", "--release"])
         .current_dir(&path)
-        .env("CARGO_TARGET_DIR", desk.path("target"))
+        .env("CARGO_TARGET_DIR", root().join("target"))
         .output()
         .expect("cargo starts");
     assert!(
