@@ -175,7 +175,7 @@ const FORMS: &[Form] = &[
     form(Vec4, &[Vec2, Vec2], "Vec4::new({0}.x, {1}.y, {0}.y, {1}.x)"),
     form(UVec3, &[U32, U32, U32], "UVec3::new({0}, {1}, {2})"),
     form(UVec3, &[UVec3, UVec3], "({0} ^ {1})"),
-    form(UVec3, &[UVec3], "({0} >> 3)"),
+    form(UVec3, &[UVec3], "({0} >> 3_u32)"),
 ];
 
 /// An expression.
@@ -230,8 +230,9 @@ pub enum Stmt {
     Array(u32, [Expr; 4]),
     SetElement(u32, Expr, Expr),
     If(Expr, Vec<Stmt>, Vec<Stmt>),
-    /// By the lowest bits of a number.
-    Match(Expr, Vec<Vec<Stmt>>),
+    /// One of the blocks, by a number; the variable gets which. (Arms without a value of their own can
+    /// become one block, which rust-gpu 0.10 refuses: `tests/upstream/rust-gpu-equal-arms`.)
+    Match(u32, Expr, Vec<Vec<Stmt>>),
     /// So many rounds; the variable counts them.
     Loop(Style, u32, u32, Vec<Stmt>),
     /// Within a loop.
@@ -307,7 +308,7 @@ pub fn expressions(statement: &Stmt) -> Vec<&Expr> {
         Stmt::Let(_, e)
         | Stmt::Assign(_, e)
         | Stmt::If(e, ..)
-        | Stmt::Match(e, _)
+        | Stmt::Match(_, e, _)
         | Stmt::BreakIf(e)
         | Stmt::ContinueIf(e)
         | Stmt::Store(_, e)
@@ -324,7 +325,7 @@ pub fn expressions_mut(statement: &mut Stmt) -> Vec<&mut Expr> {
         Stmt::Let(_, e)
         | Stmt::Assign(_, e)
         | Stmt::If(e, ..)
-        | Stmt::Match(e, _)
+        | Stmt::Match(_, e, _)
         | Stmt::BreakIf(e)
         | Stmt::ContinueIf(e)
         | Stmt::Store(_, e)
@@ -339,7 +340,7 @@ pub fn expressions_mut(statement: &mut Stmt) -> Vec<&mut Expr> {
 pub fn blocks(statement: &Stmt) -> Vec<&Vec<Stmt>> {
     match statement {
         Stmt::If(_, a, b) => vec![a, b],
-        Stmt::Match(_, all) => all.iter().collect(),
+        Stmt::Match(_, _, all) => all.iter().collect(),
         Stmt::Loop(.., body) => vec![body],
         _ => Vec::new(),
     }
@@ -349,7 +350,7 @@ pub fn blocks(statement: &Stmt) -> Vec<&Vec<Stmt>> {
 pub fn blocks_mut(statement: &mut Stmt) -> Vec<&mut Vec<Stmt>> {
     match statement {
         Stmt::If(_, a, b) => vec![a, b],
-        Stmt::Match(_, all) => all.iter_mut().collect(),
+        Stmt::Match(_, _, all) => all.iter_mut().collect(),
         Stmt::Loop(.., body) => vec![body],
         _ => Vec::new(),
     }
@@ -512,7 +513,9 @@ impl Maker {
                             self.block(count, depth - 1)
                         })
                         .collect();
-                    Stmt::Match(number, arms)
+                    let id = self.fresh();
+                    self.variables.push((U32, id));
+                    Stmt::Match(id, number, arms)
                 }
                 15..=16 if depth > 0 => {
                     let style = self.chance.pick(&[Style::For, Style::While, Style::Loop]);
@@ -577,6 +580,11 @@ impl Maker {
             return Expr::Variable(U32, self.chance.pick(&counters));
         }
         if depth == 0 {
+            let inputs = |form: &&'static Form| form.result == ty && form.operands.is_empty();
+            let inputs: Vec<&'static Form> = FORMS.iter().filter(inputs).collect();
+            if !self.inside && !inputs.is_empty() && self.chance.count(0, 3) > 0 {
+                return Expr::Form(self.chance.pick(&inputs), Vec::new());
+            }
             return Expr::Literal(ty, self.chance.bits() as u32);
         }
         let arrays: Vec<(Ty, u32)> = self.arrays.iter().copied().filter(|v| v.0 == ty).collect();
@@ -601,7 +609,7 @@ impl Maker {
                 && !(self.inside && outside)
         };
         let forms: Vec<&'static Form> = FORMS.iter().filter(fits).collect();
-        if forms.is_empty() || self.chance.count(0, 9) == 0 {
+        if forms.is_empty() || self.chance.count(0, 15) == 0 {
             return Expr::Literal(ty, self.chance.bits() as u32);
         }
         let form = self.chance.pick(&forms);

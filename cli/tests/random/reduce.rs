@@ -147,7 +147,7 @@ fn unwrap(block: &mut Vec<Stmt>, number: &mut usize, wanted: usize, unwrapped: &
                 *unwrapped = true;
                 kept.extend(inner);
             }
-            Stmt::Match(_, arms) if own == wanted => {
+            Stmt::Match(_, _, arms) if own == wanted => {
                 *unwrapped = true;
                 kept.extend(arms.into_iter().flatten());
             }
@@ -172,7 +172,7 @@ fn leaves(statement: &Stmt) -> bool {
     };
     match statement {
         Stmt::If(_, a, b) => within(a) || within(b),
-        Stmt::Match(_, arms) => arms.iter().any(within),
+        Stmt::Match(_, _, arms) => arms.iter().any(within),
         _ => false,
     }
 }
@@ -221,8 +221,11 @@ fn settle(block: &mut Vec<Stmt>, known: &mut Vec<u32>) {
             known.truncate(outside);
         }
         known.truncate(before);
-        if let Stmt::Let(id, _) | Stmt::Array(id, _) | Stmt::Store(id, _) | Stmt::Exchange(id, ..) =
-            statement
+        if let Stmt::Let(id, _)
+        | Stmt::Array(id, _)
+        | Stmt::Match(id, ..)
+        | Stmt::Store(id, _)
+        | Stmt::Exchange(id, ..) = statement
         {
             known.push(*id);
         }

@@ -252,21 +252,19 @@ impl Writer {
                 }
                 self.line("}");
             }
-            Stmt::Match(number, arms) => {
-                self.line(&format!("match {} % {} {{", expr(number), arms.len()));
+            Stmt::Match(id, number, arms) => {
+                let count = arms.len();
+                self.line(&format!("let mut v{id}: u32 = match {} % {count} {{", expr(number)));
                 for (n, arm) in arms.iter().enumerate() {
-                    let pattern = if n + 1 == arms.len() {
-                        "_".into()
-                    } else {
-                        n.to_string()
-                    };
+                    let pattern = if n + 1 == count { "_".into() } else { n.to_string() };
                     self.line(&format!("    {pattern} => {{"));
                     self.depth += 1;
                     self.inner(arm);
+                    self.line(&format!("    {}", 7 * n + 3));
                     self.depth -= 1;
                     self.line("    }");
                 }
-                self.line("}");
+                self.line("};");
             }
             Stmt::Loop(style, id, rounds, body) => {
                 match style {

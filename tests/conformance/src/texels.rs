@@ -20,7 +20,7 @@ pub fn whole(
     offsets: Texture2dArray<'_, i32>,
     #[texture] volume: Texture3d<'_, u32>,
 ) -> (UVec4, IVec4) {
-    let level = (at.x + at.y) % 3;
+    let level = at.y % 3;
     let size = counts.level_size(level);
     let count = counts.load_level(UVec2::new(at.x % size.x, at.y % size.y), level);
     let size = volume.size();
