@@ -503,9 +503,12 @@ pub struct Render {
     /// finds it for the backend, with its map's size, filter and format.
     #[arg(long, value_name = "NAME", conflicts_with = "compare")]
     pub technique: Option<String>,
-    /// With --technique auto: the greatest root mean square error of the light, against rays.
+    /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
+    /// --filter and --fit are what is chosen from.
     #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
+    #[command(flatten)]
+    pub maps: Maps,
     /// How much the difference picture is amplified.
     #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION)]
     pub amplify: u32,
@@ -525,6 +528,14 @@ pub struct Choose {
     /// Only this technique; several with commas between, or repeated [default: all].
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub technique: Vec<String>,
+    #[command(flatten)]
+    pub maps: Maps,
+}
+
+/// Shadow maps to choose from.
+#[cfg(feature = "frames")]
+#[derive(Debug, Args)]
+pub struct Maps {
     /// Texels along an edge of the map, 16 to 4096; several with commas between
     /// [default: 256,512,1024,2048].
     #[arg(long, value_name = "TEXELS", value_delimiter = ',',

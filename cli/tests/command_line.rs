@@ -812,9 +812,23 @@ fn a_scene_is_planned() {
         .fails(2, &["belong together"]);
     desk.hankel("render scene.toml --out b.png --technique magic")
         .fails(2, &["no technique magic"]);
-    desk.hankel("render scene.toml --out b.png --technique auto --error 0.000001")
-        .fails(1, &["nothing has an error of at most", "nearest"]);
+    desk.hankel("render scene.toml --out b.png --size 64")
+        .fails(2, &["belong"]);
+    let auto = "--technique auto --size 64 --filter 1 --fit camera";
+    desk.hankel(&format!(
+        "render scene.toml --out b.png {auto} --error 0.000001"
+    ))
+    .fails(1, &["nothing has an error of at most", "nearest"]);
     assert!(!desk.path("b.png").exists());
+    let out = desk
+        .hankel(&format!("render scene.toml --out b.png {auto} --error 0.3"))
+        .code(0)
+        .out();
+    assert!(
+        out.contains("predicted: error 0.") && out.contains("1. depth"),
+        "{out}"
+    );
+    assert!(desk.path("b.png").exists());
 }
 
 /// A crate of one's own, outside of the repository, through the plug-in.

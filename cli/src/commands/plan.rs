@@ -4,7 +4,7 @@ use hankel_frames::scene::{Fit, Mesh, Scene};
 use hankel_frames::techniques::{self, Technique};
 use hankel_host::device::{self, Device};
 
-use crate::args::{Backend, Choose, Fitted, Format, Plan as Args};
+use crate::args::{Backend, Choose, Fitted, Format, Maps, Plan as Args};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
@@ -76,11 +76,23 @@ pub fn technique(name: &str) -> Result<&'static Technique> {
 
 /// What was chosen, and what there is of the rest.
 pub fn choices(args: &Choose) -> Result<Choices> {
-    let mut choices = Choices::default();
+    let mut choices = of_maps(&args.maps);
     if !args.technique.is_empty() {
         let named: Result<Vec<_>> = args.technique.iter().map(|name| technique(name)).collect();
         choices.techniques = named?;
     }
+    let mut seen = Vec::new();
+    choices.techniques.retain(|t| {
+        let is_new = !seen.contains(&t.name);
+        seen.push(t.name);
+        is_new
+    });
+    Ok(choices)
+}
+
+/// The maps that were chosen, with all techniques.
+pub fn of_maps(args: &Maps) -> Choices {
+    let mut choices = Choices::default();
     let sorted = |mut all: Vec<u32>| {
         all.sort_unstable();
         all.dedup();
@@ -102,11 +114,5 @@ pub fn choices(args: &Choose) -> Result<Choices> {
         };
         choices.fits.retain(chosen);
     }
-    let mut seen = Vec::new();
-    choices.techniques.retain(|t| {
-        let is_new = !seen.contains(&t.name);
-        seen.push(t.name);
-        is_new
-    });
-    Ok(choices)
+    choices
 }

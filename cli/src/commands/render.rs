@@ -2,7 +2,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hankel_frames::graph::Summary;
-use hankel_frames::measure::Choices;
 use hankel_frames::plan::Wanted;
 use hankel_frames::scene::{Geometry, Scene, Shadow};
 use hankel_frames::truth::{Measured, measure};
@@ -11,8 +10,8 @@ use hankel_host::device::Backend;
 use hankel_system::output::{self, Output};
 use serde::Serialize;
 
-use crate::args::{Format, Render};
-use crate::commands::plan::{of_scene, technique};
+use crate::args::{Format, Maps, Render};
+use crate::commands::plan::{of_maps, of_scene, technique};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
@@ -57,10 +56,12 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         }
         None => false,
     };
-    if is_planned != args.error.is_some() {
+    let Maps { size, filter, fit } = &args.maps;
+    let has_maps = !(size.is_empty() && filter.is_empty() && fit.is_empty());
+    if is_planned != args.error.is_some() || (has_maps && !is_planned) {
         return Err(Failure::input(
-            "--technique auto and --error belong together",
-            "Write --technique auto --error 0.05, or a technique's name without --error.",
+            "--technique auto and --error belong together, and --size, --filter and --fit to them",
+            "Write --technique auto --error 0.05, or a technique's name; the scene file has the rest.",
         ));
     }
     let pictures = if args.compare {
@@ -84,7 +85,7 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
             bytes: None,
         };
         let quiet = quiet || args.format == Format::Json;
-        let (mesh, choices) = (scene.mesh()?, Choices::default());
+        let (mesh, choices) = (scene.mesh()?, of_maps(&args.maps));
         match of_scene(&scene, &mesh, &choices, wanted, args.backend, quiet)? {
             Ok(plan) => {
                 if !quiet {
