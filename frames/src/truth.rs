@@ -2,6 +2,8 @@
 //!
 //! - [`hard`] knows no map: 256 rays through each pixel, and one from each place that they meet
 //!   towards the light.
+//! - [`area`] is the same for a light that is not a point: each of the 256 rays goes towards another
+//!   point of the light.
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
@@ -106,10 +108,10 @@ pub fn by_technique(scene: &Scene, mesh: &Mesh) -> Result<Arriving> {
 /// A technique's errors on a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// Against [`hard`]: what an observer would say.
+    /// Against [`hard`], or [`area`] if the light is not a point: what an observer would say.
     pub rays: Errors,
-    /// Against [`filtered`]: what the reconstruction adds.
-    pub filtered: Errors,
+    /// Against [`filtered`]: what the reconstruction adds. Only for a light that is a point.
+    pub filtered: Option<Errors>,
 }
 
 /// Measures the scene's technique.
@@ -119,13 +121,15 @@ pub struct Measured {
 pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Result<Measured> {
     progress.begin("light by the technique", 1, 3);
     let picture = by_technique(scene, mesh)?;
+    let is_point = scene.area.radius == 0.0;
     progress.begin("light by all samples", 2, 3);
-    let soft = filtered(scene, mesh, &mut |share| progress.advance(share));
+    let soft = is_point.then(|| filtered(scene, mesh, &mut |share| progress.advance(share)));
     progress.begin("light by rays", 3, 3);
-    let sharp = hard(scene, mesh, &mut |share| progress.advance(share));
+    let by_rays = if is_point { hard } else { area };
+    let sharp = by_rays(scene, mesh, &mut |share| progress.advance(share));
     Ok(Measured {
         rays: picture.errors(&sharp)?,
-        filtered: picture.errors(&soft)?,
+        filtered: soft.map(|soft| picture.errors(&soft)).transpose()?,
     })
 }
 
@@ -140,12 +144,55 @@ const AWAY: f64 = 1e-5;
 /// the light.
 #[must_use]
 pub fn hard(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
+    let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
+    by_rays(scene, mesh, advance, |_, _| toward)
+}
+
+/// The same for the light's area: each of the 256 rays through a pixel goes on towards another point
+/// of the light, so that the pixel's value is the visible share of the light, and the pixel's own
+/// average, at once. The points are a Hammersley set, moved in each pixel by another amount.
+#[must_use]
+pub fn area(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
+    let view = light_view(scene, scene.light, mesh);
+    let clip = view.clip_from_world;
+    let axes = [0, 1].map(|i| clip.row(i).truncate().as_dvec3().normalize_or_zero());
+    let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
+    let radius = f64::from(scene.area.radius);
+    by_rays(scene, mesh, advance, |[x, y], i| {
+        let [right, up] = scene.area.point(light_sample([x, y], i));
+        toward + (axes[0] * right + axes[1] * up) * radius
+    })
+}
+
+/// A point of the unit square for ray `i` of a pixel. Rays that are neighbours in the pixel have
+/// points far from each other.
+fn light_sample([x, y]: [u32; 2], i: u32) -> [f64; 2] {
+    const RAYS: u32 = GRID * GRID;
+    // Any odd factor permutes the numbers below a power of two.
+    let j = (i * 167 + 91) % RAYS;
+    let reversed = j.reverse_bits() >> (32 - RAYS.trailing_zeros());
+    let mut hash = (y << 16 | x).wrapping_mul(0x9e37_79b9);
+    let mut shift = || {
+        hash = (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d);
+        hash ^= hash >> 12;
+        f64::from(hash) / f64::from(u32::MAX)
+    };
+    [j, reversed].map(|k| ((f64::from(k) + 0.5) / f64::from(RAYS) + shift()).fract())
+}
+
+/// The share of the rays through each pixel from whose places a ray as `toward` says, for the pixel
+/// and the number of the ray, meets nothing.
+fn by_rays(
+    scene: &Scene,
+    mesh: &Mesh,
+    advance: &mut dyn FnMut(f32),
+    toward: impl Fn([u32; 2], u32) -> DVec3 + Sync,
+) -> Arriving {
     let caster = Caster::of(mesh);
     let (width, height) = (scene.width, scene.height);
     let view = camera_view(scene, &scene.camera, mesh);
     let lens = Lens::new(view.clip_from_world, width, height);
     let diagonal = mesh.bounds().map_or(1.0, |b| f64::from(b.size().length()));
-    let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
     let mut values = vec![0.0; width as usize * height as usize];
     in_bands(
         &mut values,
@@ -157,6 +204,7 @@ pub fn hard(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arrivin
                 for i in 0..GRID * GRID {
                     let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
                     let segment = lens.segment([x as u32, y as u32], at);
+                    let toward = toward([x as u32, y as u32], i);
                     lit += u32::from(caster.first(&segment).is_none_or(|hit| {
                         let from = segment.at(hit.t) + toward * (AWAY * diagonal);
                         let to_light = Segment::new(from, toward * (2.0 * diagonal));
@@ -306,6 +354,35 @@ mod tests {
         one_off[7] = 1.0;
         let errors = row(&one_off).errors(&row(&[0.0; 100])).unwrap();
         assert_eq!((errors.percentile_99, errors.worst), (0.0, 1.0));
+    }
+
+    /// The share of a light on one side of a line through it, from each pixel.
+    #[test]
+    fn rays_reach_all_of_the_light_alike() {
+        use crate::scene::{Area, AreaShape};
+        for shape in [AreaShape::Disc, AreaShape::Square] {
+            let area = Area { radius: 1.0, shape };
+            for (edge, turn) in [(-0.7_f64, 0.0_f64), (0.0, 0.3), (0.45, 0.8), (0.9, 2.1)] {
+                let beyond = match shape {
+                    AreaShape::Disc => {
+                        (edge.acos() - edge * (1.0 - edge * edge).sqrt()) / std::f64::consts::PI
+                    }
+                    AreaShape::Square if turn == 0.0 => (1.0 - edge) / 2.0,
+                    AreaShape::Square => continue,
+                };
+                for pixel in [[0, 0], [1, 0], [17, 940]] {
+                    let points = (0..GRID * GRID).map(|i| area.point(light_sample(pixel, i)));
+                    let count = points
+                        .filter(|[x, y]| x * turn.cos() + y * turn.sin() > edge)
+                        .count();
+                    let share = count as f64 / f64::from(GRID * GRID);
+                    assert!(
+                        (share - beyond).abs() < 0.02,
+                        "{shape:?} {edge}: {share} {beyond}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
-use hankel_frames::scene::{DepthRange, Geometry, Mesh, Procedural, Scene, SceneError, Shadow};
+use hankel_frames::scene::{
+    Area, AreaShape, DepthRange, Geometry, Mesh, Procedural, Scene, SceneError, Shadow,
+};
 use hankel_frames::techniques::Technique;
 
 const LEAST: &str = r#"
@@ -64,12 +66,15 @@ fn every_field_is_read() {
         fov = 55.5
         [light]
         direction = [0.0, -3.0, 0.0]
+        radius = 0.05
+        shape = "square"
         [shadow]
         technique = "hausdorff"
         size = 512
         depth_range = "unit"
         format = "rgba16unorm"
         filter = 9
+        samples = [16, 24]
         moment_bias = 1e-4
         depth_bias = 0.001
         leak_cut = 0.1
@@ -83,6 +88,8 @@ fn every_field_is_read() {
     assert_eq!(scene.geometry, Geometry::Model { file, ground: 2.5 });
     assert_eq!(scene.camera.up, Vec3::Z);
     assert_eq!(scene.light, Vec3::NEG_Y);
+    let (radius, shape) = (0.05, AreaShape::Square);
+    assert_eq!(scene.area, Area { radius, shape });
     let map = POWER_MOMENTS[1];
     let stored = (map.format.name(), map.depth_range);
     assert_eq!(stored, ("rgba16unorm", DepthRange::Unit));
@@ -93,6 +100,7 @@ fn every_field_is_read() {
             size: 512,
             map,
             filter: 9,
+            samples: [16, 24],
             moment_bias: 1e-4,
             depth_bias: 0.001,
             leak_cut: 0.1,
@@ -125,6 +133,22 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             with("[shadow]\nfilter = 33"),
             &["`shadow.filter` is 33", "1 to 31"],
+        ),
+        (
+            with("[shadow]\nsamples = [32, 0]"),
+            &["scene.toml:10:16", "`shadow.samples` is 0", "1 to 1024"],
+        ),
+        (
+            with("[shadow]\nsamples = [32]"),
+            &["scene.toml:10:11", "shadow.samples"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nradius = -0.1"),
+            &["`light.radius` is -0.1", "0 to 1"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nshape = 'star'"),
+            &["light.shape", "star", "disc", "square"],
         ),
         (
             with("[shadow]\nmoment_bias = nan"),
