@@ -6,8 +6,10 @@ use std::time::Instant;
 use hankel_dsl::glam::{Mat4, Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_host::device::{self, Backend, Device};
+use hankel_moments::FixedPoint;
 use hankel_shadows::depth::Transform;
 use hankel_shadows::shade::Light;
+use hankel_shadows::soft::{Area, MOST_REACH};
 use serde::Serialize;
 
 use crate::error::{FrameError, Result};
@@ -85,6 +87,27 @@ pub(crate) fn light(scene: &Scene, view: &LightView, show: Show) -> Light {
     }
 }
 
+/// Steepness, depth over width, of the steepest surface that must not shade itself in a soft shadow.
+const STEEPEST: f32 = 2.0;
+/// The same for a region that is compared as a whole: of a steeper one, less than half is in front of its
+/// own middle, and moments bound little of that. More would lose what is in contact.
+const MARGIN: f32 = 0.5;
+
+/// The light's area as the kernels of soft shadows take it.
+pub(crate) fn area(scene: &Scene, view: &LightView) -> Area {
+    let radius = scene.area.radius;
+    let spread = view.texel.map(|texel| radius * view.depth / texel);
+    // Texels of the largest rectangle that is read of a table, which is a texel wide at least.
+    let [x, y] = spread.map(|s| 2 * s.clamp(0.5, MOST_REACH).ceil() as u32);
+    Area {
+        spread: spread.into(),
+        slack: (STEEPEST * radius).min(0.5),
+        margin: (MARGIN * radius).min(0.5),
+        one: FixedPoint::for_kernel(x * y).one,
+        padding: 0,
+    }
+}
+
 /// The graph of a scene's frame: what its technique starts from, and the picture, in linear light.
 ///
 /// # Errors
@@ -116,6 +139,8 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         light_view: graph.parameter("light's view", &transform(view.clip_from_world)),
         camera: graph.parameter("camera", &transform(camera.clip_from_world)),
         light: graph.parameter("light", &light(scene, &view, show)),
+        area: graph.parameter("light's area", &area(scene, &view)),
+        source: scene.area,
         shadow: scene.shadow,
         size: [scene.width, scene.height],
         format,
@@ -187,6 +212,8 @@ impl<'d> Frame<'d> {
             self.executor.set_buffer(self.given.normals, &normals)?;
         }
         self.executor.set(self.given.light, &uniform)?;
+        let area = area(&self.scene, &view);
+        self.executor.set(self.given.area, &area)?;
         let transform = transform(view.clip_from_world);
         self.executor.set(self.given.light_view, &transform)
     }

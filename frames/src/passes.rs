@@ -8,9 +8,10 @@ use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_shadows::blur::Direction;
 use hankel_shadows::shade::encoding;
+use hankel_shadows::soft::Lines;
 
 use crate::graph::{AddCompute, AddDraw, Graph, Handle, Result, Shape, Surfaces};
-use crate::scene::{DepthRange, Shadow};
+use crate::scene::{Area, DepthRange, Shadow};
 use crate::techniques::Map;
 
 /// How maps are looked up.
@@ -33,6 +34,10 @@ pub struct Given {
     pub camera: Handle,
     /// How the light shines and its map is read, [`hankel_shadows::shade::Light`].
     pub light: Handle,
+    /// How large it is, [`hankel_shadows::soft::Area`].
+    pub area: Handle,
+    /// The light's outline.
+    pub source: Area,
     /// What the scene asks for.
     pub shadow: Shadow,
     /// Pixels of the picture.
@@ -171,6 +176,42 @@ pub fn blur(graph: &mut Graph, given: &Given, map: Handle) -> Result<Handle> {
             .image([shape.size[0], shape.size[1]])?;
     }
     Ok(map)
+}
+
+/// The summed-area table of each texel's mean moments: `resolve` makes elements of depths, `sum` adds them up
+/// along lines.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn summed_area(
+    graph: &mut Graph,
+    given: &Given,
+    depth: Handle,
+    resolve: &'static str,
+    sum: &'static str,
+) -> Result<Handle> {
+    graph.omit("blur", "the filter's width differs from pixel to pixel");
+    graph.omit("mips", "the table has regions of all sizes");
+    let size = given.shadow.size;
+    let mut table = graph
+        .compute("resolve", resolve)
+        .arg("area", given.area)
+        .arg("depth", depth)
+        .elements(size as usize * size as usize)?;
+    for (label, step, between) in [("sum rows", 1, size), ("sum columns", size, 1)] {
+        let lines = Lines {
+            invocations: 64 * size,
+            length: size,
+            step,
+            between,
+        };
+        let lines = graph.constant("lines", &lines);
+        let pass = graph.compute(label, sum);
+        let summed = pass.arg("lines", lines).arg("table", table).finish()?;
+        // The kernel writes its table.
+        table = summed.changed("table").unwrap_or(table);
+    }
+    Ok(table)
 }
 
 /// The picture by a fragment kernel over `world`, `normal` and `colour`; `bind` gives it the map.

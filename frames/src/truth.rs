@@ -1,7 +1,7 @@
 //! How wrong a shadow is: pictures of the light that arrives, by a technique and by rays.
 //!
-//! - [`hard`] knows no map: 256 rays through each pixel, and one from each place that they meet
-//!   towards the light.
+//! - [`by_rays`] knows no map: 256 rays through each pixel, and one from each place that they meet
+//!   towards the light; each towards another point of it if the light has an area.
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
@@ -18,7 +18,7 @@ use crate::executor::{Clock, NoShaders, Progress, Quiet, Shaders};
 use crate::frame::{Frame, Show, camera_view, light, light_view, transform};
 use crate::passes::gaussian;
 use crate::picture::Picture;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Area, Mesh, Scene};
 use crate::visibility::SAMPLES;
 use crate::visibility::cast::{Caster, Lens, Segment, in_bands};
 use crate::visibility::fragments::{Fragments, Varying};
@@ -166,10 +166,10 @@ pub fn by_technique_on(
 /// A technique's errors on a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// Against [`hard`]: what an observer would say.
+    /// Against [`by_rays`]: what an observer would say.
     pub rays: Errors,
-    /// Against [`filtered`]: what the reconstruction adds.
-    pub filtered: Errors,
+    /// Against [`filtered`]: what the reconstruction adds. Only for a light that is a point.
+    pub filtered: Option<Errors>,
 }
 
 /// Measures the scene's technique.
@@ -179,13 +179,14 @@ pub struct Measured {
 pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Result<Measured> {
     progress.begin("light by the technique", 1, 3);
     let picture = by_technique(scene, mesh)?;
+    let is_point = scene.area.radius == 0.0;
     progress.begin("light by all samples", 2, 3);
-    let soft = filtered(scene, mesh, &mut |share| progress.advance(share));
+    let soft = is_point.then(|| filtered(scene, mesh, &mut |share| progress.advance(share)));
     progress.begin("light by rays", 3, 3);
-    let sharp = hard(scene, mesh, &mut |share| progress.advance(share));
+    let sharp = by_rays(scene, mesh, &mut |share| progress.advance(share));
     Ok(Measured {
         rays: picture.errors(&sharp)?,
-        filtered: picture.errors(&soft)?,
+        filtered: soft.map(|soft| picture.errors(&soft)).transpose()?,
     })
 }
 
@@ -200,9 +201,13 @@ const AWAY: f64 = 1e-5;
 pub struct Pixels {
     caster: Caster,
     lens: Lens,
-    /// To the light, as far as there may be something, and the first step of that way.
+    /// Length of the scene's diagonal.
+    diagonal: f64,
+    /// Towards the middle of the light.
     toward: DVec3,
-    away: DVec3,
+    /// From there to the middle of its edge, along x and y of the shadow map; nothing for a point.
+    axes: [DVec3; 2],
+    area: Area,
 }
 
 impl Pixels {
@@ -210,36 +215,67 @@ impl Pixels {
     #[must_use]
     pub fn of(scene: &Scene, mesh: &Mesh) -> Self {
         let view = camera_view(scene, &scene.camera, mesh);
-        let diagonal = mesh.bounds().map_or(1.0, |b| f64::from(b.size().length()));
-        let toward = -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y);
+        let clip = light_view(scene, scene.light, mesh).clip_from_world;
+        let radius = f64::from(scene.area.radius);
         Self {
             caster: Caster::of(mesh),
             lens: Lens::new(view.clip_from_world, scene.width, scene.height),
-            toward: toward * (2.0 * diagonal),
-            away: toward * (AWAY * diagonal),
+            diagonal: mesh.bounds().map_or(1.0, |b| f64::from(b.size().length())),
+            toward: -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y),
+            axes: [0, 1].map(|i| clip.row(i).truncate().as_dvec3().normalize_or_zero() * radius),
+            area: scene.area,
         }
     }
 
     /// The share of 256 rays through a pixel that meet nothing, or a place from which a ray reaches
-    /// the light.
+    /// the light. If the light has an area, each goes on towards another point of it, so that the
+    /// pixel's value is the visible share of the light, and the pixel's own average, at once. The
+    /// points are a Hammersley set, moved in each pixel by another amount.
     #[must_use]
     pub fn light(&self, pixel: [u32; 2]) -> f32 {
         let is_lit = |i: u32| {
             let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
             let segment = self.lens.segment(pixel, at);
             self.caster.first(&segment).is_none_or(|hit| {
-                let to_light = Segment::new(segment.at(hit.t) + self.away, self.toward);
+                let toward = self.toward(pixel, i);
+                let from = segment.at(hit.t) + toward * (AWAY * self.diagonal);
+                let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
                 self.caster.first(&to_light).is_none()
             })
         };
         let lit = (0..GRID * GRID).filter(|i| is_lit(*i)).count();
         lit as f32 / (GRID * GRID) as f32
     }
+
+    /// Where ray `i` of a pixel goes on.
+    fn toward(&self, pixel: [u32; 2], i: u32) -> DVec3 {
+        if self.area.radius == 0.0 {
+            return self.toward;
+        }
+        let [x, y] = self.area.point(light_sample(pixel, i));
+        self.toward + self.axes[0] * x + self.axes[1] * y
+    }
+}
+
+/// A point of the unit square for ray `i` of a pixel. Rays that are neighbours in the pixel have
+/// points far from each other.
+fn light_sample([x, y]: [u32; 2], i: u32) -> [f64; 2] {
+    const RAYS: u32 = GRID * GRID;
+    // Any odd factor permutes the numbers below a power of two.
+    let j = (i * 167 + 91) % RAYS;
+    let reversed = j.reverse_bits() >> (32 - RAYS.trailing_zeros());
+    let mut hash = (y << 16 | x).wrapping_mul(0x9e37_79b9);
+    let mut shift = || {
+        hash = (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d);
+        hash ^= hash >> 12;
+        f64::from(hash) / f64::from(u32::MAX)
+    };
+    [j, reversed].map(|k| ((f64::from(k) + 0.5) / f64::from(RAYS) + shift()).fract())
 }
 
 /// [`Pixels::light`] of all pixels.
 #[must_use]
-pub fn hard(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
+pub fn by_rays(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
     let pixels = Pixels::of(scene, mesh);
     let (width, height) = (scene.width, scene.height);
     let mut values = vec![0.0; width as usize * height as usize];
@@ -392,6 +428,35 @@ mod tests {
         one_off[7] = 1.0;
         let errors = row(&one_off).errors(&row(&[0.0; 100])).unwrap();
         assert_eq!((errors.percentile_99, errors.worst), (0.0, 1.0));
+    }
+
+    /// The share of a light on one side of a line through it, from each pixel.
+    #[test]
+    fn rays_reach_all_of_the_light_alike() {
+        use crate::scene::AreaShape;
+        for shape in [AreaShape::Disc, AreaShape::Square] {
+            let area = Area { radius: 1.0, shape };
+            for (edge, turn) in [(-0.7_f64, 0.0_f64), (0.0, 0.3), (0.45, 0.8), (0.9, 2.1)] {
+                let beyond = match shape {
+                    AreaShape::Disc => {
+                        (edge.acos() - edge * (1.0 - edge * edge).sqrt()) / std::f64::consts::PI
+                    }
+                    AreaShape::Square if turn == 0.0 => (1.0 - edge) / 2.0,
+                    AreaShape::Square => continue,
+                };
+                for pixel in [[0, 0], [1, 0], [17, 940]] {
+                    let points = (0..GRID * GRID).map(|i| area.point(light_sample(pixel, i)));
+                    let count = points
+                        .filter(|[x, y]| x * turn.cos() + y * turn.sin() > edge)
+                        .count();
+                    let share = count as f64 / f64::from(GRID * GRID);
+                    assert!(
+                        (share - beyond).abs() < 0.02,
+                        "{shape:?} {edge}: {share} {beyond}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use common::shaders;
 use hankel_frames::scene::Scene;
 use hankel_frames::{Comparison, Quiet, compare, techniques};
 
-fn both(geometry: &str, shadow: &str) -> Comparison {
+fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
     let eye = if geometry == "box" {
         "[1.9, 1.6, 3.1]"
     } else {
@@ -24,6 +24,7 @@ fn both(geometry: &str, shadow: &str) -> Comparison {
         target = [-0.2, 0.2, -0.3]
         [light]
         direction = [0.62, -0.62, 0.48]
+        {light}
         [shadow]
         size = 256
         {shadow}
@@ -37,9 +38,16 @@ fn both(geometry: &str, shadow: &str) -> Comparison {
 }
 
 fn agree(geometry: &str, shadow: &str) {
-    let c = both(geometry, shadow);
+    lit_agree(geometry, "", shadow);
+}
+
+fn lit_agree(geometry: &str, light: &str, shadow: &str) {
+    let c = both(geometry, light, shadow);
     let edges = c.native.edges.unwrap_or(0.0);
-    let what = format!("{geometry}, {shadow}: {}, edges {edges:.4}", c.difference);
+    let what = format!(
+        "{geometry}, {light}, {shadow}: {}, edges {edges:.4}",
+        c.difference
+    );
     assert!(edges > 0.01 && edges < 0.8, "{what}");
     assert!(c.difference.over_1 <= c.limit(), "{what}");
     // The picture shows something: not all of one colour.
@@ -79,5 +87,13 @@ fn every_map_agrees_in_the_yard() {
         "filter = 1",
     ] {
         agree("yard", map);
+    }
+}
+
+#[test]
+fn soft_shadows_agree_in_the_yard() {
+    for technique in ["pcss", "vssm", "soft", "soft-6"] {
+        let light = "radius = 0.1\nshape = 'square'";
+        lit_agree("yard", light, &format!("technique = '{technique}'"));
     }
 }

@@ -7,7 +7,7 @@ use hankel_frames::measure::{Ask, Choices, Measurement, Session, Subject, sample
 use hankel_frames::plan::{Plan, Wanted, plan};
 use hankel_frames::scene::{Fit, Scene};
 use hankel_frames::techniques::Technique;
-use hankel_frames::truth::{Arriving, by_technique, hard};
+use hankel_frames::truth::{Arriving, by_rays, by_technique};
 use hankel_frames::{FrameError, NoShaders, Quiet};
 use hankel_host::device::NativeDevice;
 
@@ -136,7 +136,7 @@ const fn within(error: f64) -> Wanted {
 #[test]
 fn a_plan_is_within_the_error_and_near_the_fastest() {
     let subject = subject([96, 54]);
-    let truth = hard(&subject.scene, &subject.mesh, &mut |_| ());
+    let truth = by_rays(&subject.scene, &subject.mesh, &mut |_| ());
     let all = exhaustively(&subject, &truth);
     let mut errors: Vec<f64> = all.values().copied().collect();
     errors.sort_by(f64::total_cmp);
@@ -186,7 +186,7 @@ fn a_plan_is_within_the_error_and_near_the_fastest() {
 #[test]
 fn what_cannot_be_had_is_said() {
     let subject = subject([48, 27]);
-    let truth = hard(&subject.scene, &subject.mesh, &mut |_| ());
+    let truth = by_rays(&subject.scene, &subject.mesh, &mut |_| ());
     let all = exhaustively(&subject, &truth);
     let least = all.values().copied().fold(f64::INFINITY, f64::min);
     let none = planned(&subject, within(1e-4)).unwrap_err();

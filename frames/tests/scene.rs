@@ -7,7 +7,7 @@ use base64::Engine;
 use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
 use hankel_frames::scene::{
-    DepthRange, Fit, Geometry, Mesh, Procedural, Scene, SceneError, Shadow,
+    Area, AreaShape, DepthRange, Fit, Geometry, Mesh, Procedural, Scene, SceneError, Shadow,
 };
 use hankel_frames::techniques::Technique;
 
@@ -66,6 +66,8 @@ fn every_field_is_read() {
         fov = 55.5
         [light]
         direction = [0.0, -3.0, 0.0]
+        radius = 0.05
+        shape = "square"
         [shadow]
         technique = "hausdorff"
         size = 512
@@ -73,6 +75,7 @@ fn every_field_is_read() {
         format = "rgba16unorm"
         filter = 9
         fit = "camera"
+        samples = [16, 24]
         moment_bias = 1e-4
         depth_bias = 0.001
         leak_cut = 0.1
@@ -86,6 +89,8 @@ fn every_field_is_read() {
     assert_eq!(scene.geometry, Geometry::Model { file, ground: 2.5 });
     assert_eq!(scene.camera.up, Vec3::Z);
     assert_eq!(scene.light, Vec3::NEG_Y);
+    let (radius, shape) = (0.05, AreaShape::Square);
+    assert_eq!(scene.area, Area { radius, shape });
     let map = POWER_MOMENTS[1];
     let stored = (map.format.name(), map.depth_range);
     assert_eq!(stored, ("rgba16unorm", DepthRange::Unit));
@@ -97,6 +102,7 @@ fn every_field_is_read() {
             map,
             filter: 9,
             fit: Fit::Camera,
+            samples: [16, 24],
             moment_bias: 1e-4,
             depth_bias: 0.001,
             leak_cut: 0.1,
@@ -129,6 +135,22 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             with("[shadow]\nfilter = 33"),
             &["`shadow.filter` is 33", "1 to 31"],
+        ),
+        (
+            with("[shadow]\nsamples = [32, 0]"),
+            &["scene.toml:10:16", "`shadow.samples` is 0", "1 to 1024"],
+        ),
+        (
+            with("[shadow]\nsamples = [32]"),
+            &["scene.toml:10:11", "shadow.samples"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nradius = -0.1"),
+            &["`light.radius` is -0.1", "0 to 1"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nshape = 'star'"),
+            &["light.shape", "star", "disc", "square"],
         ),
         (
             with("[shadow]\nmoment_bias = nan"),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hankel_frames::scene::Scene;
-use hankel_frames::truth::{Arriving, by_technique, hard};
+use hankel_frames::truth::{Arriving, by_rays, by_technique};
 
 fn files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
@@ -27,7 +27,7 @@ fn every_scene_is_drawn_with_its_shadow() {
         let name = file.file_stem().unwrap().to_string_lossy();
         (scene.width, scene.height) = (48, 27);
         scene.shadow.size = 256;
-        let truth = hard(&scene, &mesh, &mut |_| ());
+        let truth = by_rays(&scene, &mesh, &mut |_| ());
         let none = Arriving {
             values: vec![1.0; truth.values.len()],
             ..truth.clone()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use hankel_frames::scene::{Mesh, Scene, Shadow};
 use hankel_frames::techniques::{self, Map, Technique};
-use hankel_frames::truth::{Arriving, by_technique, filtered, hard};
+use hankel_frames::truth::{Arriving, by_rays, by_technique, filtered};
 
 fn scene(geometry: &str, size: u32, shadow: &str) -> (Scene, Mesh) {
     let eye = if geometry == "box" {
@@ -109,7 +109,7 @@ fn filtering_comparisons_of_all_samples_is_the_truth() {
 fn the_filtered_truth_is_a_soft_picture_of_the_hard_one() {
     let (scene, mesh) = scene("box", 1024, "filter = 3\ndepth_bias = 0.003");
     let soft = filtered(&scene, &mesh, &mut |_| ());
-    let sharp = hard(&scene, &mesh, &mut |_| ());
+    let sharp = by_rays(&scene, &mesh, &mut |_| ());
     let share = |p: &Arriving, wanted: fn(f32) -> bool| {
         p.values.iter().filter(|v| wanted(**v)).count() as f64 / p.values.len() as f64
     };
@@ -134,7 +134,7 @@ fn the_filtered_truth_is_a_soft_picture_of_the_hard_one() {
 #[test]
 fn more_moments_and_warps_leak_less() {
     let (one, mesh) = scene("yard", 1024, "");
-    let sharp = hard(&one, &mesh, &mut |_| ());
+    let sharp = by_rays(&one, &mesh, &mut |_| ());
     let lit = Arriving {
         values: vec![1.0; sharp.values.len()],
         ..sharp.clone()

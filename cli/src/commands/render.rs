@@ -230,7 +230,9 @@ fn print(args: &Render, quiet: bool, told: Told<'_>) {
     }
     if let Some(Measured { rays, filtered }) = errors {
         say!("light against rays: {rays}");
-        say!("light against all samples, filtered: {filtered}");
+        if let Some(filtered) = filtered {
+            say!("light against all samples, filtered: {filtered}");
+        }
     }
     for p in &pictures {
         say!("{}", p.display());

@@ -1,6 +1,6 @@
 //! Run time against error: the ways to make a scene's shadows, each measured.
 //!
-//! [`Session`] measures every configuration of every scene: its light against [`truth::hard`], and its
+//! [`Session`] measures every configuration of every scene: its light against [`truth::by_rays`], and its
 //! passes in rounds in which every configuration has its turn. What is finished is kept in a file, so a
 //! session that was ended goes on where it was. [`growth`] says how times grow.
 

@@ -11,7 +11,7 @@ use super::{Configuration, median, sample};
 use crate::error::Result;
 use crate::executor::{Shaders, Timing};
 use crate::scene::{Mesh, Scene};
-use crate::truth::{Arriving, Errors, by_technique_on, hard};
+use crate::truth::{Arriving, Errors, by_rays, by_technique_on};
 
 /// A scene in one size of the picture.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ pub struct Measurement {
     pub output: [u32; 2],
     /// What was measured.
     pub configuration: Configuration,
-    /// Against [`crate::truth::hard`].
+    /// Against [`crate::truth::by_rays`].
     pub errors: Errors,
     /// On the device.
     pub bytes: usize,
@@ -288,7 +288,7 @@ impl Session {
             Some(truth) => truth,
             None => {
                 let start = Instant::now();
-                let truth = hard(scene, mesh, &mut |_| ());
+                let truth = by_rays(scene, mesh, &mut |_| ());
                 self.add(Line::Truth {
                     subject: key.clone(),
                     values: truth.values.clone(),

@@ -15,6 +15,8 @@
 //!
 //! [light]
 //! direction = [-0.5, -0.8, -0.3]  # the way the light goes
+//! radius = 0.02                   # of the light, as seen: the tangent of the angle; 0: a point, default
+//! shape = "disc"                  # default; or "square"
 //!
 //! [shadow]
 //! technique = "hamburger"         # or another of `techniques::ALL`
@@ -23,6 +25,7 @@
 //! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1]: likewise
 //! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
 //! fit = "scene"                   # the map holds all; or "camera": what the camera sees
+//! samples = [32, 32]              # of a soft shadow: for the search of blockers, and for the filter
 //! moment_bias = 6e-5              # each map has its default
 //! depth_bias = 0.0                # each technique has its default
 //! leak_cut = 0.02
@@ -68,6 +71,8 @@ pub struct Scene {
     pub camera: Camera,
     /// The way the light goes; unit length.
     pub light: Vec3,
+    /// How large the light is.
+    pub area: Area,
     /// How shadows are made.
     pub shadow: Shadow,
     /// The picture's width in pixels, 1 to [`Scene::MAX_OUTPUT`].
@@ -102,6 +107,52 @@ pub struct Camera {
     pub up: Vec3,
     /// Vertical field of view in degrees, 1 to 170.
     pub fov: f32,
+}
+
+/// What of the sky a light fills, around the direction that it comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Area {
+    /// Its half width: the tangent of the angle between its middle and the middle of its edge, 0 (a
+    /// point) to [`Area::MAX_RADIUS`]. The sun has 0.0047.
+    pub radius: f32,
+    /// Its outline.
+    pub shape: AreaShape,
+}
+
+/// The outline of a light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AreaShape {
+    /// A disc.
+    #[default]
+    Disc,
+    /// A square whose edges are along those of the shadow map.
+    Square,
+}
+
+impl Area {
+    /// The largest half width: 45 degrees to each side.
+    pub const MAX_RADIUS: f32 = 1.0;
+
+    /// A point of the light, in units of its half width, for a point of the unit square: what is
+    /// uniform there is uniform on the light. A disc's is Shirley and Chiu's concentric map.
+    #[must_use]
+    pub fn point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (x, y) = (2.0 * x - 1.0, 2.0 * y - 1.0);
+        if self.shape == AreaShape::Square {
+            return [x, y];
+        }
+        let (radius, part, turn) = if x.abs() > y.abs() {
+            (x, y / x, 0.0)
+        } else if y == 0.0 {
+            (0.0, 0.0, 0.0)
+        } else {
+            // A quarter turn on, and backwards.
+            (y, -x / y, std::f64::consts::FRAC_PI_2)
+        };
+        let (sin, cos) = (part * std::f64::consts::FRAC_PI_4 + turn).sin_cos();
+        [radius * cos, radius * sin]
+    }
 }
 
 /// The interval that depths are mapped to before moments are taken.
@@ -161,6 +212,9 @@ pub struct Shadow {
     pub filter: u32,
     /// What the map holds.
     pub fit: Fit,
+    /// Depths that a soft shadow looks at in its search of blockers, and in its filter, where it looks at
+    /// single ones: 1 to [`Scene::MAX_SAMPLES`] each.
+    pub samples: [u32; 2],
     /// What is done so that rounding cannot make moments impossible, 0 to 0.1: how far they are pulled
     /// towards those of a harmless distribution, or what [`Map::moment_bias`] says of the technique.
     pub moment_bias: f32,
@@ -186,6 +240,7 @@ impl Shadow {
             map,
             filter: 7,
             fit: Fit::Scene,
+            samples: [32, 32],
             moment_bias: map.moment_bias,
             depth_bias: technique.depth_bias,
             leak_cut: 0.02,
@@ -202,6 +257,8 @@ impl Scene {
     pub const MAX_MAP: u32 = 4096;
     /// Most taps of the filter along an axis.
     pub const MAX_FILTER: u32 = 31;
+    /// Most samples of a soft shadow's search and filter, each.
+    pub const MAX_SAMPLES: u32 = 1024;
     /// Width and height of a picture unless given.
     pub const DEFAULT_OUTPUT: [u32; 2] = [960, 540];
 

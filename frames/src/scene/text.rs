@@ -9,7 +9,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
-use super::{Camera, DepthRange, FAR_OFF, Fit, Geometry, Procedural, Scene, Shadow};
+use super::{
+    Area, AreaShape, Camera, DepthRange, FAR_OFF, Fit, Geometry, Procedural, Scene, Shadow,
+};
 use crate::techniques::{self, Map, Technique};
 
 #[derive(Deserialize)]
@@ -45,6 +47,9 @@ struct CameraText {
 #[serde(deny_unknown_fields)]
 struct LightText {
     direction: Spanned<[f32; 3]>,
+    radius: Option<Spanned<f32>>,
+    #[serde(default)]
+    shape: AreaShape,
 }
 
 #[derive(Default, Deserialize)]
@@ -57,6 +62,7 @@ struct ShadowText {
     filter: Option<Spanned<i64>>,
     #[serde(default)]
     fit: Fit,
+    samples: Option<[Spanned<i64>; 2]>,
     moment_bias: Option<Spanned<f32>>,
     depth_bias: Option<Spanned<f32>>,
     leak_cut: Option<Spanned<f32>>,
@@ -341,8 +347,17 @@ impl Reader<'_> {
         if filter.is_multiple_of(2) {
             return self.refuse(filter_span, "shadow.filter", filter, "odd");
         }
+        let samples = match s.samples {
+            Some(counts) => {
+                let [search, filter] = counts
+                    .map(|n| self.integer("shadow.samples", Some(n), 0, 1..=Scene::MAX_SAMPLES));
+                [search?, filter?]
+            }
+            None => d.samples,
+        };
         let bias = 0.0..=0.1;
         Ok(Shadow {
+            samples,
             size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,
             filter,
             fit: s.fit,
@@ -366,6 +381,10 @@ impl Reader<'_> {
             geometry: self.geometry(f.geometry)?,
             camera: self.camera(&f.camera, fov)?,
             light: self.direction("light.direction", &f.light.direction)?,
+            area: Area {
+                radius: self.number("light.radius", f.light.radius, 0.0, 0.0..=Area::MAX_RADIUS)?,
+                shape: f.light.shape,
+            },
             shadow: self.shadow(f.shadow)?,
             width: self.integer("output.width", f.output.width, width, pixels.clone())?,
             height: self.integer("output.height", f.output.height, height, pixels)?,

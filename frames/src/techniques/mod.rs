@@ -8,8 +8,11 @@ mod hamburger_6;
 mod hausdorff;
 mod pcf;
 mod pcf_gaussian;
+mod pcss;
+mod soft;
 mod trigonometric;
 mod vsm;
+mod vssm;
 
 use std::fmt;
 
@@ -55,7 +58,7 @@ pub struct Map {
 }
 
 /// All of them.
-pub const ALL: [&Technique; 10] = [
+pub const ALL: [&Technique; 14] = [
     &hamburger::TECHNIQUE,
     &hausdorff::TECHNIQUE,
     &hamburger_6::TECHNIQUE,
@@ -66,6 +69,10 @@ pub const ALL: [&Technique; 10] = [
     &evsm::BOTH,
     &pcf::TECHNIQUE,
     &pcf_gaussian::TECHNIQUE,
+    &pcss::TECHNIQUE,
+    &vssm::TECHNIQUE,
+    &soft::FOUR,
+    &soft::SIX,
 ];
 
 impl Technique {

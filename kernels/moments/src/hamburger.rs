@@ -2,7 +2,7 @@
 
 use hankel_dsl::{Real, lit};
 
-use crate::Moments4;
+use crate::{Blockers, Moments4};
 
 /// What a query point makes of four moments: the polynomial whose roots are the other two points
 /// of the distribution that attains the bound (\[MSM\], Algorithm 2 and Proposition 10), up to a
@@ -74,15 +74,60 @@ impl<R: Real> Query<R> {
 #[inline(always)]
 pub fn hamburger_4<R: Real>(m: Moments4<R>, z: R) -> R {
     let query = Query::new(m.clamped(), z.clamp(lit!(-2.0), lit!(2.0)));
-    let between = query.between();
-    // Both roots below: all but the point's own weight. Both above: nothing.
+    query.below(&query.between())
+}
+
+/// Reads a distribution off four moments and a query point, and tells what of it blocks the light from
+/// the point: the share of [`hamburger_4`], and how far before the point it lies (\[BHS\], lecture,
+/// "Moment-based blocker search"). Arguments as there.
+///
+/// The distribution is that of the bound: the query point and two others. Where both others are nearer,
+/// their mean follows from the mean of all; where one is, from its distance, if it is the nearer root, and
+/// else from the mean and the other's distance, so that a root at infinity does no harm.
+#[inline(always)]
+pub fn blockers_4<R: Real>(m: Moments4<R>, z: R) -> Blockers<R> {
     let zero: R = lit!(0.0);
-    let one: R = lit!(1.0);
-    let outside = R::select(query.k1.gt(zero), one - query.own, zero);
-    query.within_two_moments(R::select(query.k2.lt(zero), between, outside))
+    let z = z.clamp(lit!(-2.0), lit!(2.0));
+    let query = Query::new(m.clamped(), z);
+    let between = query.between();
+    let share = query.below(&between);
+    let farther = (R::select(query.k2.lt(zero), lit!(1.0), zero) - query.own - share).max(zero);
+    let one_sided = R::select(query.k1.gt(zero), -query.mean, zero);
+    let two_sided = R::select(
+        between.near_is_below,
+        share * between.near,
+        farther * between.near - query.mean,
+    );
+    let moment = R::select(query.k2.lt(zero), two_sided, one_sided);
+    Blockers {
+        share,
+        // No depth is nearer than -1.
+        moment: moment.clamp(zero, share * (z + lit!(1.0)).max(zero)),
+    }
+}
+
+/// The two points beside the query point where it lies between them.
+#[derive(Clone, Copy)]
+pub(crate) struct Between<R: Real> {
+    /// The weight of the lower one.
+    pub lower: R,
+    /// How far the nearer one is.
+    pub near: R,
+    /// Whether the nearer one is the lower one.
+    pub near_is_below: R::Mask,
 }
 
 impl<R: Real> Query<R> {
+    /// The share below the query point.
+    #[inline(always)]
+    fn below(&self, between: &Between<R>) -> R {
+        // Both roots below: all but the point's own weight. Both above: nothing.
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let outside = R::select(self.k1.gt(zero), one - self.own, zero);
+        self.within_two_moments(R::select(self.k2.lt(zero), between.lower, outside))
+    }
+
     /// `share` moved into the bounds that mean and variance alone give (Cantelli's inequality).
     /// Four moments never leave them; rounding does, when there is only one depth.
     #[inline(always)]
@@ -96,9 +141,9 @@ impl<R: Real> Query<R> {
         share.clamp(least, most)
     }
 
-    /// The weight of the lower root when the query point lies between the roots (`k2` <= 0).
+    /// The roots when the query point lies between them (`k2` <= 0).
     #[inline(always)]
-    pub fn between(&self) -> R {
+    pub fn between(&self) -> Between<R> {
         let zero: R = lit!(0.0);
         let one: R = lit!(1.0);
         let k2 = self.k2.abs();
@@ -120,6 +165,10 @@ impl<R: Real> Query<R> {
         let second = one - self.own - first;
         // `first` is the nearer root's weight if the mean is on its side; wanted is the lower's.
         let first_is_below = (mean_is_near & near_is_below) | !(mean_is_near | near_is_below);
-        R::select(first_is_below, first, second)
+        Between {
+            lower: R::select(first_is_below, first, second),
+            near,
+            near_is_below,
+        }
     }
 }

@@ -38,7 +38,7 @@ fn bound<R: Real, const SYMMETRIC: bool>(m: Moments4<R>, z: R) -> R {
     let (m, z) = clamped::<R, SYMMETRIC>(m, z);
     let query = Query::new(m, z);
     let outside = R::select(query.k1.gt(zero), one - query.own, zero);
-    let three = R::select(query.k2.lt(zero), query.between(), outside);
+    let three = R::select(query.k2.lt(zero), query.between().lower, outside);
     let four = FourPoints::new::<SYMMETRIC>(m, z);
     query.within_two_moments(R::select(four.is_possible, four.bound, three))
 }

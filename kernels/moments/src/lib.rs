@@ -18,12 +18,15 @@
 //! - \[MBD\] M. Worchel, M. Alexa: *Moment Bounds are Differentiable: Efficiently Approximating
 //!   Measures in Inverse Rendering* (2025).
 //! - \[VSM\] W. Donnelly, A. Lauritzen: *Variance Shadow Maps* (2006).
+//! - \[VSSM\] B. Yang, Z. Dong, J. Feng, H.-P. Seidel, J. Kautz: *Variance Soft Shadow Mapping* (2010).
+//! - \[PCSS\] R. Fernando: *Percentage-Closer Soft Shadows* (2005).
 //! - \[ESM\] T. Annen, T. Mertens, H.-P. Seidel, E. Flerackers, J. Kautz: *Exponential Shadow Maps*
 //!   (2008).
 //! - \[LVSM\] A. Lauritzen, M. McCool: *Layered Variance Shadow Maps* (2008).
 #![no_std]
 
 pub mod bias;
+mod blockers;
 mod bound;
 mod degenerate;
 mod exponential;
@@ -39,6 +42,7 @@ mod trigonometric;
 mod variance;
 
 pub use bias::Bias;
+pub use blockers::Blockers;
 pub use bound::{
     Bounds, Canonical, Gradient, MAX_MOMENTS, bias_target, bound, bound_adjoint,
     bound_adjoint_compensated, bound_compensated, canonical, canonical_compensated, mix_bias,
@@ -46,17 +50,17 @@ pub use bound::{
 };
 pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
 pub use exponential::{markov_1, warped_2};
-pub use hamburger::hamburger_4;
+pub use hamburger::{blockers_4, hamburger_4};
 pub use hausdorff::{hausdorff_4, hausdorff_4_symmetric};
 pub use leak::cut_leak;
 pub use moments::{Moments4, Moments6};
 pub use quantization::{
-    Fixed4, Fixed6, FixedPoint, Packed6, Quantized4, Quantized6, Rectangle4, Rectangle6,
-    dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6,
+    Fixed4, Fixed6, FixedPoint, Packed6, Quantized4, Quantized6, Rectangle4, Rectangle6, Region,
+    Span, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6,
     from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, quantize_unit_6,
     to_unorm,
 };
-pub use six::hamburger_6;
+pub use six::{blockers_6, hamburger_6};
 pub use sparse::{TwoPoints, sparse_2};
 pub use trigonometric::{HalfAngle, TrigonometricMoments, trigonometric_4};
-pub use variance::variance_2;
+pub use variance::{blockers_2, variance_2};

@@ -2,10 +2,10 @@
 
 use hankel_dsl::{Real, lit};
 
-use crate::Moments6;
 use crate::bound::Bounds;
 use crate::moments::within;
 use crate::orthogonal::{Recurrence, positive_root};
+use crate::{Blockers, Moments6};
 
 /// The least and the greatest share below `z`, over all distributions of depths with moments `m`
 /// (\[BHS\], section 3 of the supplement; \[MSM\], Algorithm 2); both in [0, 1].
@@ -24,6 +24,29 @@ use crate::orthogonal::{Recurrence, positive_root};
 ///   the reciprocals, too. Its denominator is a sum of positive terms, as the root is alone.
 #[inline(always)]
 pub fn hamburger_6<R: Real>(m: Moments6<R>, z: R) -> Bounds<R> {
+    let found = query(m, z);
+    Bounds {
+        lower: found.blockers.share,
+        upper: (found.blockers.share + found.own).min(lit!(1.0)),
+    }
+}
+
+/// As [`blockers_4`](crate::blockers_4), by six moments: of the three points beside the query point, the one
+/// that is alone on its side has a distance that is known, and the mean of all is known.
+#[inline(always)]
+pub fn blockers_6<R: Real>(m: Moments6<R>, z: R) -> Blockers<R> {
+    query(m, z).blockers
+}
+
+/// The distribution that attains the bounds.
+struct Query<R> {
+    blockers: Blockers<R>,
+    /// The query point's weight.
+    own: R,
+}
+
+#[inline(always)]
+fn query<R: Real>(m: Moments6<R>, z: R) -> Query<R> {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let two: R = lit!(2.0);
@@ -75,7 +98,8 @@ pub fn hamburger_6<R: Real>(m: Moments6<R>, z: R) -> Bounds<R> {
     let others = (s + a).max(zero);
     let square = s * s;
     let scale = (square * (others + s) + c).max(epsilon * epsilon * epsilon);
-    let alone = square * s / scale * (s * (others * u2 - u1) - c * u3);
+    let factor = s * (others * u2 - u1) - c * u3;
+    let alone = square * s / scale * factor;
     let rest = one - own;
     let below = R::select(are_all_below, rest, alone.clamp(zero, rest));
     let share = R::select(is_turned, rest - below, below);
@@ -85,9 +109,18 @@ pub fn hamburger_6<R: Real>(m: Moments6<R>, z: R) -> Bounds<R> {
     let is_above = p1.gt(zero);
     let least = R::select(is_above, one - near, zero);
     let most = R::select(is_above, one, near);
-    let lower = share.clamp(least, most);
-    Bounds {
-        lower,
-        upper: (lower + own).min(one),
+    let share = share.clamp(least, most);
+    // The lone root's weight times its distance, which is 1 / s.
+    let lever = square / scale * factor;
+    let one_sided = R::select(is_turned, zero, p1);
+    let two_sided = R::select(is_turned, lever + p1, lever);
+    let moment = R::select(are_all_below, one_sided, two_sided);
+    Query {
+        blockers: Blockers {
+            share,
+            // No depth is nearer than -1.
+            moment: moment.clamp(zero, share * (z + one).max(zero)),
+        },
+        own,
     }
 }

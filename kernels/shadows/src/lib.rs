@@ -9,8 +9,10 @@
 //! | to trigonometric ones | [`resolve_trigonometric_unorm`](trigonometric::resolve_trigonometric_unorm), [`resolve_trigonometric_plain`](trigonometric::resolve_trigonometric_plain) |
 //! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm) |
 //! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float) |
+//! | summed-area table of moments | [`resolve_summed`](soft::resolve_summed), [`prefix_sums`](soft::prefix_sums) twice |
+//! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) twice |
 //! | geometry from the camera | [`surface`](shade::surface) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss) |
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -30,6 +32,7 @@ pub mod quantize;
 pub mod resolve;
 pub mod shade;
 pub mod six;
+pub mod soft;
 pub mod trigonometric;
 
 hankel_dsl::kernels![
@@ -56,6 +59,14 @@ hankel_dsl::kernels![
     trigonometric::shade_trigonometric,
     exponential::shade_esm,
     exponential::shade_evsm,
+    soft::resolve_summed,
+    soft::resolve_summed_6,
+    soft::prefix_sums,
+    soft::prefix_sums_6,
+    soft::shade_soft,
+    soft::shade_soft_6,
+    soft::shade_vssm,
+    soft::shade_pcss,
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,

@@ -170,7 +170,7 @@ fn look_up(map: Texture2d<'_>, sampler: Sampler, how: u32, uv: Vec2) -> Moments4
 
 /// Moments with the light's bias mixed in.
 #[inline(always)]
-fn biased(light: &Light, m: Moments4<f32>) -> Moments4<f32> {
+pub(crate) fn biased(light: &Light, m: Moments4<f32>) -> Moments4<f32> {
     let t = light.bias_target;
     let target = Moments4 {
         b1: t.x,

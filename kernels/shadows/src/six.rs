@@ -77,9 +77,9 @@ pub fn hamburger_6msm<R: Real>(
 
 /// A texel of each texture.
 #[derive(Clone, Copy)]
-struct Texels {
-    first: Vec4,
-    second: Vec4,
+pub(crate) struct Texels {
+    pub(crate) first: Vec4,
+    pub(crate) second: Vec4,
 }
 
 impl AddAssign for Texels {
@@ -126,14 +126,20 @@ pub fn resolve_symmetric_6(
     samples: u32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> (Vec4, Vec4) {
-    let texels = mean(depth, at, samples, |z| {
+    let texels = quantized(depth, at, samples);
+    (texels.first, texels.second)
+}
+
+/// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis.
+#[inline(always)]
+pub(crate) fn quantized(depth: Texture2dMultisampled<'_>, at: UVec2, samples: u32) -> Texels {
+    mean(depth, at, samples, |z| {
         let q = quantize_symmetric_6(symmetric(z));
         Texels {
             first: Vec4::new(q.r0, q.g0, q.b0, 0.0),
             second: Vec4::new(q.r1, q.g1, q.b1, 0.0),
         }
-    });
-    (texels.first, texels.second)
+    })
 }
 
 /// Means of a texel's six moments, depths moved to [-1, 1], as they are, for 32-bit maps.

@@ -10,7 +10,7 @@
 //! | four | 4 x 16 bits, normalised | [`Quantized4`], a texture `rgba16unorm` |
 //! | four | 4 x 32-bit floats | the moments themselves, no transform |
 //! | six | 2 x R10G10B10A2, normalised | [`Quantized6`], [`Packed6`] |
-//! | either | 32-bit integers of a summed-area table | [`FixedPoint`], [`Fixed4`], [`Fixed6`] |
+//! | either | 32-bit integers of a summed-area table | [`FixedPoint`], [`Fixed4`], [`Fixed6`], [`Region`] |
 //!
 //! All maps are affine, so filtering commutes with them. They take moments in [-1, 1] and channels
 //! in [0, 1]; `clamped` and `saturated` bring anything there. Constant summands come first in a sum:
@@ -20,6 +20,7 @@ mod fixed_point;
 mod four;
 mod packed;
 mod six;
+mod summed_area;
 mod unorm;
 
 pub use fixed_point::{Fixed4, Fixed6, FixedPoint, Rectangle4, Rectangle6};
@@ -30,4 +31,5 @@ pub use packed::Packed6;
 pub use six::{
     Quantized6, dequantize_symmetric_6, dequantize_unit_6, quantize_symmetric_6, quantize_unit_6,
 };
+pub use summed_area::{Region, Span};
 pub use unorm::{from_unorm, to_unorm};

@@ -23,9 +23,9 @@ use crate::shade::{Light, encoding};
 use crate::trigonometric;
 
 /// Texels of a map.
-const SIZE: [u32; 2] = [61, 37];
+pub(super) const SIZE: [u32; 2] = [61, 37];
 /// Samples of a texel.
-const SAMPLES: usize = 4;
+pub(super) const SAMPLES: usize = 4;
 /// Fragments of a run.
 const FRAGMENTS: usize = 1009;
 
@@ -51,7 +51,7 @@ fn depth(u: f64, v: f64) -> f64 {
 }
 
 /// Depths of the samples of each texel, together.
-fn samples() -> Vec<f64> {
+pub(super) fn samples() -> Vec<f64> {
     // Where 4x multisampling looks, in sixteenths of a texel.
     const AT: [[f64; 2]; SAMPLES] = [[6.0, 2.0], [14.0, 6.0], [2.0, 10.0], [10.0, 14.0]];
     let [width, height] = SIZE;
@@ -144,7 +144,7 @@ fn stored(how: u32, m: Moments4<f64>) -> Vec4 {
 }
 
 /// A light whose map's coordinates are the world's x and z, each from 0 to 1, and whose depth is y.
-fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32) -> Light {
+pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32) -> Light {
     let target = bias.four();
     Light {
         row_u: Vec4::new(1.0, 0.0, 0.0, 0.0),
@@ -162,7 +162,7 @@ fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32) -> Light {
 
 /// Fragments on the surfaces of the scene, just before and behind them, in the shadows of the boxes,
 /// and beyond the map.
-fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
+pub(super) fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
     let (mut world, mut normals, mut colours) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..FRAGMENTS {
         let (u, v) = match s.count(0, 7) {

@@ -4,12 +4,14 @@
 //! | what | functions |
 //! | --- | --- |
 //! | the least shadow that moments allow | [`bounds`] |
+//! | what is nearer than a receiver, for soft shadows | [`blockers`] |
 //! | bounds from two to ten moments with a free total | [`totals`] |
 //! | what a map stores | [`store`] |
 //! | published and measured biases | [`biases`] |
 //! | the few depths that have given moments | [`depths`] |
 
 pub mod biases;
+pub mod blockers;
 pub mod bounds;
 pub mod depths;
 pub mod store;
@@ -31,6 +33,9 @@ hankel_dsl::library! {
             bounds::mix_bias,
             bounds::mix_bias_six,
             bounds::cut_leak,
+            blockers::blockers_of_two,
+            blockers::blockers_of_four,
+            blockers::blockers_of_six,
             totals::bounds_of_two,
             totals::bounds_of_four,
             totals::bounds_of_six,

@@ -1,0 +1,128 @@
+//! Means over a rectangle of any size and place, from a summed-area table in integers (\[BHS\], lecture,
+//! "Caveat: bilinear interpolation").
+//!
+//! Entries wrap, so they must not be interpolated. Along each axis the rectangle's two ends lie within a
+//! texel each: with the whole texels between, these make three by three smaller rectangles. Their sums do
+//! not wrap. They are weighted by how much of them the rectangle covers. That takes 4 x 4 entries.
+
+use hankel_dsl::{Real, lit, to_i32};
+
+use super::fixed_point::{Fixed4, Fixed6, FixedPoint};
+use super::four::Quantized4;
+use super::six::Quantized6;
+
+/// One axis of a rectangle: a texel of which a part counts, then some that count wholly, then another of
+/// which a part counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Texels before the first one.
+    pub first: u32,
+    /// Texels before the first whole one.
+    pub whole: u32,
+    /// Texels before the last one: never less than `whole`.
+    pub last: u32,
+    /// Texels up to the end of the last one; `last` if nothing of it counts.
+    pub end: u32,
+    /// How much of the first one counts, 0 to 1.
+    pub first_share: f32,
+    /// How much of the last one counts, 0 to 1.
+    pub last_share: f32,
+    /// Length in texels, also of what lies beyond the table.
+    pub length: f32,
+    /// Length of what lies on the table.
+    pub inside: f32,
+}
+
+impl Span {
+    /// The texels within `reach` of `middle`, both in texels, from 0 at the first texel's first edge.
+    /// The reach is raised to half a texel and cut at 32768; `middle` is moved to less than 65536 from the
+    /// table of `size` texels, of which there are from 1 to 65536.
+    #[inline(always)]
+    #[must_use]
+    pub fn around(middle: f32, reach: f32, size: u32) -> Self {
+        let edge = size as f32;
+        let middle = Real::clamp(middle, -65536.0, edge + 65536.0);
+        let reach = Real::clamp(reach, 0.5, 32768.0);
+        let on = |x: f32| Real::clamp(x, 0.0, edge);
+        let (from, to) = (on(middle - reach), on(middle + reach));
+        let first = Real::min(Real::floor(from), edge - 1.0);
+        let whole = first + 1.0;
+        let last = Real::max(Real::floor(to), whole);
+        Self {
+            first: to_i32(first) as u32,
+            whole: to_i32(whole) as u32,
+            last: to_i32(last) as u32,
+            end: to_i32(Real::min(last + 1.0, edge)) as u32,
+            first_share: Real::saturate(Real::min(whole, to) - from),
+            last_share: Real::saturate(to - last),
+            length: reach + reach,
+            inside: to - from,
+        }
+    }
+}
+
+/// A rectangle over a summed-area table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// Along rows.
+    pub x: Span,
+    /// Along columns.
+    pub y: Span,
+}
+
+macro_rules! means {
+    ($region:ident: $fixed:ident, $quantized:ident, $($channel:ident)*) => {
+        impl Region {
+            /// The mean over the rectangle, each channel in [0, 1]. `before` gives the sum, modulo 2^32, over
+            /// so many columns and so many rows, from the first on. What lies beyond the table counts as
+            /// `beyond`.
+            #[inline(always)]
+            #[must_use]
+            pub fn $region(
+                self,
+                point: FixedPoint,
+                beyond: $quantized<f32>,
+                before: impl Fn(u32, u32) -> $fixed,
+            ) -> $quantized<f32> {
+                let Self { x, y } = self;
+                let row = |rows: u32| {
+                    let start = before(x.first, rows);
+                    let (whole, last) = (before(x.whole, rows), before(x.last, rows));
+                    let end = before(x.end, rows);
+                    (whole.minus(start), last.minus(whole), end.minus(last))
+                };
+                // Sums over rectangles above the same row, from each other.
+                let band = |above: ($fixed, $fixed, $fixed), below: ($fixed, $fixed, $fixed)| {
+                    let first = below.0.minus(above.0);
+                    let whole = below.1.minus(above.1);
+                    let last = below.2.minus(above.2);
+                    $quantized {
+                        $($channel: first.$channel as f32 * x.first_share
+                            + whole.$channel as f32
+                            + last.$channel as f32 * x.last_share,)*
+                    }
+                };
+                let (start, whole) = (row(y.first), row(y.whole));
+                let (last, end) = (row(y.last), row(y.end));
+                let (top, middle, bottom) = (band(start, whole), band(whole, last), band(last, end));
+                let texels = x.length * y.length;
+                let missing = texels - x.inside * y.inside;
+                let one: f32 = lit!(1.0);
+                let scale = one / (texels * Real::max(point.one as f32, one));
+                let missing = missing / texels;
+                $quantized {
+                    $($channel: Real::saturate(
+                        (top.$channel * y.first_share
+                            + middle.$channel
+                            + bottom.$channel * y.last_share)
+                            * scale
+                            + missing * beyond.$channel,
+                    ),)*
+                }
+            }
+        }
+    };
+}
+
+means!(mean_4: Fixed4, Quantized4, r g b a);
+means!(mean_6: Fixed6, Quantized6, r0 g0 b0 r1 g1 b1);
