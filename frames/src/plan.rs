@@ -412,7 +412,8 @@ pub fn plan(
         scene,
         mesh,
     };
-    let configurations = choices.configurations();
+    let mut configurations = choices.configurations();
+    configurations.retain(|c| c.suits(scene));
     progress.begin("timing each method", 1, 3);
     let mut times: BTreeMap<String, Times> = BTreeMap::new();
     for (i, c) in configurations.iter().enumerate() {

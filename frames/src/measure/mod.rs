@@ -55,6 +55,12 @@ impl Configuration {
         name
     }
 
+    /// Whether it is meant for a scene's light.
+    #[must_use]
+    pub fn suits(&self, scene: &Scene) -> bool {
+        !self.technique.is_soft || scene.area.radius > 0.0
+    }
+
     /// A scene with these shadows. What else the scene says of them, biases for example, was for
     /// another technique: it is as the technique has it.
     #[must_use]
@@ -112,14 +118,20 @@ impl Default for Choices {
 }
 
 impl Choices {
-    /// All of them.
+    /// All of them. Soft shadows have no filter: each once, with the narrowest.
     #[must_use]
     pub fn configurations(&self) -> Vec<Configuration> {
         let mut all = Vec::new();
+        let narrowest: Vec<u32> = self.filters.iter().copied().min().into_iter().collect();
         for &technique in &self.techniques {
+            let filters = if technique.is_soft {
+                &narrowest
+            } else {
+                &self.filters
+            };
             for &map in technique.maps {
                 for &size in &self.sizes {
-                    for &filter in &self.filters {
+                    for &filter in filters {
                         for &fit in &self.fits {
                             all.push(Configuration {
                                 technique,

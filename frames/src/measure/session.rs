@@ -34,7 +34,7 @@ impl Subject {
     /// What it holds, as a number (FNV-1a) that is another for another content.
     fn fingerprint(&self) -> u64 {
         let (camera, light) = (&self.scene.camera, self.scene.light);
-        let view = format!("{camera:?} {light:?}");
+        let view = format!("{camera:?} {light:?} {:?}", self.scene.area);
         let mesh: &Mesh = &self.mesh;
         let parts: [&[u8]; 3] = [
             view.as_bytes(),
@@ -55,6 +55,14 @@ pub struct Ask {
     pub configurations: Vec<Configuration>,
     /// How often each one's time is taken.
     pub rounds: usize,
+}
+
+impl Ask {
+    /// Those that are meant for a subject's light.
+    fn of<'a>(&'a self, subject: &'a Subject) -> impl Iterator<Item = &'a Configuration> {
+        let all = self.configurations.iter();
+        all.filter(|configuration| configuration.suits(&subject.scene))
+    }
 }
 
 /// A measured configuration.
@@ -225,7 +233,7 @@ impl Session {
             let key = subject.key();
             let truth = usize::from(self.truths.contains_key(&key));
             self.count(Kind::Truth, 1, truth);
-            for configuration in &ask.configurations {
+            for configuration in ask.of(subject) {
                 let both = (key.clone(), configuration.to_string());
                 let known = usize::from(self.errors.contains_key(&both));
                 self.count(Kind::Errors, 1, known);
@@ -298,7 +306,7 @@ impl Session {
             }
         };
         let name_of = |c: &Configuration| (key.clone(), c.to_string());
-        for configuration in &ask.configurations {
+        for configuration in ask.of(subject) {
             let (subject, name) = name_of(configuration);
             if self.errors.contains_key(&(subject.clone(), name.clone())) {
                 continue;
@@ -316,7 +324,7 @@ impl Session {
             })?;
             status(&self.finished(Kind::Errors, start, what));
         }
-        let mut order: Vec<&Configuration> = ask.configurations.iter().collect();
+        let mut order: Vec<&Configuration> = ask.of(subject).collect();
         for round in 0..ask.rounds {
             order.reverse();
             for configuration in &order {
@@ -336,7 +344,7 @@ impl Session {
                 status(&self.finished(Kind::Round, start, what));
             }
         }
-        let known = ask.configurations.iter().filter_map(|configuration| {
+        let known = ask.of(subject).filter_map(|configuration| {
             let both = name_of(configuration);
             let (errors, bytes) = *self.errors.get(&both)?;
             Some(Measurement {

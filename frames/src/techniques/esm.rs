@@ -20,6 +20,7 @@ pub const TECHNIQUE: Technique = Technique {
         ..DEPTHS[0]
     }],
     is_lower_bound: true,
+    is_soft: false,
     add,
 };
 

@@ -20,6 +20,7 @@ pub const TECHNIQUE: Technique = Technique {
         map(TexelFormat::Rgba32Float, encoding::PLAIN),
     ],
     is_lower_bound: true,
+    is_soft: false,
     add,
 };
 

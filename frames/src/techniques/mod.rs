@@ -35,6 +35,9 @@ pub struct Technique {
     pub maps: &'static [Map],
     /// Whether its shadow is never darker than [`crate::truth::filtered`], but for rounding.
     pub is_lower_bound: bool,
+    /// Whether its penumbrae are those of a light with an area. It has no filter of a fixed width then,
+    /// and of a light that is a point nothing to gain.
+    pub is_soft: bool,
     /// Adds its passes; gives the picture.
     pub add: fn(&mut Graph, &Given) -> Result<Handle>,
 }

@@ -27,6 +27,7 @@ pub const TECHNIQUE: Technique = Technique {
         ),
     ],
     is_lower_bound: true,
+    is_soft: false,
     add,
 };
 
