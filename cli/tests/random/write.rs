@@ -254,9 +254,16 @@ impl Writer {
             }
             Stmt::Match(id, number, arms) => {
                 let count = arms.len();
-                self.line(&format!("let mut v{id}: u32 = match {} % {count} {{", expr(number)));
+                self.line(&format!(
+                    "let mut v{id}: u32 = match {} % {count} {{",
+                    expr(number)
+                ));
                 for (n, arm) in arms.iter().enumerate() {
-                    let pattern = if n + 1 == count { "_".into() } else { n.to_string() };
+                    let pattern = if n + 1 == count {
+                        "_".into()
+                    } else {
+                        n.to_string()
+                    };
                     self.line(&format!("    {pattern} => {{"));
                     self.depth += 1;
                     self.inner(arm);
