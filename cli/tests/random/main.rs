@@ -59,13 +59,13 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(columns: Vec<String>) -> Self {
+    fn new(name: &str, columns: Vec<String>) -> Self {
         // The same each time, so that what it depends on is compiled once.
-        let folder = root().join("target/tmp/random-kernels");
+        let folder = root().join("target/tmp").join(name);
         fs::create_dir_all(folder.join("src")).expect("a folder");
         let dsl = root().join("kernels/dsl");
         let manifest = format!(
-            "[package]\nname = \"random-kernels\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n\
+            "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n\
              [lib]\ncrate-type = [\"lib\", \"dylib\"]\n\n\
              [dependencies]\nhankel-dsl = {{ path = {dsl:?} }}\n\n[workspace]\n"
         );
@@ -76,7 +76,7 @@ impl Bench {
 
     /// Runs kernels; if they cannot be compiled together, in halves.
     fn run(&self, programs: &[&Program], columns: &[String]) -> Outcomes {
-        match self.report(programs, columns) {
+        match self.report(&write::library(programs), columns) {
             Ok(report) => Outcomes::of(&report, programs.len()),
             Err(words) if programs.len() == 1 => Outcomes {
                 problems: vec![[("compiler".to_owned(), ("refused".to_owned(), words))].into()],
@@ -97,13 +97,8 @@ impl Bench {
     }
 
     /// The matrix's report; otherwise what the command said.
-    fn report(
-        &self,
-        programs: &[&Program],
-        columns: &[String],
-    ) -> Result<serde_json::Value, String> {
-        let library = self.folder.join("src/lib.rs");
-        fs::write(library, write::library(programs)).expect("a file");
+    fn report(&self, library: &str, columns: &[String]) -> Result<serde_json::Value, String> {
+        fs::write(self.folder.join("src/lib.rs"), library).expect("a file");
         let file = self.folder.join("report.json");
         let _ = fs::remove_file(&file);
         let mut command = Command::new(env!("CARGO_BIN_EXE_hankel"));
@@ -235,7 +230,7 @@ fn random_kernels_give_the_same_bits_everywhere() {
         "all" => Vec::new(),
         some => some.split(',').map(str::to_owned).collect(),
     };
-    let bench = Bench::new(columns);
+    let bench = Bench::new("random-kernels", columns);
     let (mut kernels, mut cells) = (0, 0);
     let mut absent: BTreeMap<String, usize> = BTreeMap::new();
     let mut seen: Vec<(Program, Problems)> = Vec::new();
@@ -279,6 +274,24 @@ fn random_kernels_give_the_same_bits_everywhere() {
         }
     }
     assert!(seen.is_empty(), "{report}");
+}
+
+/// What the generator found in rust-gpu is still there, and its message says what to write.
+#[test]
+#[ignore = "compiles with rust-gpu"]
+fn rust_gpu_refuses_two_arms_that_do_nothing() {
+    if !has_compiler() {
+        return;
+    }
+    let case = root().join("tests/upstream/rust-gpu-equal-arms/case.rs");
+    let case = fs::read_to_string(case).expect("the case");
+    let library = format!("//! A case.\n#![no_std]\nuse hankel_dsl::*;\n{case}\nkernels![arms];\n");
+    let columns = ["native".to_owned(), "spirv".to_owned()];
+    let bench = Bench::new("equal-arms", columns.to_vec());
+    let words = bench
+        .report(&library, &columns)
+        .expect_err("mended: programs may have arms that give no value, `Stmt::Match`");
+    assert!(words.contains("write `if`"), "{words}");
 }
 
 #[test]

@@ -604,7 +604,10 @@ impl Maker {
         let fits = |form: &&'static Form| {
             let outside = ["row.", "settings.", "table.", "floats."];
             let outside = outside.iter().any(|it| form.text.contains(it)) || form.text == "i";
+            // Where a division fails, an invocation would end before a barrier: that is refused.
+            let divides = form.text.contains("{1} | 1") || form.text.contains("len()");
             form.result == ty
+                && !(self.cooperative && divides)
                 && form.only.is_none_or(|floats| floats == self.floats)
                 && !(self.inside && outside)
         };

@@ -45,7 +45,7 @@ struct Expansion {
 }
 
 /// What messages are known: words that they contain, and what to write instead.
-const KNOWN: [(&[&str], &str); 22] = [
+const KNOWN: [(&[&str], &str); 23] = [
     (
         &["cannot offset a pointer"],
         "a shader cannot walk through an array or a slice by pointer, as iterators, `swap` and \
@@ -55,6 +55,11 @@ const KNOWN: [(&[&str], &str); 22] = [
         &["cannot cast between pointer types"],
         "memory has one type in a shader. An enum whose variants hold different types: a structure \
          with a tag and a field for each. A slice of an array: the array itself, or its reference",
+    ),
+    (
+        &["OpSwitch", "is duplicated"],
+        "two arms of a `match` that do nothing become one, which rust-gpu 0.10 refuses: write `if`, or let \
+         each arm give a value, `y = match x { 0 => 5, _ => y }`",
     ),
     (
         &["OpPhi", "VariablePointers"],
@@ -327,6 +332,9 @@ mod tests {
                 .unwrap()
                 .contains("a > b")
         );
+        let said = "malformed SPIR-V (in OpSwitch: `OpPhi` (#0 in %9)'s case for source block %8 is \
+                    duplicated)";
+        assert!(advice(said).unwrap().contains("write `if`"));
         assert_eq!(advice("mismatched types"), None);
     }
 }

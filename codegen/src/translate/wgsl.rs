@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use naga::back::pipeline_constants::process_overrides;
 use naga::back::{PipelineConstants, wgsl};
 use naga::valid::ModuleInfo;
-use naga::{ImageClass, Module, StorageFormat, TypeInner};
+use naga::{ImageClass, Module, StorageAccess, StorageFormat, TypeInner};
 
 use super::{Job, Place, Text, Written, text, validate};
 use crate::Language;
@@ -14,6 +14,9 @@ use crate::error::{Failure, Step};
 
 /// WebGPU's feature for storage textures of more formats.
 const MORE_FORMATS: &str = "texture-formats-tier1";
+
+/// WGSL's language feature for storage textures that are read.
+const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
 
 /// The largest f32, as naga writes it.
 const LARGEST_AS_WRITTEN: &str = "340282350000000000000000000000000000000";
@@ -62,6 +65,9 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     if ir.globals().any(|(_, inner)| needs_more_formats(inner)) {
         requires.push(MORE_FORMATS.to_owned());
     }
+    if ir.globals().any(|(_, inner)| reads_storage(inner)) {
+        requires.push(READ_STORAGE.to_owned());
+    }
     let entry_point = text::name_before(&source_after_stage(&source), "(")
         .unwrap_or_else(|| job.kernel.name.clone());
     Ok(Written::Text(Text {
@@ -103,6 +109,17 @@ fn needs_more_formats(inner: &TypeInner) -> bool {
         ),
         _ => false,
     }
+}
+
+/// Whether it is a storage texture that is read.
+fn reads_storage(inner: &TypeInner) -> bool {
+    matches!(
+        inner,
+        TypeInner::Image {
+            class: ImageClass::Storage { access, .. },
+            ..
+        } if access.contains(StorageAccess::LOAD)
+    )
 }
 
 /// The name that the declaration after `@group(g) @binding(b)` gives.
