@@ -198,12 +198,12 @@ pub fn summed_area(
         .arg("area", given.area)
         .arg("depth", depth)
         .elements(size as usize * size as usize)?;
-    for (label, step, between) in [("sum rows", 1, size), ("sum columns", size, 1)] {
+    for (label, across) in [("sum rows", 0), ("sum columns", 1)] {
         let lines = Lines {
             invocations: 64 * size,
             length: size,
-            step,
-            between,
+            across,
+            padding: 0,
         };
         let lines = graph.constant("lines", &lines);
         let pass = graph.compute(label, sum);

@@ -12,7 +12,7 @@ use crate::visibility::SAMPLES;
 pub const TECHNIQUE: Technique = Technique {
     name: "pcss",
     summary: "percentage-closer soft shadows of an area light",
-    // As for `pcf`: also without a penumbra, samples lie as far apart as a texel is wide.
+    // As for `pcf`: without a penumbra, too, samples lie as far apart as a texel is wide.
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: false,

@@ -1,5 +1,6 @@
 //! Soft shadows of an area light: percentage-closer soft shadows (\[PCSS\]), variance soft shadows
-//! (\[VSSM\]), and moment soft shadows (\[BHS\], lecture, "Moment soft shadow mapping"). Sources are named in [`hankel_moments`].
+//! (\[VSSM\]), and moment soft shadows (\[BHS\], lecture, "Moment soft shadow mapping"). Sources are named
+//! in [`hankel_moments`].
 //!
 //! The light is directional, so that what lies a depth d before a receiver is seen from it, against the
 //! light, moved by up to d times the light's half width: the same for all receivers. Penumbrae are therefore
@@ -71,7 +72,7 @@ impl Area {
     }
 }
 
-/// Lines of a table: its rows or its columns.
+/// Lines of a table: its rows or its columns. A workgroup of 64 invocations has a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
 #[repr(C)]
 pub struct Lines {
@@ -81,12 +82,11 @@ pub struct Lines {
     /// Elements of a line.
     #[range(1..=64)]
     pub length: u32,
-    /// From one element of a line to the next.
-    #[range(1..=16)]
-    pub step: u32,
-    /// From one line's first element to the next one's.
-    #[range(1..=16)]
-    pub between: u32,
+    /// 0: a line's elements follow each other (rows). 1: lines do (columns).
+    #[values(0, 1)]
+    pub across: u32,
+    /// Fills the structure up.
+    pub padding: u32,
 }
 
 /// What a table's entries are made of: integers modulo 2^32.
@@ -154,13 +154,17 @@ macro_rules! prefix_sums {
         pub fn $name(
             #[local_index] me: u32,
             #[group_id] line: u32,
+            #[group_count] count: u32,
             #[shared] totals: Shared<'_, $element, 64>,
             #[uniform] lines: &Lines,
             #[storage] table: StorageMut<'_, $element>,
         ) {
             // Lines do not reach beyond the table, whatever the uniform says.
             let entries = table.len();
-            let place = |k: u32| line * lines.between + k * lines.step;
+            let is_row = lines.across == 0;
+            let step = if is_row { 1 } else { count };
+            let first_of_all = if is_row { line * lines.length } else { line };
+            let place = |k: u32| first_of_all + k * step;
             let share = lines.length.div_ceil(64);
             let first = me * share;
             let end = if first + share < lines.length {
@@ -284,7 +288,8 @@ fn region(place: Vec2, reach: Vec2, size: UVec2) -> Region {
 /// before the first of them.
 #[inline(always)]
 fn entry(columns: u32, rows: u32, size: UVec2) -> (u32, bool) {
-    let is_any = columns > 0 && rows > 0;
+    // Without a branch.
+    let is_any = (columns > 0) & (rows > 0);
     (
         if is_any {
             (rows - 1) * size.x + columns - 1

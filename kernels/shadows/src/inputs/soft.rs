@@ -77,26 +77,18 @@ fn tables<const N: usize>(request: &Request, of_map: &[[u32; N]]) -> Vec<Given> 
         let mut element = || [0; N].map(|_: u32| s.bits() as u32);
         (0..count).map(|_| element()).collect::<Vec<_>>()
     };
-    let lines = |count: u32, length: u32, step: u32, between: u32| Lines {
+    let lines = |count: u32, length: u32, across: u32| Lines {
         invocations: 64 * count,
         length,
-        step,
-        between,
+        across,
+        padding: 0,
     };
     [
-        (
-            "rows of a map",
-            lines(height, width, 1, width),
-            of_map.to_vec(),
-        ),
-        (
-            "columns of a map",
-            lines(width, height, width, 1),
-            of_map.to_vec(),
-        ),
-        ("long rows", lines(5, 331, 1, 331), any(5 * 331)),
-        ("long columns", lines(7, 192, 7, 1), any(7 * 192)),
-        ("one row of one", lines(1, 1, 1, 1), any(1)),
+        ("rows of a map", lines(height, width, 0), of_map.to_vec()),
+        ("columns of a map", lines(width, height, 1), of_map.to_vec()),
+        ("long rows", lines(5, 331, 0), any(5 * 331)),
+        ("long columns", lines(7, 192, 1), any(7 * 192)),
+        ("one row of one", lines(1, 1, 0), any(1)),
     ]
     .into_iter()
     .map(|(what, lines, table)| {
