@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hankel_frames::measure::{Ask, Choices, Measurement, Session, Subject, sample};
+use hankel_frames::measure::{Ask, Choices, Measurement, Session, Subject};
 use hankel_frames::plan::{Plan, Wanted, plan};
 use hankel_frames::scene::{Fit, Scene};
 use hankel_frames::techniques::Technique;
@@ -134,7 +134,7 @@ const fn within(error: f64) -> Wanted {
 }
 
 #[test]
-fn a_plan_is_within_the_error_and_near_the_fastest() {
+fn a_plan_is_within_the_error() {
     let subject = subject([96, 54]);
     let truth = by_rays(&subject.scene, &subject.mesh, &mut |_| ());
     let all = exhaustively(&subject, &truth);
@@ -152,26 +152,6 @@ fn a_plan_is_within_the_error_and_near_the_fastest() {
     );
     assert!(plan.probed <= plan.considered && plan.considered == all.len());
     assert!(plan.pixels <= 96 * 54 && plan.pixels >= 4096);
-    // Of the good ones none is much faster. (Tests run beside others: three times, and not 1.15. Between
-    // the fastest and the slowest there is more.)
-    let mut device = NativeDevice::new();
-    let mut time = |c: &hankel_frames::measure::Configuration| {
-        let scene = c.on(&subject.scene);
-        let samples =
-            (0..5).map(|_| sample(&mut device, &NoShaders, &scene, &subject.mesh).unwrap());
-        samples.map(|s| s.seconds()).fold(f64::INFINITY, f64::min)
-    };
-    let chosen = time(&plan.configuration);
-    for c in choices().configurations() {
-        if all[&c.to_string()] <= budget {
-            let other = time(&c);
-            assert!(
-                chosen < 3.0 * other,
-                "{}: {chosen}; {c}: {other}",
-                plan.choice
-            );
-        }
-    }
     let text = plan.to_string();
     for part in [
         "1. depth: light_depth",
