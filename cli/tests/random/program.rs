@@ -604,10 +604,12 @@ impl Maker {
         let fits = |form: &&'static Form| {
             let outside = ["row.", "settings.", "table.", "floats."];
             let outside = outside.iter().any(|it| form.text.contains(it)) || form.text == "i";
-            // Where a division fails, an invocation would end before a barrier: that is refused.
-            let divides = form.text.contains("{1} | 1") || form.text.contains("len()");
+            // Where a division or an index fails, an invocation would end before a barrier: that is
+            // refused, even where neither can fail.
+            let fails = ["{1} | 1", "len()", "as usize"];
+            let fails = fails.iter().any(|it| form.text.contains(it));
             form.result == ty
-                && !(self.cooperative && divides)
+                && !(self.cooperative && fails)
                 && form.only.is_none_or(|floats| floats == self.floats)
                 && !(self.inside && outside)
         };

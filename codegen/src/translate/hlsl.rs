@@ -106,6 +106,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     // (`tests/upstream/dxc-literal-selection`).
     let source = text::suffixed(&source);
     let source = without_zero_arrays(&source);
+    let source = without_repetitions(&source);
     let source = job.open_constants(source)?;
     let mut source = doubles.apply(job.precise(source, &["float", "double"])?);
     // fxc, which has models up to 5.1, does not know attributes of Vulkan.
@@ -255,6 +256,27 @@ impl Doubles {
     }
 }
 
+/// naga's functions for the sizes of storage textures once each: it writes one for each format, and
+/// several formats have one type in HLSL (`tests/upstream/naga-hlsl-size-queries`).
+fn without_repetitions(source: &str) -> String {
+    const NAME: &str = " NagaRWDimensions";
+    let mut seen: Vec<&str> = Vec::new();
+    let mut plain = String::with_capacity(source.len());
+    let mut dropping = false;
+    for line in source.split_inclusive('\n') {
+        let is_header = line.starts_with("uint") && line.contains(NAME);
+        dropping |= is_header && seen.contains(&line);
+        if is_header {
+            seen.push(line);
+        }
+        if !dropping {
+            plain.push_str(line);
+        }
+        dropping &= line.trim_end() != "}";
+    }
+    plain
+}
+
 /// Arrays of functions without the zeros that naga gives every variable, which glslang's HLSL refuses
 /// for arrays (`tests/upstream/glslang-zero-array`). Nothing reads them: a Rust array has values
 /// before anybody can.
@@ -372,7 +394,9 @@ const fn vulkan_format(format: StorageFormat) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Doubles, Register, plain_samplers, with_format, without_zero_arrays};
+    use super::{
+        Doubles, Register, plain_samplers, with_format, without_repetitions, without_zero_arrays,
+    };
 
     const fn register(class: &'static str, number: u32, space: u8) -> Register {
         Register {
@@ -380,6 +404,17 @@ mod tests {
             number,
             space,
         }
+    }
+
+    #[test]
+    fn sizes_are_asked_by_one_function_of_each_type() {
+        let one = "uint2 NagaRWDimensions2D(RWTexture2D<float4> tex)\n{\n    return ret.xy;\n}\n\n";
+        let other = one.replace("float4", "int4");
+        let text = format!("{one}{one}{other}void main()\n{{\n}}\n");
+        assert_eq!(
+            without_repetitions(&text),
+            format!("{one}\n{other}void main()\n{{\n}}\n")
+        );
     }
 
     #[test]

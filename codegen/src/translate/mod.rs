@@ -492,8 +492,8 @@ impl Ir {
         }
         if glsl && self.gathers_compared_layers() {
             return Some(format!(
-                "naga's {language} writer gives a gather of comparisons in an array of textures \
-                 gradients, which it does not take"
+                "naga's {language} writer gives a gather of comparisons in an array of textures or a \
+                 cube gradients, which it does not take"
             ));
         }
         if language == Language::Msl
@@ -680,19 +680,29 @@ impl Ir {
         })
     }
 
-    /// Whether comparisons with the texels of a layer are gathered.
+    /// Whether comparisons with the texels of a layer or of a cube are gathered.
     fn gathers_compared_layers(&self) -> bool {
-        self.has(|expression| {
+        let gathers = self.has(|expression| {
             matches!(
                 expression,
                 Expression::ImageSample {
                     gather: Some(_),
                     depth_ref: Some(_),
-                    array_index: Some(_),
                     ..
                 }
             )
-        })
+        });
+        let layered = self.globals().any(|(_, inner)| {
+            matches!(
+                inner,
+                TypeInner::Image {
+                    class: ImageClass::Depth { .. },
+                    dim,
+                    arrayed,
+                } if *arrayed || *dim == ImageDimension::Cube
+            )
+        });
+        gathers && layered
     }
 
     /// Whether a texel of a depth texture is read as it is.

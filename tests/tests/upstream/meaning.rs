@@ -100,6 +100,17 @@ fn naga_reads_what_a_thread_wrote_to_a_texture_without_a_fence() {
 }
 
 #[test]
+fn naga_writes_a_function_of_hlsl_twice() {
+    let source = to_hlsl(&wgsl("naga-hlsl-size-queries"));
+    let header = "uint2 NagaRWDimensions2D(RWTexture2D<float4> tex)";
+    assert_eq!(
+        source.matches(header).count(),
+        2,
+        "mended: drop `without_repetitions` in codegen/src/translate/hlsl.rs\n{source}"
+    );
+}
+
+#[test]
 fn naga_reads_unordered_comparisons_as_ordered() {
     let wgsl = to_wgsl(&read_by_naga("naga-unordered"));
     assert!(
