@@ -100,7 +100,7 @@ proptest! {
         let points: Vec<_> = points.iter().map(|(z, w)| (z * spread, w / total)).collect();
         let (m, six) = (single(moments(&points)), six(&points));
         for z in [z, points[0].0] {
-            let found = blockers_4(m, *z as f32);
+            let found = blockers_4(m, z as f32);
             prop_assert_eq!(found.share, hamburger_4(m, z as f32));
             let distance = f64::from(found.distance(1e-3));
             prop_assert!(found.moment >= 0.0 && distance <= z + 1.0 + 1e-6, "{found:?}");
