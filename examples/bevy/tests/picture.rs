@@ -26,8 +26,8 @@ fn bevy() -> PathBuf {
 
 /// The library as `hankel build --form functions` writes it for naga_oil.
 fn library() -> String {
-    let texts =
-        crates::texts(&here().join("../../kernels/shadows/Cargo.toml")).expect("the sources");
+    let manifest = here().join("../../kernels/shadows/Cargo.toml");
+    let texts = crates::sources(&manifest).expect("the sources").texts;
     let libraries = functions::read(&texts).unwrap_or_else(|e| panic!("{e}"));
     let form = FORMS
         .iter()
