@@ -15,6 +15,7 @@
 //!    fastest few of these have their times taken in rounds, and the fastest is the plan.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fmt;
 
 use hankel_host::device::Device;
@@ -417,8 +418,8 @@ pub fn plan(
     progress.begin("timing each method", 1, 3);
     let mut times: BTreeMap<String, Times> = BTreeMap::new();
     for (i, c) in configurations.iter().enumerate() {
-        if !times.contains_key(&c.method()) {
-            times.insert(c.method(), search.times(c, choices)?);
+        if let Entry::Vacant(method) = times.entry(c.method()) {
+            method.insert(search.times(c, choices)?);
         }
         progress.advance((i + 1) as f32 / configurations.len() as f32);
     }
