@@ -670,7 +670,13 @@ mod tests {
     #[test]
     fn an_estimate_holds_the_exact_error() {
         // One pixel in 50 is off by 0.5, in no order.
-        let of = |i: usize| if (i * 7919) % 50 == 0 { 0.25 } else { 0.0 };
+        let of = |i: usize| {
+            if (i * 7919).is_multiple_of(50) {
+                0.25
+            } else {
+                0.0
+            }
+        };
         let all: Vec<f64> = (0..50_000).map(of).collect();
         let exact = (0.25_f64 / 50.0).sqrt();
         let mut width = f64::INFINITY;

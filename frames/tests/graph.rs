@@ -48,9 +48,9 @@ fn refused<T: std::fmt::Debug>(result: Result<T, GraphError>, wanted: &[&str]) {
 fn kernels_are_found_by_their_names() {
     let mut g = graph();
     refused(
-        g.compute("smooth", "blurr").image([8, 8]),
+        g.compute("smooth", "nothing_like_it").image([8, 8]),
         &[
-            "pass `smooth`, kernel `blurr`",
+            "pass `smooth`, kernel `nothing_like_it`",
             "there is no such kernel",
             "kernels!",
         ],

@@ -93,7 +93,7 @@ pub fn library(programs: &[&Program]) -> String {
     let mut names = String::new();
     for (n, program) in programs.iter().enumerate() {
         text += &kernel(n, program);
-        let _ = write!(names, "    m{n}::k{n},\n");
+        let _ = writeln!(names, "    m{n}::k{n},");
     }
     text + "\nkernels![\n" + &names + "];\n"
 }
