@@ -5,11 +5,20 @@ use std::collections::BTreeMap;
 
 use hankel_codegen::lint::{Construct, Finding};
 use hankel_codegen::translate::Ir;
-use hankel_dsl::native::describe::{Kernel, Output, Role};
+use hankel_dsl::native::describe::{Kernel, Output, Role, Stage};
 use hankel_tests::Crate;
 
-/// Whether it reads or writes no texture.
+/// Whether it reads or writes no texture, and its invocations do not work together.
 fn maps_rows(kernel: &Kernel) -> bool {
+    if matches!(
+        kernel.stage,
+        Stage::Compute {
+            cooperative: true,
+            ..
+        }
+    ) {
+        return false;
+    }
     let reads = |role: &Role| matches!(role, Role::Texture { .. });
     let writes = |output: &Output| matches!(output, Output::Texture { .. });
     !kernel.params.iter().any(|param| reads(&param.role)) && !kernel.outputs.iter().any(writes)

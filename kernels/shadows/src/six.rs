@@ -133,13 +133,13 @@ pub fn resolve_symmetric_6(
 /// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis.
 #[inline(always)]
 pub(crate) fn quantized(depth: Texture2dMultisampled<'_>, at: UVec2, samples: u32) -> Texels {
-    mean(depth, at, samples, |z| {
-        let q = quantize_symmetric_6(symmetric(z));
-        Texels {
-            first: Vec4::new(q.r0, q.g0, q.b0, 0.0),
-            second: Vec4::new(q.r1, q.g1, q.b1, 0.0),
-        }
-    })
+    // Half by half: glslang takes minutes for pinned sums of a structure in a loop (it looks for what
+    // has to be `precise` through each member again).
+    let sum = |half: usize| mean(depth, at, samples, |z| halves(z)[half]);
+    Texels {
+        first: sum(0),
+        second: sum(1),
+    }
 }
 
 /// Means of a texel's six moments, depths moved to [-1, 1], as they are, for 32-bit maps.
@@ -218,4 +218,14 @@ pub fn shade_hamburger_6(
         };
         hamburger_6(m.lerp(*target, light.moment_bias), 2.0 * z - 1.0).lower
     })
+}
+
+/// A depth's quantised moments.
+#[inline(always)]
+fn halves(z: f32) -> [Vec4; 2] {
+    let q = quantize_symmetric_6(symmetric(z));
+    [
+        Vec4::new(q.r0, q.g0, q.b0, 0.0),
+        Vec4::new(q.r1, q.g1, q.b1, 0.0),
+    ]
 }
