@@ -63,8 +63,10 @@ if [ "${for_tests:-no}" = yes ]; then
     mkdir -p "$HANKEL_TOOLS"
     if ! cmp -s xtask/tools/package-lock.json "$HANKEL_TOOLS/package-lock.json" ||
         [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ] ||
+        [ ! -e "$HANKEL_TOOLS/node_modules/three/package.json" ] ||
         [ ! -e "$HANKEL_TOOLS/node_modules/typescript/package.json" ]; then
-        echo "Installing Dawn for Node.js and TypeScript (npm: webgpu, MIT and BSD-3-Clause; typescript, Apache-2.0)"
+        echo "Installing Dawn for Node.js, three.js and TypeScript (npm: webgpu, MIT and BSD-3-Clause;" \
+            "three and @types/three, MIT; typescript, Apache-2.0)"
         cp xtask/tools/package.json xtask/tools/package-lock.json "$HANKEL_TOOLS"
         npm ci --silent --prefix "$HANKEL_TOOLS"
     fi

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+#[cfg(feature = "frames")]
+use hankel_frames::scene::Scene;
 
 /// Shaders for every language from kernels written once in Rust.
 ///
@@ -170,7 +172,7 @@ The file of --bindings puts single bindings elsewhere, with names as in manifest
   essl310 = { binding = 1 }
 
 With --form functions it gets FORM/PREFIX_LIBRARY.EXTENSION, libraries of functions to include and call,
-and functions.json, for each form: wgsl, naga-oil, wesl, hlsl, glsl, godot, msl, slang, c, rust.")]
+and functions.json, for each form: wgsl, naga-oil, wesl, hlsl, glsl, godot, msl, tsl, slang, c, rust.")]
 pub struct Build {
     #[command(flatten)]
     pub generate: Generate,
@@ -539,7 +541,7 @@ pub struct Maps {
     /// Texels along an edge of the map, 16 to 4096; several with commas between
     /// [default: 256,512,1024,2048].
     #[arg(long, value_name = "TEXELS", value_delimiter = ',',
-          value_parser = clap::value_parser!(u32).range(16..=4096))]
+          value_parser = clap::value_parser!(u32).range(16..=i64::from(Scene::MAX_MAP)))]
     pub size: Vec<u32>,
     /// Taps of the filter along an axis, odd, 1 (none) to 31; several with commas between
     /// [default: 1,3,5,9].
@@ -712,8 +714,11 @@ fn percentage(text: &str) -> Result<f64, String> {
 #[cfg(feature = "frames")]
 fn taps(text: &str) -> Result<u32, String> {
     match text.parse::<u32>() {
-        Ok(taps) if (1..=31).contains(&taps) && taps % 2 == 1 => Ok(taps),
-        _ => Err("give an odd number from 1 to 31".into()),
+        Ok(taps) if (1..=Scene::MAX_FILTER).contains(&taps) && taps % 2 == 1 => Ok(taps),
+        _ => Err(format!(
+            "give an odd number from 1 to {}",
+            Scene::MAX_FILTER
+        )),
     }
 }
 

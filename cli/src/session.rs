@@ -24,7 +24,8 @@ use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language};
 use hankel_dsl::native::describe::Kernel;
 use hankel_dsl::native::lanes;
-use hankel_host::crates::{KernelCrate, Native};
+use hankel_host::crates::{KernelCrate, KernelEntry, Native};
+use hankel_host::inputs::{self, Case};
 use hankel_host::worker::Worker;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
@@ -368,12 +369,16 @@ impl Session {
     }
 }
 
+/// Where this program lies.
+pub fn this_program() -> Result<PathBuf> {
+    std::env::current_exe()
+        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))
+}
+
 /// This program, to be started again for the kernels of other crates.
 fn worker(limit: Duration) -> Result<Worker> {
-    let program = std::env::current_exe()
-        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))?;
     Ok(Worker {
-        program,
+        program: this_program()?,
         arguments: vec![WORKER.into()],
         limit,
     })
@@ -536,6 +541,16 @@ fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, u32>> {
         }
     }
     Ok(values)
+}
+
+/// The inputs that parity makes for an entry point.
+pub fn cases(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>> {
+    inputs::of_entry(entry, seed).map_err(|e| {
+        Failure::input(
+            format!("kernel `{}`: there are no inputs: {e}", entry.kernel.name),
+            "Mend the function that makes them, or the attributes of its parameters.",
+        )
+    })
 }
 
 /// Refuses a name of an instruction set that the lanes would pass over.

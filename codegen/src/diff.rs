@@ -421,3 +421,52 @@ impl fmt::Display for Diff {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::functions::api::{LibraryRecord, Record};
+
+    fn record(signatures: &[(&str, &str)]) -> Record {
+        let library = LibraryRecord {
+            api: 1,
+            signatures: signatures
+                .iter()
+                .map(|(name, signature)| ((*name).into(), (*signature).into()))
+                .collect(),
+        };
+        Record {
+            hankel: "1".into(),
+            prefix: "hankel".into(),
+            libraries: [("shadows".into(), library)].into(),
+            files: BTreeMap::new(),
+        }
+    }
+
+    #[test]
+    fn a_changed_signature_is_of_the_interface_and_a_new_one_is_not() {
+        let old = record(&[("bound", "(z: f32) -> f32")]);
+        let more = record(&[("bound", "(z: f32) -> f32"), ("bias", "() -> f32")]);
+        let other = record(&[("bound", "(z: vec2<f32>) -> f32")]);
+        assert!(of_libraries(&old, &old).is_empty());
+        let offered = of_libraries(&old, &more);
+        assert!(!offered.is_empty() && !offered.changes_interface());
+        assert!(of_libraries(&old, &other).changes_interface());
+        assert!(of_libraries(&more, &old).changes_interface());
+    }
+
+    #[test]
+    fn elements_with_names_are_compared_by_them() {
+        let values = |text: &str| {
+            let mut values = BTreeMap::new();
+            let json = serde_json::from_str(text).expect("JSON");
+            flatten(String::new(), json, &mut values);
+            values
+        };
+        // Their order does not count, that of others does.
+        let one = values(r#"{"a": [{"name": "x", "n": 1}, {"name": "y", "n": 2}], "b": [1, 2]}"#);
+        let two = values(r#"{"a": [{"name": "y", "n": 2}, {"name": "x", "n": 1}], "b": [2, 1]}"#);
+        assert_eq!(one["a.x.n"], two["a.x.n"]);
+        assert_ne!(one["b"], two["b"]);
+    }
+}

@@ -465,6 +465,15 @@ fn text_is_as_a_person_writes_it() {
         msl.contains("inline float f(float x) {\n    #pragma METAL fp contract(off)"),
         "{msl}"
     );
+    let tsl = text(&libraries, "tsl");
+    let function = "/** Doubles `x` [Knuth]. */\nexport const f = /*@__PURE__*/ Fn(([x]) => {\n    // Twice \
+                    beta^2.\n    const y = x.mul(2).toConst('y');\n    return y.mul(y);\n}).setLayout({\n    name: \
+                    'hankel_f', type: 'float', inputs: [\n        { name: 'x', type: 'float' },\n    ],\n});\n";
+    assert!(tsl.ends_with(function), "{tsl}");
+    assert!(
+        tsl.contains("import {\n    Fn\n} from 'three/tsl';\n"),
+        "{tsl}"
+    );
 }
 
 const LOOKUP: &str = "/// The mean of what is looked up.\n#[function]\npub fn f(count: u32, depth_at: impl \
@@ -483,6 +492,14 @@ fn what_the_host_looks_up_is_handed_in() {
             .contains("template <typename DepthAt>\ninline float f(uint count, DepthAt depth_at)")
     );
     assert!(!text(&libraries, "wgsl").contains("fn hankel_f"));
+    // In JavaScript a function that gives a node. Its loop's name is its own, for others may run around it.
+    let tsl = text(&libraries, "tsl");
+    let function = "/** The mean of what is looked up. */\nexport const f = (count, depthAt) => Fn(([count]) => {\n    \
+                    const sum = depthAt(uint(0)).toVar();\n    Loop({ start: uint(1), end: count, type: 'uint', \
+                    condition: '<', name: 'hankel_f_i' }, (each) => {\n        const i = \
+                    each.hankel_f_i.toConst();\n        sum.assign(sum.add(depthAt(i)));\n    });\n    return \
+                    sum.div(float(count));\n})(count);\n";
+    assert!(tsl.ends_with(function), "{tsl}");
 
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -573,4 +590,31 @@ fn a_prefix_is_a_name() {
     let text = hlsl.text(&libraries[0], &naming, "0");
     assert!(text.contains("float my_engine_f(float x)"), "{text}");
     assert!(text.contains("#ifndef MY_ENGINE_SAMPLE_HLSL"), "{text}");
+}
+
+/// Rust's names become JavaScript's, but none hides what the module imports or gives, or another local.
+#[test]
+fn names_are_those_of_javascript_and_unique() {
+    let source = "/// By `b_b` and [`two_max`].\n#[function]\npub fn f(b_b: f32, bB: f32, uv_uint: f32) -> f32 {\n    \
+                  let undefined = b_b * bB;\n    let two_max = two_max(undefined, uv_uint) - undefined;\n    \
+                  two_max * two_max + undefined\n}\n/// Twice the larger one.\n#[function]\npub fn two_max(a: f32, b: f32) -> \
+                  f32 {\n    Real::max(a, b) * 2.0\n}";
+    let tsl = text(&one(source).unwrap(), "tsl");
+    let function = "/** By `bB` and `twoMax`. */\nexport const f = /*@__PURE__*/ Fn(([bB, bB_, uvUint]) => {\n    \
+                    const undefined_ = bB.mul(bB_).toConst('undefined_');\n    const twoMax_ = twoMax(undefined_, \
+                    uvUint).sub(undefined_).toConst('twoMax_');\n    return twoMax_.mul(twoMax_).add(undefined_);\n\
+                    }).setLayout({";
+    assert!(tsl.contains(function), "{tsl}");
+}
+
+#[test]
+fn types_lie_beside_the_module() {
+    let libraries = one("/// Half.\n#[function]\npub fn f(x: f32) -> f32 { x * 0.5 }").unwrap();
+    let files = hankel_codegen::functions::files(&libraries, "mine", "0");
+    assert!(files["tsl/mine_sample.tsl.js"].contains("name: 'mine_f'"));
+    let types = &files["tsl/mine_sample.tsl.d.ts"];
+    assert!(
+        types.ends_with("/** Half. */\nexport function f(x: Float): Node<'float'>;\n"),
+        "{types}"
+    );
 }

@@ -258,3 +258,87 @@ fn what_naga_cannot_read_is_an_error_with_advice() {
     assert!(error.to_string().contains("IAddCarry"), "{error}");
     assert!(error.advice().contains("--target spirv"));
 }
+
+/// Of a compute kernel with this body; `%there` is a private float, `%four` a private vector.
+fn registers(body: &str) -> u32 {
+    let text = format!(
+        "OpCapability Shader
+OpMemoryModel Logical GLSL450
+OpEntryPoint GLCompute %main \"registers\"
+OpExecutionMode %main LocalSize 1 1 1
+%void = OpTypeVoid
+%call = OpTypeFunction %void
+%bool = OpTypeBool
+%uint = OpTypeInt 32 0
+%float = OpTypeFloat 32
+%vector = OpTypeVector %float 4
+%one = OpConstant %float 1
+%eight = OpConstant %uint 8
+%array = OpTypeArray %float %eight
+%of_array = OpTypePointer Function %array
+%of_float = OpTypePointer Private %float
+%of_vector = OpTypePointer Private %vector
+%there = OpVariable %of_float Private
+%four = OpVariable %of_vector Private
+%main = OpFunction %void None %call
+%begin = OpLabel
+{body}
+OpReturn
+OpFunctionEnd
+"
+    );
+    let cost = cost::of_spirv(&support::assemble(&text), "registers").unwrap();
+    cost.registers
+}
+
+#[test]
+fn registers_are_what_is_alive_at_once() {
+    // Three at once, then the sum of two with the third; constants are none.
+    let sum = "%a = OpLoad %float %there
+%b = OpLoad %float %there
+%c = OpLoad %float %there
+%ab = OpFAdd %float %a %b
+%abc = OpFAdd %float %ab %c
+%d = OpFAdd %float %abc %one
+OpStore %there %d";
+    assert_eq!(registers(sum), 3);
+    // The same, each loaded when it is needed.
+    let later = "%a = OpLoad %float %there
+%b = OpLoad %float %there
+%ab = OpFAdd %float %a %b
+%c = OpLoad %float %there
+%abc = OpFAdd %float %ab %c
+OpStore %there %abc";
+    assert_eq!(registers(later), 2);
+    let vector = "%v = OpLoad %vector %four
+%x = OpCompositeExtract %float %v 0
+%y = OpCompositeExtract %float %v 1
+%xy = OpFAdd %float %x %y
+OpStore %there %xy";
+    assert_eq!(registers(vector), 5);
+    // An array of the function's own is there all the time.
+    let array = "%own = OpVariable %of_array Function
+%a = OpLoad %float %there
+OpStore %there %a";
+    assert_eq!(registers(array), 9);
+}
+
+#[test]
+fn registers_are_alive_around_loops() {
+    // `%kept` is used behind the loop, so it is alive in it, with the sum and the addend.
+    let text = "%kept = OpLoad %float %there
+OpBranch %head
+%head = OpLabel
+%sum = OpPhi %float %one %begin %more %next
+%ends = OpFOrdLessThan %bool %sum %one
+OpLoopMerge %after %next None
+OpBranchConditional %ends %after %next
+%next = OpLabel
+%addend = OpLoad %float %there
+%more = OpFAdd %float %sum %addend
+OpBranch %head
+%after = OpLabel
+%all = OpFAdd %float %sum %kept
+OpStore %there %all";
+    assert_eq!(registers(text), 3);
+}

@@ -88,7 +88,8 @@ pub const POWER_MOMENTS: &[Map] = &[
     },
 ];
 
-const fn biased(bias: Bias) -> Map {
+/// A map whose moments are pulled towards a published target, by the published strength.
+pub(crate) const fn biased(bias: Bias) -> Map {
     let target = bias.four();
     Map {
         moment_bias: bias.strength as f32,

@@ -17,7 +17,7 @@ use crate::args::{Deny, Diff, Format};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
-use crate::session::Session;
+use crate::session::{Session, cases};
 
 /// Seconds that the inputs of a kernel may take.
 const LIMIT: Duration = Duration::from_secs(120);
@@ -116,12 +116,7 @@ fn between(
     seed: u64,
 ) -> Result<Found> {
     let kernel = &entry.kernel;
-    let cases = inputs::of_entry(entry, seed).map_err(|e| {
-        Failure::input(
-            format!("kernel `{}`: there are no inputs: {e}", kernel.name),
-            "Mend the function that makes them, or the attributes of its parameters.",
-        )
-    })?;
+    let cases = cases(entry, seed)?;
     let exact = Tolerance {
         ulp: 0,
         absolute: 0.0,

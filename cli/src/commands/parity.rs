@@ -20,7 +20,7 @@ use crate::args::{Format, Parity};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
-use crate::session::Session;
+use crate::session::{Session, this_program};
 
 /// Cells of the built-in kernels that are known not to run.
 const ABSENT: &str = include_str!("../../../snapshots/absent-cells.toml");
@@ -88,14 +88,15 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let subjects = Subject::with_constants(&generated, &request, &modules, &krate.entries)?;
 
     let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
-    let this = std::env::current_exe()
-        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))?;
     let request = Request {
         columns,
         seed: args.seed,
         limit,
         tools: tools(),
-        runner: vec![this.into_os_string(), OsString::from("matrix-runner")],
+        runner: vec![
+            this_program()?.into_os_string(),
+            OsString::from("matrix-runner"),
+        ],
         cache: cache.filter(|_| !own.no_cache && !in_ci()),
         known,
         absent: absent.filter(|_| whole && own.write_absent.is_none()),

@@ -60,8 +60,8 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
     let has_maps = !(size.is_empty() && filter.is_empty() && fit.is_empty());
     if is_planned != args.error.is_some() || (has_maps && !is_planned) {
         return Err(Failure::input(
-            "--technique auto and --error belong together, and --size, --filter and --fit to them",
-            "Write --technique auto --error 0.05, or a technique's name; the scene file has the rest.",
+            "--technique auto needs --error, and --error, --size, --filter and --fit need --technique auto",
+            "Write --technique auto --error 0.05, or a technique's name: then the scene file says the rest.",
         ));
     }
     let pictures = if args.compare {

@@ -4,15 +4,15 @@ use hankel_codegen::translate::Options;
 use hankel_dsl::native::Mode;
 use hankel_host::crates::KernelEntry;
 use hankel_host::device::NativeDevice;
-use hankel_host::inputs::{self, Case};
+use hankel_host::inputs::Case;
 use hankel_host::parity::{execute, sanitize};
 use serde::Serialize;
 
 use crate::args::{Format, Sanitize};
-use crate::failure::{Failure, Outcome, Result};
+use crate::failure::{Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
-use crate::session::Session;
+use crate::session::{Session, cases};
 
 /// What is said of a kernel.
 #[derive(Serialize)]
@@ -65,12 +65,7 @@ pub fn run(args: &Sanitize, quiet: bool) -> Result<Outcome> {
 /// Runs a kernel on all of its inputs, or up to the first fault.
 fn check(entry: &KernelEntry, seed: u64) -> Result<Checked> {
     let kernel = &entry.kernel;
-    let cases = inputs::of_entry(entry, seed).map_err(|e| {
-        Failure::input(
-            format!("kernel `{}`: there are no inputs: {e}", kernel.name),
-            "Mend the function that makes them, or the attributes of its parameters.",
-        )
-    })?;
+    let cases = cases(entry, seed)?;
     let program = entry.program(None, &[]);
     let run = |mode: Mode, case: &Case| {
         let start = Instant::now();

@@ -15,7 +15,7 @@ use super::{command_line, deliver};
 use crate::args::Format;
 use crate::failure::{Failure, Outcome, Result};
 use crate::progress::Progress;
-use crate::session::Session;
+use crate::session::{Session, this_program};
 
 /// The hidden command that measures for another process.
 const WORKER: [&str; 2] = ["bench", "worker"];
@@ -54,14 +54,8 @@ fn bounds(args: &BenchBounds, quiet: bool) -> Result<Outcome> {
     options.python = args
         .against
         .map(|Rival::Diffmoments| args.python.clone().unwrap_or_else(default_python));
-    let me = std::env::current_exe().map_err(|error| {
-        Failure::machine(
-            format!("this program does not know where it is: {error}"),
-            Some("Other instruction sets are measured by starting it again.".into()),
-        )
-    })?;
     options.worker = Some(Program {
-        path: me,
+        path: this_program()?,
         arguments: WORKER.map(Into::into).to_vec(),
     });
 

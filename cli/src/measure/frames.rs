@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use hankel_codegen::files::sha256;
 use hankel_frames::measure::growth::growth;
 use hankel_frames::measure::{
     Ask, Choices, Configuration, Measurement, Session, Status, Subject, median, sample,
@@ -23,7 +24,7 @@ use crate::commands::plan::{choices, open};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::note;
 use crate::progress::Progress;
-use crate::session::Words;
+use crate::session::{Words, this_program};
 
 /// Where scenes are unless the command says.
 const SCENES: &str = "scenes";
@@ -57,8 +58,12 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
         choices,
         args,
     };
+    // Other kernels or other code take other times.
+    let program = this_program()?;
+    let program = std::fs::read(&program)
+        .map_err(|e| Failure::machine(format!("{}: {e}", program.display()), None))?;
     let conditions = [
-        ("hankel", env!("CARGO_PKG_VERSION").to_owned()),
+        ("the program", sha256(&program)),
         ("device", bench.device.name().to_owned()),
     ];
     let session = Session::open(&args.out.join(KEPT), &conditions);

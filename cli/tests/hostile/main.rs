@@ -2,6 +2,7 @@
 //! a file, to hang, to crash, to eat all memory or to run somebody else's code, each tried again.
 #![cfg(unix)]
 
+#[path = "../desk/mod.rs"]
 mod desk;
 
 mod inputs;

@@ -4,8 +4,8 @@
 
 use super::ir::{Builtin, Function, Id, Library, Literal, Scalar, Signature, Type};
 use super::print::{
-    Bond, Dialect, Naming, Piece, atom, bracketed, called, choice, components, digits, documented,
-    function, list, members, provenance, signed,
+    Bond, Dialect, Naming, Piece, atom, block_comment, bracketed, called, choice, components,
+    digits, documented, function, list, members, provenance, signed,
 };
 
 struct C<'a>(&'a Naming);
@@ -68,14 +68,6 @@ pub fn write(library: &Library, naming: &Naming, sha256: &str) -> String {
     }
     text.push_str("\n#endif\n");
     text
-}
-
-fn block_comment(docs: &[String]) -> String {
-    if docs.is_empty() {
-        return String::new();
-    }
-    let text = documented(docs, " *").replace("*/", "* /");
-    format!("/**\n{text} */\n")
 }
 
 impl C<'_> {

@@ -8,7 +8,7 @@
 //! ```text
 //! sources --source--> modules and items --evaluate--> statements of scalars --tidy--> ir::Library
 //!                                                                                        |
-//!                           wgsl, hlsl, glsl, msl, c, rust, slang: one file each <--+
+//!                                          wgsl, hlsl, glsl, msl, tsl, c, rust, slang <--+
 //! ```
 //!
 //! - [`evaluate`] runs a function as far as it goes without knowing its arguments. Generic parameters,
@@ -42,6 +42,7 @@ pub mod rust;
 pub mod slang;
 pub mod source;
 mod tidy;
+pub mod tsl;
 mod value;
 pub mod wgsl;
 
@@ -64,87 +65,118 @@ pub struct Form {
     pub what: &'static str,
     /// The file's name after the library's.
     suffix: &'static str,
-    write: fn(&Library, &Naming, &str) -> String,
+    write: Write,
+    /// What lies beside it: the end of its name, and its text.
+    beside: Option<(&'static str, Write)>,
 }
 
+type Write = fn(&Library, &Naming, &str) -> String;
+
 /// All forms. A file is `<prefix>_<library><suffix>` in a folder of the form's name.
-pub const FORMS: [Form; 10] = [
+pub const FORMS: [Form; 11] = [
     Form {
         name: "wgsl",
         what: "WGSL: put before or after your own text",
         suffix: ".wgsl",
         write: |l, n, s| wgsl::write(l, n, s, wgsl::Form::Plain),
+        beside: None,
     },
     Form {
         name: "naga-oil",
         what: "WGSL with #define_import_path: Bevy",
         suffix: ".wgsl",
         write: |l, n, s| wgsl::write(l, n, s, wgsl::Form::NagaOil),
+        beside: None,
     },
     Form {
         name: "wesl",
         what: "WESL",
         suffix: ".wesl",
         write: |l, n, s| wgsl::write(l, n, s, wgsl::Form::Wesl),
+        beside: None,
     },
     Form {
         name: "hlsl",
         what: "HLSL: Direct3D, Unity, Unreal (.ush)",
         suffix: ".hlsl",
         write: hlsl::write,
+        beside: None,
     },
     Form {
         name: "glsl",
         what: "GLSL 3.30 and later, GLSL ES 3.00 and later",
         suffix: ".glsl",
         write: |l, n, s| glsl::write(l, n, s, glsl::Form::Plain),
+        beside: None,
     },
     Form {
         name: "godot",
         what: "Godot 4",
         suffix: ".gdshaderinc",
         write: |l, n, s| glsl::write(l, n, s, glsl::Form::Godot),
+        beside: None,
     },
     Form {
         name: "msl",
         what: "MSL: Metal",
         suffix: ".h.metal",
         write: msl::write,
+        beside: None,
+    },
+    Form {
+        name: "tsl",
+        what: "TSL: three.js, as an ES module with types",
+        suffix: ".tsl.js",
+        write: tsl::write,
+        beside: Some((".tsl.d.ts", tsl::write_types)),
     },
     Form {
         name: "slang",
         what: "Slang",
         suffix: ".slang",
         write: slang::write,
+        beside: None,
     },
     Form {
         name: "c",
         what: "C99 and C++, for the processor",
         suffix: ".h",
         write: c::write,
+        beside: None,
     },
     Form {
         name: "rust",
         what: "Rust, for the processor",
         suffix: ".rs",
         write: rust::write,
+        beside: None,
     },
 ];
 
 impl Form {
     /// The path of a library's file.
     pub fn path(&self, naming: &Naming) -> String {
-        format!(
-            "{}/{}{}",
-            self.name,
-            naming.function(&naming.library),
-            self.suffix
-        )
+        self.path_of(naming, self.suffix)
+    }
+
+    fn path_of(&self, naming: &Naming, suffix: &str) -> String {
+        format!("{}/{}{suffix}", self.name, naming.function(&naming.library))
     }
 
     /// The text of a library.
     pub fn text(&self, library: &Library, naming: &Naming, sha256: &str) -> String {
         (self.write)(library, naming, sha256)
+    }
+
+    /// The path and text of what lies beside it: the types of TSL's module.
+    pub fn beside(
+        &self,
+        library: &Library,
+        naming: &Naming,
+        sha256: &str,
+    ) -> Option<(String, String)> {
+        let (suffix, write) = self.beside?;
+        Some((self.path_of(naming, suffix), write(library, naming, sha256)))
     }
 }
 
@@ -158,6 +190,7 @@ pub fn files(libraries: &[Library], prefix: &str, sha256: &str) -> BTreeMap<Stri
         };
         for form in &FORMS {
             all.insert(form.path(&naming), form.text(library, &naming, sha256));
+            all.extend(form.beside(library, &naming, sha256));
         }
     }
     all

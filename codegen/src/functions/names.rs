@@ -431,7 +431,7 @@ fn in_order(body: &[Stmt], order: &mut Vec<(Id, bool)>) {
 }
 
 /// `snake_case` as `camelCase`.
-fn camel(name: &str) -> String {
+pub fn camel(name: &str) -> String {
     let mut out = String::new();
     let mut up = false;
     for c in name.chars() {

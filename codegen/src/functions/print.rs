@@ -495,6 +495,15 @@ pub fn documented(lines: &[String], prefix: &str) -> String {
     text
 }
 
+/// Documentation as `/** … */`.
+pub fn block_comment(docs: &[String]) -> String {
+    if docs.is_empty() {
+        return String::new();
+    }
+    let text = documented(docs, " *").replace("*/", "* /");
+    format!("/**\n{text} */\n")
+}
+
 /// Text that every compiler takes: not all of them read more than ASCII, even in comments.
 pub fn ascii(text: &str) -> String {
     let mut out = String::new();

@@ -15,8 +15,8 @@ use naga::{
 /// Most numbers in the constants of a text: tens of megabytes of it.
 pub(crate) const MOST_NUMBERS: u64 = 4_000_000;
 
-/// Most bytes that a structure may leave unused: the whole of the smallest constant buffer that
-/// every device has. HLSL has a member for every four of them.
+/// Most bytes that a structure may leave unused: as many as Direct3D's largest constant buffer has.
+/// HLSL has a member for every four of them.
 const MOST_PADDING: u32 = 64 << 10;
 
 /// Most levels of an expression within an expression or a block within a block: the writers' stack

@@ -564,12 +564,7 @@ impl Ir {
                 ImageClass::Storage { format, access }
                     if language == Language::Wgsl
                         && access.contains(StorageAccess::LOAD | StorageAccess::STORE)
-                        && !matches!(
-                            format,
-                            StorageFormat::R32Float
-                                | StorageFormat::R32Uint
-                                | StorageFormat::R32Sint
-                        ) =>
+                        && !is_read_and_written(format) =>
                 {
                     return Some(format!(
                         "WGSL reads and writes textures of r32float, r32uint and r32sint, not of \
@@ -587,12 +582,7 @@ impl Ir {
                 ImageClass::Storage { format, access }
                     if language == Language::Essl310
                         && access.contains(StorageAccess::LOAD | StorageAccess::STORE)
-                        && !matches!(
-                            format,
-                            StorageFormat::R32Float
-                                | StorageFormat::R32Uint
-                                | StorageFormat::R32Sint
-                        ) =>
+                        && !is_read_and_written(format) =>
                 {
                     return Some(format!(
                         "{language} cannot both read and write {format:?} textures"
@@ -833,6 +823,14 @@ const EXACT_MSL: MslVersion = MslVersion { major: 3, minor: 2 };
 
 /// The first version of MSL with atomics of floats.
 const FLOAT_ATOMICS_MSL: MslVersion = MslVersion { major: 3, minor: 0 };
+
+/// Whether WGSL and GLSL ES let a kernel read and write one texture of this format.
+fn is_read_and_written(format: StorageFormat) -> bool {
+    matches!(
+        format,
+        StorageFormat::R32Float | StorageFormat::R32Uint | StorageFormat::R32Sint
+    )
+}
 
 /// Formats of GLSL ES 3.10's images.
 fn in_es(format: StorageFormat) -> bool {

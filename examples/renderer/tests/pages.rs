@@ -59,10 +59,11 @@ fn page(example: &str, files: &[&str]) {
     );
     let mut block = format!("{count} lines:\n");
     for (file, lines) in all {
-        let language = if file.ends_with(".rs") {
-            "rust"
-        } else {
-            "wgsl"
+        let extension = file.rsplit_once('.').map(|(_, extension)| extension);
+        let language = match extension {
+            Some("rs") => "rust",
+            Some(other) => other,
+            None => "",
         };
         let _ = write!(
             block,
@@ -90,5 +91,6 @@ fn page(example: &str, files: &[&str]) {
 #[test]
 fn pages_count_the_lines_of_glue() {
     page("wgpu", &["build.rs", "src/lib.rs"]);
+    page("three", &["page/shadows.js"]);
     page("bevy", &["src/lib.rs", "src/moment_shadows.wgsl"]);
 }

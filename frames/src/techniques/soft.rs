@@ -7,7 +7,7 @@ use hankel_moments::bias::{SYMMETRIC_4_16_LECTURE, SYMMETRIC_6_16};
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, light_depth, shade, summed_area};
+use crate::passes::{Given, biased, light_depth, shade, summed_area};
 use crate::scene::DepthRange;
 
 pub const FOUR: Technique = Technique {
@@ -37,13 +37,8 @@ pub const SUMMED: Map = Map {
     depth_range: DepthRange::Symmetric,
     encoding: 0,
     moment_bias: 2e-5,
-    bias_target: target(),
+    ..biased(SYMMETRIC_4_16_LECTURE)
 };
-
-const fn target() -> [f32; 4] {
-    let target = SYMMETRIC_4_16_LECTURE.four();
-    [target.b1, target.b2, target.b3, target.b4]
-}
 
 fn add_four(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let depth = light_depth(graph, given)?;

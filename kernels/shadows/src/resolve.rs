@@ -37,6 +37,14 @@ fn symmetric(z: f32) -> Moments4<f32> {
     Moments4::of_depth(2.0 * z - 1.0)
 }
 
+/// Mean of a texel's moments, depths moved to [-1, 1], in the basis optimised for 16 bits.
+#[inline(always)]
+pub(crate) fn mean_symmetric(depth: Texture2dMultisampled<'_>, at: UVec2, samples: u32) -> Vec4 {
+    mean(depth, at, samples, |z| {
+        quantized(quantize_symmetric_4(symmetric(z)))
+    })
+}
+
 /// Mean of a texel's moments, depths in [0, 1], in the basis optimised for 16 bits.
 #[kernel(
     compute,
@@ -80,9 +88,7 @@ pub fn resolve_symmetric(
     samples: u32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
-    mean(depth, at, samples, |z| {
-        quantized(quantize_symmetric_4(symmetric(z)))
-    })
+    mean_symmetric(depth, at, samples)
 }
 
 /// Mean of a texel's moments, depths moved to [-1, 1], as they are, for a 32-bit map.

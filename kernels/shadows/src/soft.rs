@@ -22,7 +22,8 @@ use hankel_moments::{
 };
 
 use crate::grid::within;
-use crate::resolve::mean;
+use crate::library::store::symmetric_depth;
+use crate::resolve::mean_symmetric;
 use crate::shade::{Light, biased, shade_with};
 use crate::six::quantized;
 
@@ -226,7 +227,9 @@ prefix_sums!(
 /// The texel that an element of a table belongs to: rows from the top, one after the other.
 #[inline(always)]
 fn texel(i: u32, size: UVec2) -> UVec2 {
-    UVec2::new(i % size.x, within((i / size.x) as i32, size.y))
+    // A division that has no branch which leaves the kernel: a texture is a texel wide at least.
+    let (x, y) = (i.checked_rem(size.x), i.checked_div(size.x));
+    UVec2::new(x.unwrap_or(0), within(y.unwrap_or(0) as i32, size.y))
 }
 
 /// Mean of a texel's four moments, depths moved to [-1, 1], in the optimised basis, as integers: what
@@ -240,10 +243,7 @@ pub fn resolve_summed(
     #[uniform] area: &Area,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> UVec4 {
-    let q = mean(depth, texel(i, depth.size()), samples, |z| {
-        let q = quantize_symmetric_4(Moments4::of_depth(2.0 * z - 1.0));
-        Vec4::new(q.r, q.g, q.b, q.a)
-    });
+    let q = mean_symmetric(depth, texel(i, depth.size()), samples);
     let q = Quantized4 {
         r: q.x,
         g: q.y,
@@ -361,12 +361,6 @@ fn in_texels(uv: Vec2, size: UVec2) -> Vec2 {
     Vec2::new(uv.x * size.x as f32, uv.y * size.y as f32)
 }
 
-/// Depth in [0, 1] as a depth in [-1, 1], in which all are twice as far apart.
-#[inline(always)]
-fn symmetric(z: f32) -> f32 {
-    2.0 * z - 1.0
-}
-
 /// What the lecture adds of the receiver's own depth to the mean of the blockers'.
 const EPSILON: f32 = 1e-3;
 
@@ -407,9 +401,9 @@ pub fn shade_soft(
         };
         let place = in_texels(uv, *size);
         let all = biased(light, table.around(place, area.reach(z)));
-        let distance = 0.5 * blockers_4(all, symmetric(z)).distance(EPSILON);
+        let distance = 0.5 * blockers_4(all, symmetric_depth(z)).distance(EPSILON);
         let near = biased(light, table.around(place, area.reach(distance)));
-        hamburger_4(near, symmetric(z - area.margin * distance))
+        hamburger_4(near, symmetric_depth(z - area.margin * distance))
     })
 }
 
@@ -450,9 +444,9 @@ pub fn shade_soft_6(
         };
         let place = in_texels(uv, *size);
         let around = |reach: Vec2| table.around(place, reach).lerp(*target, light.moment_bias);
-        let blockers = blockers_6(around(area.reach(z)), symmetric(z));
+        let blockers = blockers_6(around(area.reach(z)), symmetric_depth(z));
         let distance = 0.5 * blockers.distance(EPSILON);
-        let receiver = symmetric(z - area.margin * distance);
+        let receiver = symmetric_depth(z - area.margin * distance);
         hamburger_6(around(area.reach(distance)), receiver).lower
     })
 }
@@ -500,15 +494,17 @@ pub fn shade_vssm(
         let per_part = 1.0 / parts as f32;
         let blockers = |reach: Vec2, z: f32| {
             let (mut share, mut moment) = (0.0, 0.0);
-            let mut i = 0;
-            while i < parts * parts {
-                let turn = |k: u32| (2 * k + 1) as f32 * per_part - 1.0;
-                let (across, down) = (turn(i % parts), turn(i / parts));
-                let middle = Vec2::new(place.x + reach.x * across, place.y + reach.y * down);
-                let half = Vec2::new(reach.x * per_part, reach.y * per_part);
+            let half = Vec2::new(reach.x * per_part, reach.y * per_part);
+            let turn = |k: u32| (2 * k + 1) as f32 * per_part - 1.0;
+            let mut part = UVec2::ZERO;
+            while part.y < parts {
+                let middle = Vec2::new(
+                    place.x + reach.x * turn(part.x),
+                    place.y + reach.y * turn(part.y),
+                );
                 let m = table.around(middle, half);
-                if m.b1 < symmetric(z) {
-                    let found = blockers_2(m.b1, m.b2, symmetric(z), light.moment_bias);
+                if m.b1 < symmetric_depth(z) {
+                    let found = blockers_2(m.b1, m.b2, symmetric_depth(z), light.moment_bias);
                     share += found.share;
                     moment += found.moment;
                 } else {
@@ -528,7 +524,10 @@ pub fn shade_vssm(
                         k += 1;
                     }
                 }
-                i += 1;
+                part.x += 1;
+                if part.x >= parts {
+                    part = UVec2::new(0, part.y + 1);
+                }
             }
             let scale = per_part * per_part;
             Blockers {
@@ -578,7 +577,12 @@ pub fn shade_pcss(
             let at = Vec2::new(place.x + offset.x * reach.x, place.y + offset.y * reach.y);
             let width = Real::sqrt(offset.x * offset.x + offset.y * offset.y);
             let slack = area.slack * width * distance;
-            (depth.load(nearest(at, size), i % samples).x, z - slack)
+            (
+                depth
+                    .load(nearest(at, size), i.checked_rem(samples).unwrap_or(0))
+                    .x,
+                z - slack,
+            )
         };
         let (mut distances, mut blockers) = (0.0, 0.0);
         let mut i = 0;

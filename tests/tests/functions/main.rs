@@ -6,6 +6,8 @@
 //! structure `Light` and a function `lerp` of their own, take the first registers, and say
 //! `precision mediump float;`.
 
+mod tsl;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -54,6 +56,11 @@ fn library() -> &'static Library {
     LIBRARY.with(|library| *library)
 }
 
+fn tools() -> Tools {
+    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
+    Tools::of_cache(cache.as_deref())
+}
+
 fn naming() -> Naming {
     Naming {
         prefix: PREFIX.into(),
@@ -65,6 +72,12 @@ fn naming() -> Naming {
 fn text(form: &str) -> String {
     let form = FORMS.iter().find(|f| f.name == form).expect("a form");
     form.text(library(), &naming(), &"0".repeat(64))
+}
+
+/// The path and text of what is shipped beside it.
+fn beside(form: &str) -> Option<(String, String)> {
+    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
+    form.beside(library(), &naming(), &"0".repeat(64))
 }
 
 /// A scalar of a function's arguments or result.
@@ -443,7 +456,10 @@ fn hlsl(function: &Function, library: &str) -> Code {
     )
 }
 
-fn glsl(function: &Function, library: &str, version: &str) -> Code {
+/// What a host says of precision before a library is included.
+const MEDIUM: &str = "precision mediump float;\nprecision mediump int;";
+
+fn glsl(function: &Function, library: &str, version: &str, precision: &str) -> Code {
     let host = Host {
         scalars: ["float", "uint", "int"],
         vector: |s, n| match s {
@@ -454,14 +470,14 @@ fn glsl(function: &Function, library: &str, version: &str) -> Code {
     };
     let line = |ty: &str, name: &str| format!("    highp {ty} {name};\n");
     let text = format!(
-        "#version {version}\nprecision mediump float;\nprecision mediump int;\n\
+        "#version {version}\n{precision}\n\
          layout(local_size_x = 64, local_size_y = 1, local_size_z = 1) in;\n\
          struct Light {{ vec4 color; }};\n\
          float lerp(float a, float b, float t) {{ return a + (b - a) * t; }}\n\
          struct Row {{\n{}}};\nstruct Given {{\n{}}};\n\
          layout(std430, binding = 0) readonly buffer RowBuffer {{ Row b_row[]; }};\n\
          layout(std430, binding = 1) buffer OutBuffer {{ Given b_out[]; }};\n\
-         {library}\n{library}\n\
+         {library}\n\
          void main() {{\n\
          \x20   highp uvec3 id = gl_GlobalInvocationID;\n\
          \x20   if (id.x < uint(b_out.length())) {{\n\
@@ -529,13 +545,13 @@ fn msl(function: &Function, library: &Path) -> Code {
 
 fn subject(function: &Function, msl_file: &Path) -> Subject {
     let none = |language: Language| Err(format!("no stub in {language}"));
-    let glsl_text = text("glsl");
+    let twice = format!("{0}\n{0}", text("glsl"));
     let codes = Language::ALL.map(|language| {
         let code = match language {
             Language::Wgsl => Ok(wgsl(function, &text("wgsl"))),
             Language::Hlsl => Ok(hlsl(function, &text("hlsl"))),
-            Language::Glsl => Ok(glsl(function, &glsl_text, "450 core")),
-            Language::Essl310 => Ok(glsl(function, &glsl_text, "310 es")),
+            Language::Glsl => Ok(glsl(function, &twice, "450 core", MEDIUM)),
+            Language::Essl310 => Ok(glsl(function, &twice, "310 es", MEDIUM)),
             Language::Msl => Ok(msl(function, msl_file)),
             other => none(other),
         };
@@ -576,8 +592,9 @@ fn every_function_computes_the_native_bits_in_every_language() {
     let folder = tempfile::tempdir().expect("a folder");
     let msl_file = folder.path().join("hankel_shadows.h.metal");
     std::fs::write(&msl_file, text("msl")).expect("the header can be written");
-    let subjects: Vec<Subject> = natives().iter().map(|f| subject(f, &msl_file)).collect();
-    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
+    let tools = tools();
+    let mut subjects: Vec<Subject> = natives().iter().map(|f| subject(f, &msl_file)).collect();
+    subjects.extend(tsl::subjects(&tools));
     let wanted = std::env::var("HANKEL_COLUMNS").unwrap_or_default();
     let columns: Vec<Column> = COLUMNS
         .into_iter()
@@ -588,11 +605,11 @@ fn every_function_computes_the_native_bits_in_every_language() {
         columns: columns.clone(),
         seed: 1,
         limit: Duration::from_secs(120),
-        tools: Tools::of_cache(cache.as_deref()),
+        tools,
         runner: vec![PathBuf::from(env!("CARGO_BIN_EXE_hankel-tests-runner")).into()],
         cache: None,
         known: Known::parse(include_str!(
-            "../../snapshots/known-function-differences.toml"
+            "../../../snapshots/known-function-differences.toml"
         ))
         .expect("the list can be read"),
         absent: None,
@@ -833,7 +850,12 @@ fn the_texts_are_those_under_review() {
         settings.set_snapshot_path(root().join("snapshots/functions"));
         settings.set_prepend_module_to_snapshot(false);
         settings.set_omit_expression(true);
-        settings.bind(|| insta::assert_snapshot!(form.name, text));
+        settings.bind(|| {
+            insta::assert_snapshot!(form.name, text);
+            if let Some((_, beside)) = beside(form.name) {
+                insta::assert_snapshot!(format!("{}-types", form.name), beside);
+            }
+        });
     }
 }
 
@@ -882,10 +904,7 @@ fn same_words(form: &str, a: &str, b: &str) {
 
 #[test]
 fn a_host_of_medium_precision_changes_nothing() {
-    let cache = hankel_toolchain::Options::from_env().cache_folder().ok();
-    let glslang = Tools::of_cache(cache.as_deref())
-        .glslang()
-        .expect("glslang");
+    let glslang = tools().glslang().expect("glslang");
     let folder = tempfile::tempdir().expect("a folder");
     let stub = folder.path().join("stub.frag");
     let host = format!(

@@ -1,6 +1,9 @@
-//! What all of these tests work with.
+//! What tests of the command line work with.
+
+#![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use std::fs;
+#[cfg(unix)]
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -152,6 +155,7 @@ impl Run {
     }
 
     /// It ended by a signal.
+    #[cfg(unix)]
     pub fn ended_by(&self, signal: i32) -> &Self {
         assert_eq!(self.0.status.signal(), Some(signal), "{}", self.err());
         self
