@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use hankel_dsl::native::describe::{self, Kernel, Output, Type};
-use hankel_host::device::extent;
+use hankel_host::device::extent::{self, Extent};
 use hankel_host::device::slots::{self, Given, Use};
 use hankel_host::inputs::{Case as HostCase, Input};
 use hankel_host::parity::execute::Written;
@@ -167,7 +167,9 @@ fn groups(kernel: &Kernel, case: &HostCase) -> [u32; 3] {
         })
         .collect();
     // The inputs are made to fit.
-    let extent = extent::extent(kernel, &slots, &given).unwrap_or([0; 3]);
+    let Ok(Extent::Known(extent)) = extent::extent(kernel, &slots, &given) else {
+        return [0; 3];
+    };
     [0, 1, 2].map(|i| extent[i].div_ceil(threads[i].max(1)))
 }
 

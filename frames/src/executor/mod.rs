@@ -505,12 +505,11 @@ impl<'d> Executor<'d> {
             given: &self.given,
         };
         match &pass.work {
-            Work::Clear => {
+            Work::Clear(value) => {
                 for made in &pass.writes {
-                    let zeros = vec![0; self.graph.values()[made.at()].shape.bytes()];
                     match place.block(*made)? {
-                        Block::Buffer(id) => self.device.write_buffer(id, &zeros),
-                        Block::Texture(id) => self.device.write_texture(id, &zeros),
+                        Block::Buffer(id) => self.device.clear_buffer(id),
+                        Block::Texture(id) => self.device.clear_texture(id, *value),
                     }
                     .map_err(during(&pass.label))?;
                 }

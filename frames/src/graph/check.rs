@@ -44,6 +44,14 @@ pub enum GraphError {
         /// What does not fit, and what would.
         problem: String,
     },
+    /// A texture that cannot hold what it is filled with.
+    #[error("`{value}`: its texels are {format}, which are integers: make it with `cleared`")]
+    Fill {
+        /// The texture.
+        value: String,
+        /// Its format.
+        format: String,
+    },
 }
 
 /// Names of a pass and its kernel, for messages.
@@ -267,7 +275,7 @@ impl Graph {
             | Use::Output(wanted) => same(layout, wanted),
             Use::StorageMut { layout: wanted, .. } => same(layout, wanted),
             Use::Attribute(_, wanted) => same_type(&element(layout), wanted),
-            Use::Atomic { scalar, .. } => element(layout) == Type::Scalar { scalar },
+            Use::Atomic { scalar, .. } => is_all(&element(layout), scalar),
             _ => return Ok(()),
         };
         if fits {
@@ -420,6 +428,15 @@ pub(super) fn allowed(domain: Option<&Domain>, value: u32) -> std::result::Resul
             Err(format!("it is {value}, but must be from {least} to {most}"))
         }
         _ => Ok(()),
+    }
+}
+
+/// Whether a type is made of such numbers alone.
+fn is_all(ty: &Type, wanted: Scalar) -> bool {
+    match ty {
+        Type::Scalar { scalar } | Type::Vector { scalar, .. } => *scalar == wanted,
+        Type::Array { element, .. } => is_all(element, wanted),
+        Type::Struct { layout } => layout.fields.iter().all(|f| is_all(&f.ty, wanted)),
     }
 }
 

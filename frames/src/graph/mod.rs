@@ -37,6 +37,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use bytemuck::cast_slice;
+use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::Layout;
 use hankel_dsl::native::layout::Element;
 use hankel_dsl::native::{Entry, Sampler};
@@ -204,8 +205,8 @@ pub enum Target {
 /// What a pass does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Work {
-    /// Fills with zeros.
-    Clear,
+    /// Fills with one value: a buffer with zeros, a texture with what [`Graph::filled`] was given.
+    Clear(Vec4),
     /// Runs a compute kernel.
     Compute(Call),
     /// Draws triangles.
@@ -369,7 +370,28 @@ impl Graph {
 
     /// A texture of zeros, for kernels that write where they like.
     pub fn cleared(&mut self, label: impl Into<Cow<'static, str>>, shape: TextureShape) -> Handle {
-        self.clear(label.into(), Shape::Texture(shape))
+        self.clear(label.into(), Shape::Texture(shape), Vec4::ZERO)
+    }
+
+    /// A texture of floats that holds one value everywhere, rounded to its format, for kernels that write
+    /// where they like.
+    ///
+    /// # Errors
+    /// [`GraphError::Fill`] for a texture of integers.
+    pub fn filled(
+        &mut self,
+        label: impl Into<Cow<'static, str>>,
+        shape: TextureShape,
+        value: Vec4,
+    ) -> Result<Handle> {
+        let label = label.into();
+        if shape.format.texel().is_integer() {
+            return Err(GraphError::Fill {
+                value: label.into(),
+                format: shape.format.name().into(),
+            });
+        }
+        Ok(self.clear(label, Shape::Texture(shape), value))
     }
 
     /// A buffer of so many zeros, for kernels that add to it or write where they like.
@@ -382,14 +404,14 @@ impl Graph {
             bytes: elements.saturating_mul(size_of::<T>()),
             layout: T::layout(),
         };
-        self.clear(label.into(), shape)
+        self.clear(label.into(), shape, Vec4::ZERO)
     }
 
-    fn clear(&mut self, label: Cow<'static, str>, shape: Shape) -> Handle {
+    fn clear(&mut self, label: Cow<'static, str>, shape: Shape, value: Vec4) -> Handle {
         let made = self.made(label.clone(), shape);
         self.passes.push(Pass {
             label,
-            work: Work::Clear,
+            work: Work::Clear(value),
             reads: Vec::new(),
             writes: vec![made],
             note: None,
@@ -442,7 +464,7 @@ impl Graph {
     /// The kernels that a pass calls, by number.
     pub(crate) fn calls(pass: &Pass) -> impl Iterator<Item = &Call> {
         let (first, second) = match &pass.work {
-            Work::Clear => (None, None),
+            Work::Clear(_) => (None, None),
             Work::Compute(call) => (Some(call), None),
             Work::Draw {
                 vertex, fragment, ..

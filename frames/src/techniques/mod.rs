@@ -10,6 +10,7 @@ mod pcf;
 mod pcf_gaussian;
 mod pcss;
 mod soft;
+mod tiles;
 mod trigonometric;
 mod vsm;
 mod vssm;
@@ -61,7 +62,7 @@ pub struct Map {
 }
 
 /// All of them.
-pub const ALL: [&Technique; 14] = [
+pub const ALL: [&Technique; 16] = [
     &hamburger::TECHNIQUE,
     &hausdorff::TECHNIQUE,
     &hamburger_6::TECHNIQUE,
@@ -76,6 +77,8 @@ pub const ALL: [&Technique; 14] = [
     &vssm::TECHNIQUE,
     &soft::FOUR,
     &soft::SIX,
+    &tiles::HAMBURGER,
+    &tiles::PCF_GAUSSIAN,
 ];
 
 impl Technique {

@@ -5,6 +5,37 @@ use hankel_dsl::native::describe::{Kernel, Range, Stage};
 use super::error::{DeviceError, Result};
 use super::slots::{Given, Slot, Use, refuse};
 
+/// How far a kernel runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// So many invocations along x, y, z.
+    Known([u32; 3]),
+    /// As many as a buffer says when the kernel begins: one `u32` for each dimension.
+    InBuffer {
+        /// The argument's number.
+        slot: usize,
+        /// Where the numbers begin, in bytes.
+        offset: u32,
+        /// How many there are, 1 to 3.
+        dimensions: u32,
+    },
+}
+
+/// The numbers of a range in the bytes of its uniform; 1 for the dimensions that it does not have.
+#[must_use]
+pub fn in_bytes(bytes: &[u8], offset: u32, dimensions: u32) -> [u32; 3] {
+    let mut extent = [1; 3];
+    let words = bytes.get(offset as usize..).unwrap_or_default();
+    for (n, word) in extent
+        .iter_mut()
+        .take(dimensions as usize)
+        .zip(words.chunks_exact(4))
+    {
+        *n = u32::from_le_bytes([word[0], word[1], word[2], word[3]]);
+    }
+    extent
+}
+
 /// How many invocations run along x, y, z, as the kernel's [`Range`] says; where its outputs say
 /// it, as many as the first has elements or texels, without outputs as many as the first buffer
 /// that is read has.
@@ -13,11 +44,14 @@ use super::slots::{Given, Slot, Use, refuse};
 /// except where the invocations of a workgroup work together: they are told. Outputs must have that size where they say it;
 /// elsewhere a texture must have it, and a buffer at least that many elements.
 ///
+/// A uniform that says the range may be a buffer that another kernel has written. Its numbers are
+/// not known here, so that the kernel must have neither outputs nor elements.
+///
 /// # Errors
-/// [`DeviceError::Argument`] for a buffer that is too short, an output of another size, or a
-/// uniform that was not given as bytes though it says the range; [`DeviceError::Stage`] for a
-/// kernel that nothing tells the number of invocations, or that tells too large a one.
-pub fn extent(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given<'_>]) -> Result<[u32; 3]> {
+/// [`DeviceError::Argument`] for a buffer that is too short, an output of another size, or one for
+/// each invocation where a buffer says the range; [`DeviceError::Stage`] for a kernel that nothing
+/// tells the number of invocations, or that tells too large a one.
+pub fn extent(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given<'_>]) -> Result<Extent> {
     let arguments = Arguments {
         kernel,
         slots,
@@ -37,21 +71,42 @@ pub fn extent(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given<'_>]) -> Resul
             [arguments.elements(i)?, 1, 1]
         }
         Range::Fixed { size } => *size,
-        Range::Uniform { param, offset } => arguments.said(param, *offset, dimensions)?,
+        Range::Uniform { param, offset } => {
+            let slot = arguments.named(param)?;
+            let Given::Bytes(bytes) = given[slot] else {
+                arguments.none_for_each_invocation(slot)?;
+                return Ok(Extent::InBuffer {
+                    slot,
+                    offset: *offset,
+                    dimensions,
+                });
+            };
+            in_bytes(bytes, *offset, dimensions)
+        }
     };
-    let invocations = extent.iter().map(|n| u128::from(*n)).product::<u128>();
-    let Ok(invocations) = u32::try_from(invocations) else {
-        return Err(DeviceError::Stage {
-            kernel: kernel.name.clone(),
-            stage: "compute",
-            problem: format!("{extent:?} invocations are more than 32 bits can count"),
-        });
-    };
+    check_count(kernel, extent)?;
+    let invocations = extent.iter().product();
     if *range != Range::Outputs {
         arguments.outputs_hold(extent, invocations)?;
     }
     arguments.elements_suffice(invocations)?;
-    Ok(extent)
+    Ok(Extent::Known(extent))
+}
+
+/// Whether 32 bits can count the invocations.
+///
+/// # Errors
+/// [`DeviceError::Stage`] if they cannot.
+pub fn check_count(kernel: &Kernel, extent: [u32; 3]) -> Result<()> {
+    let invocations = extent.iter().map(|n| u128::from(*n)).product::<u128>();
+    if invocations <= u128::from(u32::MAX) {
+        return Ok(());
+    }
+    Err(DeviceError::Stage {
+        kernel: kernel.name.clone(),
+        stage: "compute",
+        problem: format!("{extent:?} invocations are more than 32 bits can count"),
+    })
 }
 
 struct Arguments<'a, 'k> {
@@ -144,25 +199,24 @@ impl Arguments<'_, '_> {
         Ok([self.elements(i.ok_or_else(|| self.nothing_says())?)?, 1, 1])
     }
 
-    /// The range that a uniform says.
-    fn said(&self, param: &str, offset: u32, dimensions: u32) -> Result<[u32; 3]> {
-        let i = self.named(param)?;
-        let Given::Bytes(bytes) = self.given[i] else {
-            return Err(self.refuse(
-                i,
-                "it says how many invocations run: give its bytes, not a buffer".into(),
-            ));
-        };
-        let mut extent = [1; 3];
-        let words = bytes.get(offset as usize..).unwrap_or_default();
-        for (n, word) in extent
-            .iter_mut()
-            .take(dimensions as usize)
-            .zip(words.chunks_exact(4))
-        {
-            *n = u32::from_le_bytes([word[0], word[1], word[2], word[3]]);
+    /// Nothing has an element or a texel of its own for each invocation: whether there are enough
+    /// cannot be checked where a buffer says the range.
+    fn none_for_each_invocation(&self, says: usize) -> Result<()> {
+        let first_output = self.slots.len() - self.kernel.outputs.len();
+        for (i, slot) in self.slots.iter().enumerate() {
+            let own = matches!(slot.role, Use::Element(_) | Use::ElementMut(_));
+            if own || i >= first_output {
+                return Err(self.refuse(
+                    says,
+                    format!(
+                        "it says how many invocations run, and `{}` has one element for each: give \
+                         the uniform's bytes, not a buffer, or write the kernel with `StorageMut`",
+                        slot.name
+                    ),
+                ));
+            }
         }
-        Ok(extent)
+        Ok(())
     }
 
     /// Outputs that do not say the range are large enough for it.

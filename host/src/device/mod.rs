@@ -20,6 +20,7 @@ pub mod vulkan;
 use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::{Call, CallError, Sampler, level_size, texture_bytes};
 use serde::{Deserialize, Serialize};
@@ -281,6 +282,27 @@ fn check_write(what: &str, given: usize, room: usize, exact: bool) -> Result<()>
     Ok(())
 }
 
+/// Refuses what a texture of integers is not filled with.
+fn check_clear(what: &str, shape: &TextureShape, value: Vec4) -> Result<()> {
+    if shape.format.texel().is_integer() && value != Vec4::ZERO {
+        return Err(DeviceError::Transfer {
+            what: what.into(),
+            problem: format!("its texels are integers, which are cleared to 0, not to {value}"),
+        });
+    }
+    Ok(())
+}
+
+/// The bytes of a texture that holds one value.
+fn filled(shape: &TextureShape, value: Vec4) -> Vec<u8> {
+    let format = shape.format.texel();
+    let mut texel = vec![0; format.bytes()];
+    if !format.is_integer() {
+        format.store(&mut texel, value);
+    }
+    texel.repeat(shape.bytes() / texel.len())
+}
+
 /// An argument of a kernel, in the order of [`slots::slots`].
 #[derive(Clone, Copy, Debug)]
 pub enum Bind<'a> {
@@ -468,6 +490,20 @@ pub trait Device {
     /// [`DeviceError::Transfer`] for any other number of bytes.
     fn write_texture(&mut self, texture: TextureId, bytes: &[u8]) -> Result<()>;
 
+    /// Fills a buffer with zeros.
+    ///
+    /// # Errors
+    /// [`DeviceError::Handle`], [`DeviceError::Lost`].
+    fn clear_buffer(&mut self, buffer: BufferId) -> Result<()>;
+
+    /// Fills a texture with one value, rounded to what its format holds; of depth, its first channel
+    /// counts. Textures of integers are filled with zeros only.
+    ///
+    /// # Errors
+    /// [`DeviceError::Handle`], [`DeviceError::Lost`], [`DeviceError::Transfer`] for a value other than 0
+    /// in a texture of integers.
+    fn clear_texture(&mut self, texture: TextureId, value: Vec4) -> Result<()>;
+
     /// Waits, and reads a buffer.
     ///
     /// # Errors
@@ -492,7 +528,11 @@ pub trait Device {
     /// [`DeviceError::Handle`].
     fn free_texture(&mut self, texture: TextureId) -> Result<()>;
 
-    /// Runs a kernel over all elements of its outputs.
+    /// Runs a kernel over all elements of its outputs, or as far as its range says.
+    ///
+    /// A uniform that says the range may be a buffer that an earlier dispatch has written: see
+    /// [`extent::extent`]. Vulkan then runs no more workgroups along an axis than its limit, which is at
+    /// least 65535; who writes the buffer keeps within it.
     ///
     /// # Errors
     /// [`DeviceError::Count`], [`DeviceError::Argument`], [`DeviceError::Constants`] for what does

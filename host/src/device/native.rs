@@ -1,10 +1,11 @@
 //! This machine's processor as a device: buffers are memory, kernels are called directly.
 
+use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::{Arg, Call, Mode, TextureMut, TextureRef};
 
 use super::error::{DeviceError, Result};
-use super::extent;
+use super::extent::{self, Extent};
 use super::slots::{self, Given, Slot, Use};
 use super::{Backend, Bind, BufferId, Device, Pass, Program, TextureId, TextureShape};
 
@@ -297,6 +298,24 @@ impl Device for NativeDevice {
         Ok(())
     }
 
+    fn clear_buffer(&mut self, buffer: BufferId) -> Result<()> {
+        let index = self.buffer_at(buffer)?;
+        if let Some(memory) = &mut self.buffers[index] {
+            memory.get_mut().fill(0);
+        }
+        Ok(())
+    }
+
+    fn clear_texture(&mut self, texture: TextureId, value: Vec4) -> Result<()> {
+        let index = self.texture_at(texture)?;
+        if let Some(texture) = &mut self.textures[index] {
+            super::check_clear("texture", &texture.shape, value)?;
+            let filled = super::filled(&texture.shape, value);
+            texture.memory.get_mut().copy_from_slice(&filled);
+        }
+        Ok(())
+    }
+
     fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>> {
         let index = self.buffer_at(buffer)?;
         Ok(self.buffers[index]
@@ -331,7 +350,24 @@ impl Device for NativeDevice {
             .map(|b| self.given(b))
             .collect::<Result<Vec<_>>>()?;
         slots::check(kernel, &slots, &given)?;
-        let extent = extent::extent(kernel, &slots, &given)?;
+        let extent = match extent::extent(kernel, &slots, &given)? {
+            Extent::Known(extent) => extent,
+            Extent::InBuffer {
+                slot,
+                offset,
+                dimensions,
+            } => {
+                let Bind::Buffer(id) = args[slot] else {
+                    // The checks let no other kind through.
+                    return Ok(());
+                };
+                let bytes = self.buffers[self.buffer_at(id)?].as_ref();
+                let bytes = bytes.map_or(&[][..], Memory::get);
+                let extent = extent::in_bytes(bytes, offset, dimensions);
+                extent::check_count(kernel, extent)?;
+                extent
+            }
+        };
         if extent.contains(&0) {
             return Ok(());
         }

@@ -437,7 +437,7 @@ impl Own {
             };
             let slot = slots
                 .iter()
-                .find(|s| s.name == *name && is_input(&s.role))
+                .find(|s| s.name == *name && is_given(&s.role))
                 .ok_or_else(|| bad("the kernel reads no such parameter".into()))?;
             let arg = own_arg(slot, value).map_err(bad)?;
             if args.insert(name.clone(), arg).is_some() {
@@ -524,6 +524,48 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
                 ))
             }
         }
+        (
+            Value::Texture {
+                size,
+                levels: 1,
+                layers: 1,
+                samples: 1,
+                format,
+                bytes,
+            },
+            Use::StorageTexture {
+                format: wanted,
+                dimensions,
+                ..
+            },
+        ) => {
+            let shape = TextureShape {
+                dimensions,
+                ..TextureShape::d3(*size, *format)
+            };
+            if *format != wanted {
+                return Err(format!(
+                    "its format is {}, not {}",
+                    format.name(),
+                    wanted.name()
+                ));
+            }
+            if dimensions == 2 && size[2] != 1 {
+                return Err("it has two dimensions".into());
+            }
+            if shape.bytes() == bytes.len() && !bytes.is_empty() {
+                Ok(Input::Texture {
+                    shape,
+                    bytes: bytes.clone(),
+                })
+            } else {
+                Err(format!(
+                    "{} bytes, but its size makes {}",
+                    bytes.len(),
+                    shape.bytes()
+                ))
+            }
+        }
         (Value::Sampler(sampler), Use::Sampler { comparison })
             if sampler.compare.is_some() == comparison =>
         {
@@ -544,6 +586,11 @@ const fn is_input(role: &Use<'_>) -> bool {
         Use::StorageTexture { access, .. } => access.reads(),
         _ => true,
     }
+}
+
+/// Whether an author may give it: what is written to as well, if its size is not the range's.
+const fn is_given(role: &Use<'_>) -> bool {
+    is_input(role) || matches!(role, Use::StorageTexture { .. })
 }
 
 /// Whether there is one element of it for each invocation.

@@ -18,7 +18,7 @@ pub struct Direction {
 
 /// The weighted sum of what `of` takes from the texels around one.
 #[inline(always)]
-fn filtered<T: Add<Output = T> + AddAssign + Mul<f32, Output = T>>(
+pub(crate) fn filtered<T: Add<Output = T> + AddAssign + Mul<f32, Output = T>>(
     at: UVec2,
     direction: &Direction,
     weights: Buffer<'_, f32>,

@@ -11,8 +11,9 @@
 //! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float) |
 //! | summed-area table of moments | [`resolve_summed`](soft::resolve_summed), [`prefix_sums`](soft::prefix_sums) twice |
 //! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) twice |
+//! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles) |
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -33,6 +34,7 @@ pub mod resolve;
 pub mod shade;
 pub mod six;
 pub mod soft;
+pub mod tiles;
 pub mod trigonometric;
 
 hankel_dsl::kernels![
@@ -67,6 +69,12 @@ hankel_dsl::kernels![
     soft::shade_soft_6,
     soft::shade_vssm,
     soft::shade_pcss,
+    tiles::tile_depths,
+    tiles::tile_list,
+    tiles::resolve_symmetric_tiles,
+    tiles::blur_tiles,
+    tiles::shade_hamburger_tiles,
+    tiles::shade_pcf_gaussian_tiles,
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,

@@ -77,13 +77,18 @@ fn dot(a: Vec3, b: Vec3) -> f32 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// Lambert's law with a shadow from 0 (lit) to 1, plus ambient light; each channel in [0, 65504].
+/// The cosine of the angle between a normal and the light; 0 for a face that is turned from it.
 #[inline(always)]
-fn lit(light: &Light, normal: Vec3, colour: Vec3, shadow: f32) -> Vec4 {
+fn cosine(light: &Light, normal: Vec3) -> f32 {
     let toward = Vec3::new(light.toward.x, light.toward.y, light.toward.z);
     // A normal interpolated to nothing has no direction; the floor keeps it finite.
     let length = Real::max(Real::sqrt(dot(normal, normal)), 1e-20);
-    let cosine = Real::max(dot(normal, toward) / length, 0.0);
+    Real::max(dot(normal, toward) / length, 0.0)
+}
+
+/// Lambert's law with a shadow from 0 (lit) to 1, plus ambient light; each channel in [0, 65504].
+#[inline(always)]
+fn lit(light: &Light, cosine: f32, colour: Vec3, shadow: f32) -> Vec4 {
     let direct = cosine * light.toward.w * (1.0 - shadow);
     // 65504 is the most that a 16-bit float target holds.
     let shade = |colour: f32, ambient: f32| Real::clamp(colour * (direct + ambient), 0.0, 65504.0);
@@ -111,7 +116,25 @@ fn receiver(light: &Light, world: Vec3) -> (Vec2, f32) {
 }
 
 /// Lambert's law with what `shadow` gives for a receiver's coordinates in the map and its depth, both
-/// from 0 to 1 inside, after the cut against light leaking.
+/// from 0 to 1 inside. It is not asked for a face that is turned from the light.
+#[inline(always)]
+pub(crate) fn shade_by(
+    light: &Light,
+    world: Vec3,
+    normal: Vec3,
+    colour: Vec3,
+    shadow: impl FnOnce(Vec2, f32) -> f32,
+) -> Vec4 {
+    let cosine = cosine(light, normal);
+    let mut shadowed = 1.0;
+    if cosine > 0.0 {
+        let (uv, z) = receiver(light, world);
+        shadowed = shadow(uv, z);
+    }
+    lit(light, cosine, colour, shadowed)
+}
+
+/// The same after the cut against light leaking.
 #[inline(always)]
 pub(crate) fn shade_with(
     light: &Light,
@@ -120,13 +143,9 @@ pub(crate) fn shade_with(
     colour: Vec3,
     shadow: impl FnOnce(Vec2, f32) -> f32,
 ) -> Vec4 {
-    let (uv, z) = receiver(light, world);
-    lit(
-        light,
-        normal,
-        colour,
-        cut_leak(shadow(uv, z), light.light_leak),
-    )
+    shade_by(light, world, normal, colour, |uv, z| {
+        cut_leak(shadow(uv, z), light.light_leak)
+    })
 }
 
 /// Moments from a map's texel.
@@ -154,7 +173,7 @@ fn decode(texel: Vec4, how: u32) -> Moments4<f32> {
 
 /// The map's depth range: [0, 1] or [-1, 1].
 #[inline(always)]
-fn in_range(z: f32, how: u32) -> f32 {
+pub(crate) fn in_range(z: f32, how: u32) -> f32 {
     if how == encoding::UNIT {
         z
     } else {
@@ -164,7 +183,7 @@ fn in_range(z: f32, how: u32) -> f32 {
 
 /// The map's moments at a place.
 #[inline(always)]
-fn look_up(map: Texture2d<'_>, sampler: Sampler, how: u32, uv: Vec2) -> Moments4<f32> {
+pub(crate) fn look_up(map: Texture2d<'_>, sampler: Sampler, how: u32, uv: Vec2) -> Moments4<f32> {
     decode(map.sample_level(sampler, uv, 0.0), how)
 }
 
@@ -280,21 +299,9 @@ pub fn shade_variance(
     })
 }
 
-/// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
-/// the receiver, the first sample of each texel. The reference for the others.
-#[kernel(fragment, inputs = crate::inputs::maps::shaded_depths)]
-pub fn shade_pcf(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    let (uv, z) = receiver(light, world);
+/// The share of a square of depths that is nearer than `z`, the first sample of each texel.
+#[inline(always)]
+fn nearer(depth: Texture2dMultisampled<'_>, radius: i32, uv: Vec2, z: f32) -> f32 {
     let size = depth.size();
     let nearest = |t: f32, size: u32| {
         let last = (size - 1) as f32;
@@ -302,7 +309,6 @@ pub fn shade_pcf(
         to_i32(Real::clamp(t * size as f32, 0.0, last))
     };
     let (x, y) = (nearest(uv.x, size.x), nearest(uv.y, size.y));
-    let radius = light.filter_radius as i32;
     let mut shadowed = 0.0;
     let mut dy = -radius;
     while dy <= radius {
@@ -315,40 +321,19 @@ pub fn shade_pcf(
         dy += 1;
     }
     let width = (2 * radius + 1) as f32;
-    lit(light, normal, colour, shadowed / (width * width))
+    shadowed / (width * width)
 }
 
-/// Shading with percentage-closer filtering that has the weights of a separable filter and of
-/// bilinear lookup, over all samples of each texel: what a filtered shadow map approximates, and
-/// what lower bounds are never darker than. `weights` are those of [`crate::blur::blur`].
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::weighted_depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-5,
-        why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
-    )
-)]
-pub fn shade_pcf_gaussian(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
+/// The weight of the depths that are nearer than `z`, by a separable filter and bilinear lookup, over
+/// all samples of each texel.
+#[inline(always)]
+pub(crate) fn weighted(
+    depth: Texture2dMultisampled<'_>,
     weights: Buffer<'_, f32>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
     samples: u32,
-) -> Vec4 {
-    let (uv, z) = receiver(light, world);
+    uv: Vec2,
+    z: f32,
+) -> f32 {
     let size = depth.size();
     // In texels from the first one's centre; beyond the edge as at it.
     let place = |t: f32, size: u32| Real::clamp(t * size as f32 - 0.5, 0.0, (size - 1) as f32);
@@ -383,6 +368,59 @@ pub fn shade_pcf_gaussian(
         shadowed += (weight(dy) * (1.0 - low_share) + weight(dy - 1) * low_share) * row;
         dy += 1;
     }
-    let shadow = Real::saturate(shadowed / samples as f32);
-    lit(light, normal, colour, shadow)
+    Real::saturate(shadowed / samples as f32)
+}
+
+/// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
+/// the receiver, the first sample of each texel. The reference for the others.
+#[kernel(fragment, inputs = crate::inputs::maps::shaded_depths)]
+pub fn shade_pcf(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    shade_by(light, world, normal, colour, |uv, z| {
+        nearer(depth, light.filter_radius as i32, uv, z)
+    })
+}
+
+/// Shading with percentage-closer filtering that has the weights of a separable filter and of
+/// bilinear lookup, over all samples of each texel: what a filtered shadow map approximates, and
+/// what lower bounds are never darker than. `weights` are those of [`crate::blur::blur`].
+#[kernel(
+    fragment,
+    inputs = crate::inputs::maps::weighted_depths,
+    parity(
+        ulp = 0,
+        absolute = 4e-5,
+        why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
+    )
+)]
+pub fn shade_pcf_gaussian(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[storage]
+    #[length(1..=7)]
+    #[range(0.0..=0.15)]
+    weights: Buffer<'_, f32>,
+    #[texture] depth: Texture2dMultisampled<'_>,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+) -> Vec4 {
+    shade_by(light, world, normal, colour, |uv, z| {
+        weighted(depth, weights, samples, uv, z)
+    })
 }

@@ -1,5 +1,6 @@
 //! Any Vulkan adapter through wgpu: a GPU, or lavapipe on a machine without one.
 
+mod indirect;
 mod pipelines;
 mod resources;
 pub mod words;
@@ -7,12 +8,14 @@ pub mod words;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::Sampler;
 
 use super::error::{DeviceError, Result};
-use super::extent;
+use super::extent::{self, Extent};
 use super::slots::{self, Given, Slot};
 use super::{Backend, Bind, BufferId, Device, Pass, Program, TextureId, TextureShape};
+use indirect::Indirect;
 use pipelines::Pipelines;
 use resources::{Memory, Texture};
 
@@ -43,6 +46,15 @@ pub struct VulkanDevice {
     textures: Vec<Option<Texture>>,
     samplers: HashMap<Sampler, wgpu::Sampler>,
     pipelines: Pipelines,
+    /// Made when the first range is in a buffer.
+    indirect: Option<Indirect>,
+}
+
+/// How many workgroups run along x, y, z.
+enum Groups {
+    Known([u32; 3]),
+    /// What a buffer of three numbers says.
+    InBuffer(wgpu::Buffer),
 }
 
 /// What the driver reported outside of a call.
@@ -140,6 +152,7 @@ impl VulkanDevice {
             textures: Vec::new(),
             samplers: HashMap::new(),
             pipelines: Pipelines::default(),
+            indirect: None,
         })
     }
 
@@ -351,6 +364,25 @@ impl Device for VulkanDevice {
         }
     }
 
+    fn clear_buffer(&mut self, buffer: BufferId) -> Result<()> {
+        let memory = self.memory(buffer)?;
+        self.guarded(&|| format!("clearing {}", memory.what()), |device| {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            encoder.clear_buffer(&memory.buffer, 0, None);
+            self.queue.submit([encoder.finish()]);
+        })
+    }
+
+    fn clear_texture(&mut self, texture: TextureId, value: Vec4) -> Result<()> {
+        let image = self.image(texture)?;
+        super::check_clear(&image.what(), &image.shape, value)?;
+        if image.is_drawn_into() {
+            return self.fill(image, value);
+        }
+        let filled = super::filled(&image.shape, value);
+        self.write_texture(texture, &filled)
+    }
+
     fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>> {
         let memory = self.memory(buffer)?;
         let mut bytes = self.download(&memory.buffer, memory.physical(), &memory.what())?;
@@ -383,21 +415,34 @@ impl Device for VulkanDevice {
         let slots = slots::slots(kernel);
         let threads = pipelines::threads(kernel)?;
         let (slots, given) = self.checked(program, slots, args)?;
-        let extent = extent::extent(kernel, &slots, &given)?;
-        if extent.contains(&0) {
-            return Ok(());
-        }
-        let groups = [0, 1, 2].map(|i| extent[i].div_ceil(threads[i].max(1)));
-        for (axis, n) in ["x", "y", "z"].into_iter().zip(groups) {
-            self.limit(
-                format!(
-                    "the number of workgroups of kernel `{}` along {axis}",
-                    kernel.name
-                ),
-                n.into(),
-                self.limits.max_compute_workgroups_per_dimension.into(),
-            )?;
-        }
+        let groups = match extent::extent(kernel, &slots, &given)? {
+            Extent::Known(extent) if extent.contains(&0) => return Ok(()),
+            Extent::Known(extent) => {
+                let groups = [0, 1, 2].map(|i| extent[i].div_ceil(threads[i].max(1)));
+                for (axis, n) in ["x", "y", "z"].into_iter().zip(groups) {
+                    self.limit(
+                        format!(
+                            "the number of workgroups of kernel `{}` along {axis}",
+                            kernel.name
+                        ),
+                        n.into(),
+                        self.limits.max_compute_workgroups_per_dimension.into(),
+                    )?;
+                }
+                Groups::Known(groups)
+            }
+            Extent::InBuffer {
+                slot,
+                offset,
+                dimensions,
+            } => {
+                let Bind::Buffer(id) = args[slot] else {
+                    // The checks let no other kind through.
+                    return Ok(());
+                };
+                Groups::InBuffer(self.groups_of(kernel, threads, id, offset, dimensions)?)
+            }
+        };
         let during = || format!("running kernel `{}`", kernel.name);
         let bound = self.bind(program, &slots, args, wgpu::ShaderStages::COMPUTE)?;
         let pipeline = self.compute_pipeline(program, &slots, &bound.layout)?;
@@ -410,7 +455,10 @@ impl Device for VulkanDevice {
                 });
                 pass.set_pipeline(&pipeline);
                 pass.set_bind_group(0, &bound.group, &[]);
-                pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
+                match &groups {
+                    Groups::Known([x, y, z]) => pass.dispatch_workgroups(*x, *y, *z),
+                    Groups::InBuffer(groups) => pass.dispatch_workgroups_indirect(groups, 0),
+                }
             }
             self.queue.submit([encoder.finish()]);
         })

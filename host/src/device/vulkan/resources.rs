@@ -1,5 +1,6 @@
 //! Buffers and textures of the Vulkan device, and what goes to and from them.
 
+use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::{Channels, TexelFormat, TextureKind};
 use hankel_dsl::native::{Address, Compare, Filter, Sampler};
 
@@ -49,6 +50,11 @@ impl Texture {
     /// Name for messages.
     pub fn what(&self) -> String {
         format!("texture `{}`", self.label)
+    }
+
+    /// Whether a pass may have it as its target.
+    pub fn is_drawn_into(&self) -> bool {
+        self.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
     }
 }
 
@@ -315,6 +321,45 @@ impl VulkanDevice {
         })
     }
 
+    /// Fills a texture that can be drawn into, by passes that draw nothing.
+    pub(super) fn fill(&self, texture: &Texture, value: Vec4) -> Result<()> {
+        let shape = &texture.shape;
+        let [r, g, b, a] = value.to_array().map(f64::from);
+        self.guarded(&|| format!("clearing {}", texture.what()), |device| {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            for level in 0..shape.levels {
+                for layer in 0..shape.layers {
+                    let view = layer_of(&texture.texture, level, layer);
+                    let colour = wgpu::RenderPassColorAttachment {
+                        view: &view,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations {
+                            load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                            store: wgpu::StoreOp::Store,
+                        },
+                    };
+                    let depth = wgpu::RenderPassDepthStencilAttachment {
+                        view: &view,
+                        depth_ops: Some(wgpu::Operations {
+                            load: wgpu::LoadOp::Clear(value.x),
+                            store: wgpu::StoreOp::Store,
+                        }),
+                        stencil_ops: None,
+                    };
+                    let is_depth = shape.format == Format::Depth32;
+                    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                        label: Some("clear"),
+                        color_attachments: if is_depth { &[] } else { &[Some(colour)] },
+                        depth_stencil_attachment: is_depth.then_some(depth),
+                        ..Default::default()
+                    });
+                }
+            }
+            self.queue.submit([encoder.finish()]);
+        })
+    }
+
     pub(super) fn download_texels(&self, texture: &Texture) -> Result<Vec<u8>> {
         let shape = &texture.shape;
         // Of each level: where it begins in the staging buffer, bytes of a row, there and padded.
@@ -416,7 +461,7 @@ impl VulkanDevice {
     pub(super) fn upload_samples(&mut self, texture: TextureId, bytes: &[u8]) -> Result<()> {
         let (texture, shape, what) = {
             let t = self.image(texture)?;
-            if !t.usage.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
+            if !t.is_drawn_into() {
                 return Err(DeviceError::Missing {
                     device: self.name.clone(),
                     feature: format!("drawing into {}", shape_name(&t.shape)),

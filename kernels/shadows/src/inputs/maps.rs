@@ -112,7 +112,7 @@ fn filtered<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[f64; N]> {
 }
 
 /// The texels of a map of four moments, stored as `how` says.
-fn texels(how: u32) -> Vec<Vec4> {
+pub(super) fn texels(how: u32) -> Vec<Vec4> {
     let map = filtered(|z| {
         let z = match how {
             encoding::UNIT => z,
@@ -143,6 +143,9 @@ fn stored(how: u32, m: Moments4<f64>) -> Vec4 {
     unorm([q.r, q.g, q.b, q.a])
 }
 
+/// Where the light is.
+const TOWARD: Vec3 = Vec3::new(0.36, -0.8, 0.48);
+
 /// A light whose map's coordinates are the world's x and z, each from 0 to 1, and whose depth is y.
 pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32) -> Light {
     let target = bias.four();
@@ -150,7 +153,7 @@ pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32)
         row_u: Vec4::new(1.0, 0.0, 0.0, 0.0),
         row_v: Vec4::new(0.0, 0.0, 1.0, 0.0),
         row_depth: Vec4::new(0.0, 1.0, 0.0, 0.0),
-        toward: Vec4::new(0.36, -0.8, 0.48, 2.5),
+        toward: TOWARD.extend(2.5),
         ambient: Vec4::new(0.1, 0.12, 0.15, 0.0),
         bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
         moment_bias,
@@ -187,7 +190,11 @@ pub(super) fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
         world.push(Vec3::new(u as f32, z as f32, v as f32));
         let n = Vec3::new(s.normal() as f32, s.normal() as f32, s.normal() as f32);
         let up = Vec3::new(0.0, -1.0, 0.0);
-        normals.push(if n.length() > 1e-3 { n.normalize() } else { up });
+        let n = if n.length() > 1e-3 { n.normalize() } else { up };
+        // Most faces see the light; the others read no map.
+        let is_turned = n.dot(TOWARD) < 0.0;
+        let turns_back = is_turned && s.count(0, 7) > 0;
+        normals.push(if turns_back { -n } else { n });
         let mut channel = || s.between(0.0, 1.0) as f32;
         colours.push(Vec3::new(channel(), channel(), channel()));
     }
@@ -195,7 +202,7 @@ pub(super) fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
 }
 
 /// What shading reads beside a map: fragments, light and sampler.
-fn fragments_and_light(s: &mut Source, what: &str, light: &Light) -> Given {
+pub(super) fn fragments_and_light(s: &mut Source, what: &str, light: &Light) -> Given {
     let [world, normals, colours] = fragments(s);
     Given::new(what)
         .buffer("world", &world)
@@ -215,7 +222,7 @@ fn with_map(given: Given, name: &str, map: &[Vec4]) -> Given {
 }
 
 /// The same with the published bias and a depth bias, and with ten times that strength and none.
-fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>)]) -> Vec<Given> {
+pub(super) fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>)]) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     let strength = bias.strength as f32;
     [
@@ -456,7 +463,7 @@ pub fn blurred_warps(_: &Request) -> Vec<Given> {
 }
 
 /// A map, filtered along each axis.
-fn with_filter(what: &str, map: &[Vec4]) -> Vec<Given> {
+pub(super) fn with_filter(what: &str, map: &[Vec4]) -> Vec<Given> {
     [(IVec2::X, 0.75_f64), (IVec2::Y, 1.5)]
         .into_iter()
         .map(|(step, sigma)| {

@@ -4,6 +4,7 @@
 
 pub mod maps;
 pub mod soft;
+pub mod tiles;
 
 use std::vec::Vec;
 

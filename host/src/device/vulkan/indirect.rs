@@ -1,0 +1,131 @@
+//! Dispatches whose size is in a buffer: WebGPU wants numbers of workgroups there, kernels say how many
+//! invocations run. A shader of three lines makes the one of the other.
+
+use hankel_dsl::native::describe::Kernel;
+
+use super::super::error::Result;
+use super::{BufferId, VulkanDevice};
+
+const SHADER: &str = "
+struct Asked {
+    threads: vec3<u32>,
+    first: u32,
+    dimensions: u32,
+    most: u32,
+}
+@group(0) @binding(0) var<storage, read> says: array<u32>;
+@group(0) @binding(1) var<uniform> asked: Asked;
+@group(0) @binding(2) var<storage, read_write> groups: array<u32, 3>;
+
+@compute @workgroup_size(1)
+fn main() {
+    for (var i = 0u; i < 3u; i++) {
+        var n = 1u;
+        if (i < asked.dimensions) {
+            n = says[asked.first + i];
+        }
+        let whole = n / asked.threads[i];
+        groups[i] = min(whole + u32(n > whole * asked.threads[i]), asked.most);
+    }
+}
+";
+
+/// What every such dispatch uses.
+#[derive(Debug)]
+pub struct Indirect {
+    pipeline: wgpu::ComputePipeline,
+    /// `Asked` of the shader.
+    asked: wgpu::Buffer,
+    /// Numbers of workgroups along x, y, z.
+    groups: wgpu::Buffer,
+}
+
+impl Indirect {
+    fn new(device: &wgpu::Device) -> Self {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("workgroups of a range"),
+            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+        });
+        let buffer = |label, size, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        Self {
+            pipeline: device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("workgroups of a range"),
+                layout: None,
+                module: &module,
+                entry_point: None,
+                compilation_options: Default::default(),
+                cache: None,
+            }),
+            asked: buffer(
+                "asked",
+                32,
+                wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            ),
+            groups: buffer(
+                "workgroups",
+                12,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
+            ),
+        }
+    }
+}
+
+impl VulkanDevice {
+    /// How many workgroups of `threads` invocations a kernel needs for the range that `says` holds
+    /// `offset` bytes from its start, at most as many along an axis as the device can run. The buffer holds
+    /// it until the next call.
+    pub(super) fn groups_of(
+        &mut self,
+        kernel: &Kernel,
+        threads: [u32; 3],
+        says: BufferId,
+        offset: u32,
+        dimensions: u32,
+    ) -> Result<wgpu::Buffer> {
+        let during = || format!("reading how far kernel `{}` runs", kernel.name);
+        let indirect = match self.indirect.take() {
+            Some(indirect) => indirect,
+            None => self.guarded(&during, Indirect::new)?,
+        };
+        let [x, y, z] = threads.map(|n| n.max(1));
+        let most = self.limits.max_compute_workgroups_per_dimension;
+        let asked = [x, y, z, offset / 4, dimensions, most, 0, 0];
+        let result = self.memory(says).and_then(|memory| {
+            self.guarded(&during, |device| {
+                let binding = |binding, buffer: &wgpu::Buffer| wgpu::BindGroupEntry {
+                    binding,
+                    resource: buffer.as_entire_binding(),
+                };
+                self.queue
+                    .write_buffer(&indirect.asked, 0, bytemuck::cast_slice(&asked));
+                let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("workgroups of a range"),
+                    layout: &indirect.pipeline.get_bind_group_layout(0),
+                    entries: &[
+                        binding(0, &memory.buffer),
+                        binding(1, &indirect.asked),
+                        binding(2, &indirect.groups),
+                    ],
+                });
+                let mut encoder = device.create_command_encoder(&Default::default());
+                {
+                    let mut pass = encoder.begin_compute_pass(&Default::default());
+                    pass.set_pipeline(&indirect.pipeline);
+                    pass.set_bind_group(0, &group, &[]);
+                    pass.dispatch_workgroups(1, 1, 1);
+                }
+                self.queue.submit([encoder.finish()]);
+            })
+        });
+        let groups = indirect.groups.clone();
+        self.indirect = Some(indirect);
+        result.map(|()| groups)
+    }
+}
