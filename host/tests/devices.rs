@@ -871,3 +871,66 @@ fn passes_whose_parts_do_not_fit_are_refused() {
         "{text}"
     );
 }
+
+/// Whether there are enough elements cannot be known where a buffer says how many invocations run.
+#[test]
+fn a_range_in_a_buffer_is_refused_beside_elements() {
+    let mut kernel = affine();
+    let Stage::Compute { range, .. } = &mut kernel.kernel.stage else {
+        panic!("it is a compute kernel");
+    };
+    *range = Range::Uniform {
+        param: "settings".into(),
+        offset: 0,
+    };
+    for device in [&mut NativeDevice::new() as &mut dyn Device, &mut vulkan()] {
+        let settings = device.buffer_from("settings", &bytes(&[3_u32, 0])).unwrap();
+        let pairs = device.buffer_from("pairs", &bytes(&[1.0_f32; 6])).unwrap();
+        let out = device.buffer("out", 12).unwrap();
+        let args = [settings, pairs, out].map(Bind::Buffer);
+        let error = device.dispatch(&kernel.program(Way::Wgsl), &args);
+        let text = error.unwrap_err().to_string();
+        assert!(text.contains("`settings`"), "{text}");
+        assert!(
+            text.contains("how many invocations run, and `pair` has one element for each"),
+            "{text}"
+        );
+    }
+}
+
+/// A texture is filled with a value as its format holds it, drawn into or not.
+#[test]
+fn textures_and_buffers_are_cleared() {
+    use hankel_dsl::glam::Vec4;
+    let value = Vec4::new(0.25, 1.0, 0.4, 0.125);
+    for device in [&mut NativeDevice::new() as &mut dyn Device, &mut vulkan()] {
+        for format in [
+            TexelFormat::Rgba16Unorm,
+            TexelFormat::Rgba32Float,
+            TexelFormat::Rgba8Unorm,
+        ] {
+            for shape in [
+                TextureShape::d2(7, 5, format),
+                TextureShape::d3([3, 4, 2], format),
+            ] {
+                let texture = device.texture("filled", &shape).unwrap();
+                device.clear_texture(texture, value).unwrap();
+                let read = device.read_texture(texture).unwrap();
+                let mut texel = vec![0; format.bytes()];
+                format.store(&mut texel, value);
+                assert_eq!(read, texel.repeat(read.len() / texel.len()), "{shape:?}");
+            }
+        }
+        let shape = TextureShape::d2(4, 4, TexelFormat::R32Uint);
+        let numbers = device
+            .texture_from("numbers", &shape, &bytes(&[7_u32; 16]))
+            .unwrap();
+        let text = device.clear_texture(numbers, value).unwrap_err();
+        assert!(text.to_string().contains("integers"), "{text}");
+        device.clear_texture(numbers, Vec4::ZERO).unwrap();
+        assert_eq!(device.read_texture(numbers).unwrap(), vec![0; 64]);
+        let words = device.buffer_from("words", &bytes(&[7_u32; 9])).unwrap();
+        device.clear_buffer(words).unwrap();
+        assert_eq!(device.read_buffer(words).unwrap(), vec![0; 36]);
+    }
+}

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use hankel_dsl::glam::Vec4;
 use hankel_host::device::{
     Backend, Bind, BufferId, Device, Pass, Program, Result, TextureId, TextureShape,
 };
@@ -115,6 +116,12 @@ impl<D: Inner> Device for Counting<D> {
     }
     fn write_texture(&mut self, texture: TextureId, bytes: &[u8]) -> Result<()> {
         self.device.device().write_texture(texture, bytes)
+    }
+    fn clear_buffer(&mut self, buffer: BufferId) -> Result<()> {
+        self.device.device().clear_buffer(buffer)
+    }
+    fn clear_texture(&mut self, texture: TextureId, value: Vec4) -> Result<()> {
+        self.device.device().clear_texture(texture, value)
     }
     fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>> {
         self.device.device().read_buffer(buffer)

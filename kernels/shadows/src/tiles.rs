@@ -176,8 +176,8 @@ pub fn tile_list(
             let away = slope.x * (dx * EDGE as i32) as f32 + slope.y * (dy * EDGE as i32) as f32;
             least = Real::min(least, other.least - half * turned - away);
             most = Real::max(most, other.most);
-            let is_flat = other.slope.x == 0.0 && other.slope.y == 0.0;
-            is_empty = is_empty && is_flat && other.least >= 1.0;
+            let is_flat = (other.slope.x == 0.0) & (other.slope.y == 0.0);
+            is_empty = is_empty & is_flat & (other.least >= 1.0);
             dx += 1;
         }
         dy += 1;
@@ -198,9 +198,10 @@ pub fn tile_list(
 fn texel(at: UVec2, listed: &Listed, list: Buffer<'_, u32>, map: UVec2) -> UVec2 {
     let place = at.y * ACROSS + at.x / TEXELS;
     let mut texel = map;
-    if place < listed.tiles && place < list.len() {
+    if place < listed.tiles {
         let across = tiles_of(map.x);
-        let (tile, inside) = (list.get(place), at.x % TEXELS);
+        let tile = list.get(within(place as i32, list.len()));
+        let inside = at.x % TEXELS;
         texel = UVec2::new(
             EDGE * (tile % across) + inside % EDGE,
             EDGE * (tile / across) + inside / EDGE,
@@ -233,7 +234,7 @@ pub fn resolve_symmetric_tiles(
 ) {
     let size = depth.size();
     let texel = texel(at, listed, list, size);
-    if texel.x < size.x && texel.y < size.y {
+    if (texel.x < size.x) & (texel.y < size.y) {
         map.store(texel, mean_symmetric(depth, texel, samples));
     }
 }
@@ -265,7 +266,7 @@ pub fn blur_tiles(
 ) {
     let size = source.size();
     let texel = texel(at, listed, list, size);
-    if texel.x < size.x && texel.y < size.y {
+    if (texel.x < size.x) & (texel.y < size.y) {
         map.store(texel, filtered(texel, direction, weights, source, |t| t));
     }
 }

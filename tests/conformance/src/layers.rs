@@ -1,7 +1,7 @@
 //! Layers, cubes, and textures of one dimension. Levels are as in [`super::sampling`].
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Sampler, Texture1d, Texture2dArray, TextureCube, TextureCubeArray, kernel};
+use hankel_dsl::{Real, Sampler, Texture1d, Texture2dArray, TextureCube, TextureCubeArray, kernel};
 
 /// Texels of all levels of all layers.
 #[kernel(compute, threads(8, 8), texture(rgba32float))]
@@ -36,12 +36,13 @@ pub fn between(
     Vec4::new(filtered.x, filtered.y, four.x, four.w)
 }
 
-/// A direction through a face of a cube, away from its edges: SwiftShader reads beyond them what nobody
-/// wrote. (`super::shadow::hidden` crosses them.)
+/// A direction through a face of a cube, away from its edges whatever `on` is: SwiftShader reads beyond
+/// them what nobody wrote, now and then a NaN. (`super::shadow::hidden` crosses them.)
 fn through_a_face(i: u32, on: Vec2) -> Vec3 {
+    let inside = |x: f32| Real::clamp(x, -0.7, 0.7);
     let group = i / 64;
     let major = if group & 1 == 0 { 1.0 } else { -1.0 };
-    let (s, t) = (on.x, on.y * 0.5);
+    let (s, t) = (inside(on.x), inside(on.y) * 0.5);
     let axis = group % 3;
     if axis == 0 {
         Vec3::new(major, t, s)

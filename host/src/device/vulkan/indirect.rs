@@ -99,20 +99,22 @@ impl VulkanDevice {
         let asked = [x, y, z, offset / 4, dimensions, most, 0, 0];
         let result = self.memory(says).and_then(|memory| {
             self.guarded(&during, |device| {
-                let binding = |binding, buffer: &wgpu::Buffer| wgpu::BindGroupEntry {
-                    binding,
-                    resource: buffer.as_entire_binding(),
-                };
                 self.queue
                     .write_buffer(&indirect.asked, 0, bytemuck::cast_slice(&asked));
+                let buffers = [&memory.buffer, &indirect.asked, &indirect.groups];
+                let mut binding = 0;
+                let entries = buffers.map(|buffer| {
+                    let entry = wgpu::BindGroupEntry {
+                        binding,
+                        resource: buffer.as_entire_binding(),
+                    };
+                    binding += 1;
+                    entry
+                });
                 let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label: Some("workgroups of a range"),
                     layout: &indirect.pipeline.get_bind_group_layout(0),
-                    entries: &[
-                        binding(0, &memory.buffer),
-                        binding(1, &indirect.asked),
-                        binding(2, &indirect.groups),
-                    ],
+                    entries: &entries,
                 });
                 let mut encoder = device.create_command_encoder(&Default::default());
                 {

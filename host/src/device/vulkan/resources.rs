@@ -348,9 +348,10 @@ impl VulkanDevice {
                         stencil_ops: None,
                     };
                     let is_depth = shape.format == Format::Depth32;
+                    let colours = if is_depth { vec![] } else { vec![Some(colour)] };
                     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                         label: Some("clear"),
-                        color_attachments: if is_depth { &[] } else { &[Some(colour)] },
+                        color_attachments: &colours,
                         depth_stencil_attachment: is_depth.then_some(depth),
                         ..Default::default()
                     });
