@@ -539,17 +539,19 @@ impl<'d> Executor<'d> {
                 let (drawn, onto) = match target {
                     Target::Depth { depth } => (*depth, Onto::Depth(place.texture(*depth)?)),
                     Target::Colour {
-                        colour, background, ..
+                        colour,
+                        background,
+                        blend,
+                        before,
+                        ..
                     } => {
-                        let texture = place.texture(*colour)?;
-                        let background = *background;
-                        (
-                            *colour,
-                            Onto::Colour {
-                                texture,
-                                background,
-                            },
-                        )
+                        let onto = Onto::Colour {
+                            texture: place.texture(*colour)?,
+                            background: *background,
+                            blend: *blend,
+                            before: before.map(|depth| place.texture(depth)).transpose()?,
+                        };
+                        (*colour, onto)
                     }
                 };
                 let Shape::Texture(shape) = self.graph.values()[drawn.at()].shape else {

@@ -20,6 +20,7 @@ pub mod vulkan;
 use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
 use hankel_dsl::native::{Call, CallError, Sampler, level_size, texture_bytes};
 use serde::{Deserialize, Serialize};
@@ -105,6 +106,16 @@ impl Format {
         match self {
             Self::Texel(t) => t.name(),
             Self::Depth32 => "depth32float",
+        }
+    }
+
+    /// Whether every device can blend what is drawn into it: colours of up to 16 bits in each channel. Blending
+    /// of 32-bit floats is optional in WebGPU, and integers have none.
+    #[must_use]
+    pub const fn is_blendable(self) -> bool {
+        match self {
+            Self::Texel(t) => !t.is_integer() && t.bytes() < 4 * t.channels(),
+            Self::Depth32 => false,
         }
     }
 }
@@ -358,6 +369,56 @@ pub enum Cull {
     Front,
 }
 
+/// How what is drawn is put together with what is there, fragment by fragment in the order of the triangles.
+/// `source` is the fragment's colour, `destination` what is there, `alpha` the fourth channel of `source`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Blend {
+    /// `source`.
+    #[default]
+    Off,
+    /// `alpha source + (1 - alpha) destination`; of the fourth channel itself
+    /// `alpha + (1 - alpha) destination`.
+    Alpha,
+    /// `source + destination`.
+    Additive,
+    /// `source destination`.
+    Multiplicative,
+    /// The smaller one of `source` and `destination`, channel by channel.
+    Least,
+}
+
+impl Blend {
+    /// Its name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Alpha => "alpha",
+            Self::Additive => "additive",
+            Self::Multiplicative => "multiplicative",
+            Self::Least => "least",
+        }
+    }
+
+    /// What is there afterwards, before it is stored.
+    #[must_use]
+    pub fn apply(self, source: Vec4, destination: Vec4) -> Vec4 {
+        match self {
+            Self::Off => source,
+            Self::Alpha => {
+                let alpha = source.w;
+                let mixed = source * alpha + destination * (1.0 - alpha);
+                mixed
+                    .truncate()
+                    .extend(alpha + destination.w * (1.0 - alpha))
+            }
+            Self::Additive => source + destination,
+            Self::Multiplicative => source * destination,
+            Self::Least => source.min(destination),
+        }
+    }
+}
+
 /// A colour target of a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Colour {
@@ -367,6 +428,9 @@ pub struct Colour {
     pub resolve: Option<TextureId>,
     /// What it is filled with first; `None` keeps what is there.
     pub clear: Option<[f64; 4]>,
+    /// How what is drawn is put together with what is there; other than [`Blend::Off`] for formats that are
+    /// [`Format::is_blendable`].
+    pub blend: Blend,
 }
 
 /// Which depths pass.

@@ -294,8 +294,23 @@ pub fn shade_pcf(
     #[uniform] light: &Light,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
+    percentage(light, world, normal, colour, depth.size(), |at, z| {
+        if depth.load(at, 0).x < z { 1.0 } else { 0.0 }
+    })
+}
+
+/// Lambert's law with the mean of what `compare` gives for the texels of a square around the receiver and for
+/// the receiver's depth.
+#[inline(always)]
+pub(crate) fn percentage(
+    light: &Light,
+    world: Vec3,
+    normal: Vec3,
+    colour: Vec3,
+    size: UVec2,
+    compare: impl Fn(UVec2, f32) -> f32,
+) -> Vec4 {
     let (uv, z) = receiver(light, world);
-    let size = depth.size();
     let nearest = |t: f32, size: u32| {
         let last = (size - 1) as f32;
         // Not negative, so that cutting the fraction off is rounding down.
@@ -309,7 +324,7 @@ pub fn shade_pcf(
         let mut dx = -radius;
         while dx <= radius {
             let at = UVec2::new(within(x + dx, size.x), within(y + dy, size.y));
-            shadowed += if depth.load(at, 0).x < z { 1.0 } else { 0.0 };
+            shadowed += compare(at, z);
             dx += 1;
         }
         dy += 1;

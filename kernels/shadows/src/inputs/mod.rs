@@ -4,6 +4,7 @@
 
 pub mod maps;
 pub mod soft;
+pub mod translucent;
 
 use std::vec::Vec;
 
