@@ -90,7 +90,9 @@ impl Rays {
                 device
                     .write_texture(texture, &texels)
                     .map_err(during(draw.label))?;
-                Ok(self.found.get(&draw.pass).map(|f| f.fragments.edges()))
+                // A map's samples are no picture's.
+                let found = self.found.get(&draw.pass).filter(|_| !target.are_kept);
+                Ok(found.map(|f| f.fragments.edges()))
             }
             (Onto::Colour { texture, .. } | Onto::Depth(texture), _) => {
                 let vertices = self.run_vertices(device, draw)?;

@@ -48,7 +48,14 @@ fn quantized(z: f32, how: u32) -> Quantized4<f32> {
 
 /// Half of a translucent fragment's four moments in the optimised basis, for alpha blending into zeros:
 /// the first two channels with `part` 0, the other two with 1. Alpha is the opacity.
-#[kernel(fragment)]
+#[kernel(
+    fragment,
+    parity(
+        ulp = 0,
+        absolute = 5e-7,
+        why = "sums of products: drivers may contract two of them, and so leave out the rounding of products of at most 4, which is 2.4e-7"
+    )
+)]
 pub fn translucent_moments(
     #[varying]
     #[range(0.0..=1.0)]
