@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::error::{FrameError, Result};
 use crate::executor::{Clock, Executor, Memory, Progress, Run, Shaders, Timing};
 use crate::graph::{self, Graph, Handle, Summary};
-use crate::passes::Given;
+use crate::passes::{Given, Translucent};
 use crate::picture::{Difference, Picture};
 use crate::scene::{Camera, CameraView, Fit, LightView, Mesh, Scene};
 
@@ -60,7 +60,7 @@ pub enum Show {
     /// The scene, lit.
     Picture,
     /// The share of light that arrives, 1 minus the shadow, in 32-bit floats: white surfaces that
-    /// face the light everywhere. The same passes by the same kernels make it.
+    /// face the light everywhere, seen through translucent ones. The same passes by the same kernels make it.
     Light,
 }
 
@@ -116,6 +116,11 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
     let view = light_view(scene, scene.light, mesh);
     let camera = camera_view(scene, &scene.camera, mesh);
     let mut graph = Graph::new(hankel_shadows::entries());
+    let translucent = mesh.translucent_along(view.direction);
+    let translucent = (!translucent.is_empty()).then(|| Translucent {
+        indices: graph.buffer("translucent indices", translucent.as_flattened()),
+        opacities: graph.buffer("opacities", &mesh.all_opacities()),
+    });
     let vertices = mesh.positions.len();
     let (normals, colours, format, [r, g, b]) = match show {
         Show::Picture => (
@@ -135,7 +140,8 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         positions: graph.buffer("positions", &mesh.positions),
         normals: graph.buffer("normals", &normals),
         colours: graph.buffer("colours", &colours),
-        indices: graph.buffer("indices", mesh.indices()),
+        indices: graph.buffer("indices", mesh.opaque().as_flattened()),
+        translucent,
         light_view: graph.parameter("light's view", &transform(view.clip_from_world)),
         camera: graph.parameter("camera", &transform(camera.clip_from_world)),
         light: graph.parameter("light", &light(scene, &view, show)),
@@ -145,6 +151,7 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         size: [scene.width, scene.height],
         format,
         background: [r, g, b, 1.0],
+        is_tinted: show == Show::Picture,
     };
     let picture = (scene.shadow.technique.add)(&mut graph, &given)?;
     graph.keep(picture);
@@ -210,6 +217,11 @@ impl<'d> Frame<'d> {
         if self.show == Show::Light {
             let normals = vec![-view.direction; self.mesh.positions.len()];
             self.executor.set_buffer(self.given.normals, &normals)?;
+        }
+        if let Some(translucent) = self.given.translucent {
+            let triangles = self.mesh.translucent_along(view.direction);
+            let indices = triangles.as_flattened();
+            self.executor.set_buffer(translucent.indices, indices)?;
         }
         self.executor.set(self.given.light, &uniform)?;
         let area = area(&self.scene, &view);

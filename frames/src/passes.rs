@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use hankel_dsl::glam::IVec2;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::{Address, Filter, Sampler};
+use hankel_host::device::Blend;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_shadows::blur::Direction;
 use hankel_shadows::shade::encoding;
@@ -28,6 +29,8 @@ pub struct Given {
     pub colours: Handle,
     /// Three for each triangle.
     pub indices: Handle,
+    /// Translucent triangles, if there are any; they are not among `indices`.
+    pub translucent: Option<Translucent>,
     /// From the world to the shadow map, [`hankel_shadows::depth::Transform`].
     pub light_view: Handle,
     /// From the world to the picture, [`hankel_shadows::depth::Transform`].
@@ -46,13 +49,44 @@ pub struct Given {
     pub format: TexelFormat,
     /// The colour where nothing is.
     pub background: [f64; 4],
+    /// Whether the picture shows translucent surfaces, not only their shadow.
+    pub is_tinted: bool,
 }
 
-/// Depth as the light sees it.
+/// Triangles that let a share of the light pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Translucent {
+    /// Three for each triangle, from the farthest from the light to the nearest.
+    pub indices: Handle,
+    /// Of each vertex, the share of light that does not pass.
+    pub opacities: Handle,
+}
+
+/// What [`Graph::omit`] calls translucent casters that cast no shadow.
+pub const TRANSLUCENT: &str = "shadow of translucent casters";
+
+/// Depth as the light sees it, of opaque casters only.
 ///
 /// # Errors
 /// [`crate::graph::GraphError`], as of all functions here.
 pub fn light_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    if given.translucent.is_some() {
+        graph.omit(
+            TRANSLUCENT,
+            "of each sample the map holds the nearest depth, and a share of it cannot be told",
+        );
+    }
+    opaque_depth(graph, given)
+}
+
+/// Depth as the light sees it, of opaque casters, for techniques that see to the others.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn opaque_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    if given.translucent.is_none() {
+        graph.omit("blending", "no caster is translucent");
+    }
     let surfaces = Surfaces {
         positions: given.positions,
         indices: given.indices,
@@ -120,6 +154,102 @@ pub fn moments(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Handle
     resolve(graph, given, kernel)
         .arg("depth", depth)
         .image([given.shadow.size; 2])
+}
+
+/// The map of four power moments, as one of [`POWER_MOMENTS`], of opaque and translucent casters. The latter are
+/// blended into it in maps of 16 bits.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn moment_map(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    let Some(translucent) = given.translucent else {
+        let depth = opaque_depth(graph, given)?;
+        return moments(graph, given, depth);
+    };
+    let Map {
+        format, encoding, ..
+    } = given.shadow.map;
+    if encoding == encoding::PLAIN {
+        graph.omit(
+            TRANSLUCENT,
+            "not every device can blend 32-bit floats: a map of 16 bits shows it",
+        );
+        let depth = opaque_depth(graph, given)?;
+        return moments(graph, given, depth);
+    }
+    let depth = opaque_depth(graph, given)?;
+    let size = [given.shadow.size; 2];
+    let mut halves = Vec::new();
+    for (part, label) in ["blend first half", "blend second half"]
+        .into_iter()
+        .enumerate()
+    {
+        let pass = draw_translucent(graph, given, &translucent, label, given.light_view)
+            .fragment("translucent_moments")
+            .constant("encoding", encoding)
+            .constant("part", part as u32)
+            .blend(Blend::Alpha)
+            .before(depth);
+        halves.push(pass.samples(size, format, [0.0; 4])?);
+    }
+    resolve(graph, given, "resolve_translucent")
+        .arg("depth", depth)
+        .arg("first", halves[0])
+        .arg("second", halves[1])
+        .constant("encoding", encoding)
+        .image(size)
+}
+
+/// Begins the pass that draws translucent triangles as a light or a camera sees them.
+pub fn draw_translucent<'g>(
+    graph: &'g mut Graph,
+    given: &Given,
+    translucent: &Translucent,
+    label: &'static str,
+    view: Handle,
+) -> AddDraw<'g> {
+    let surfaces = Surfaces {
+        positions: given.positions,
+        indices: translucent.indices,
+        clip_from_world: view,
+    };
+    graph
+        .draw(label, surfaces, "translucent")
+        .arg("position", given.positions)
+        .arg("colour", given.colours)
+        .arg("opacity", translucent.opacities)
+        .arg("view", view)
+}
+
+/// A picture as it is seen through the translucent triangles before its surfaces: they absorb, each channel for
+/// itself, and scatter nothing.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn see_through(graph: &mut Graph, given: &Given, picture: Handle) -> Result<Handle> {
+    let Some(translucent) = given.translucent.filter(|_| given.is_tinted) else {
+        return Ok(picture);
+    };
+    let surfaces = Surfaces {
+        positions: given.positions,
+        indices: given.indices,
+        clip_from_world: given.camera,
+    };
+    let depth = graph
+        .draw("depth of the picture", surfaces, "light_depth")
+        .arg("position", given.positions)
+        .arg("light", given.camera)
+        .depth(given.size)?;
+    let tint = draw_translucent(graph, given, &translucent, "tint", given.camera)
+        .fragment("tint")
+        .blend(Blend::Multiplicative)
+        .before(depth)
+        .colour(given.size, given.format, [1.0; 4])?;
+    graph
+        .compute("tinted picture", "tinted")
+        .arg("picture", picture)
+        .arg("tint", tint)
+        .image(given.size)
 }
 
 /// Begins the pass that makes a map of the light's depths.
@@ -241,7 +371,8 @@ pub fn shade(
         .arg("camera", given.camera)
         .fragment(kernel)
         .arg("light", given.light);
-    bind(pass).colour(given.size, given.format, given.background)
+    let picture = bind(pass).colour(given.size, given.format, given.background)?;
+    see_through(graph, given, picture)
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ use crate::executor::{Progress, Shaders, Timing};
 use crate::frame::{Show, graph, light_view};
 use crate::graph::{Omission, Summary};
 use crate::measure::{Choices, Configuration, Sample, median, sample};
+use crate::passes::TRANSLUCENT;
 use crate::scene::{Fit, Mesh, Scene};
 use crate::truth::{Arriving, Pixels, by_technique_on};
 
@@ -415,6 +416,8 @@ pub fn plan(
     };
     let mut configurations = choices.configurations();
     configurations.retain(|c| c.suits(scene));
+    let blind = blind(&configurations, scene, mesh)?;
+    configurations.retain(|c| blind.iter().all(|b| b.what != c.method()));
     progress.begin("timing each method", 1, 3);
     let mut times: BTreeMap<String, Times> = BTreeMap::new();
     for (i, c) in configurations.iter().enumerate() {
@@ -526,7 +529,7 @@ pub fn plan(
         return Ok(Err(Impossible {
             wanted,
             nearest: nearest.map(|(c, e)| (c.to_string(), e)),
-            rejected: why.told(None),
+            rejected: blind.into_iter().chain(why.told(None)).collect(),
         }));
     };
     let times = of_passes(&rounds[fastest]);
@@ -543,13 +546,42 @@ pub fn plan(
         times,
         bytes: chosen.bytes,
         summary: made.summary(),
-        rejected: why.told(Some(&chosen.configuration)),
+        rejected: blind
+            .into_iter()
+            .chain(why.told(Some(&chosen.configuration)))
+            .collect(),
         gain: gain(&configured, mesh),
         probed: why.probed,
         considered: configurations.len(),
         pixels: truth.known.len(),
         scene: configured,
     }))
+}
+
+/// The methods that leave the shadow of a scene's translucent casters out, and why.
+fn blind(configurations: &[Configuration], scene: &Scene, mesh: &Mesh) -> Result<Vec<Omission>> {
+    let mut seen = BTreeMap::new();
+    if mesh.translucent().is_empty() {
+        return Ok(Vec::new());
+    }
+    for c in configurations {
+        // It is the same for all sizes.
+        if let Entry::Vacant(method) = seen.entry(c.method()) {
+            let (graph, ..) = graph(&c.on(scene), mesh, Show::Light)?;
+            let omitted = graph.omitted().iter();
+            let why = omitted
+                .filter(|o| o.what == TRANSLUCENT)
+                .map(|o| o.why.clone());
+            method.insert(why.last());
+        }
+    }
+    let blind = seen.into_iter().filter_map(|(method, why)| {
+        Some(Omission {
+            what: method.into(),
+            why: format!("no {TRANSLUCENT}: {}", why?).into(),
+        })
+    });
+    Ok(blind.collect())
 }
 
 /// The medians of the rounds' passes.

@@ -1,7 +1,8 @@
 //! How wrong a shadow is: pictures of the light that arrives, by a technique and by rays.
 //!
 //! - [`by_rays`] knows no map: 256 rays through each pixel, and one from each place that they meet
-//!   towards the light; each towards another point of it if the light has an area.
+//!   towards the light; each towards another point of it if the light has an area. Of the light, translucent
+//!   surfaces let pass the product of 1 minus each one's opacity.
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
@@ -20,7 +21,7 @@ use crate::passes::gaussian;
 use crate::picture::Picture;
 use crate::scene::{Area, Mesh, Scene};
 use crate::visibility::SAMPLES;
-use crate::visibility::cast::{Caster, Lens, Segment, in_bands};
+use crate::visibility::cast::{Caster, Lens, SAMPLES as AT, Segment, in_bands};
 use crate::visibility::fragments::{Fragments, Varying};
 
 /// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is.
@@ -200,6 +201,7 @@ const AWAY: f64 = 1e-5;
 /// What rays say of single pixels.
 pub struct Pixels {
     caster: Caster,
+    translucent: Option<Layers>,
     lens: Lens,
     /// Length of the scene's diagonal.
     diagonal: f64,
@@ -208,6 +210,45 @@ pub struct Pixels {
     /// From there to the middle of its edge, along x and y of the shadow map; nothing for a point.
     axes: [DVec3; 2],
     area: Area,
+}
+
+/// Translucent surfaces.
+struct Layers {
+    caster: Caster,
+    /// Of each vertex.
+    opacities: Vec<f32>,
+}
+
+impl Layers {
+    fn of(mesh: &Mesh) -> Option<Self> {
+        Some(Self {
+            caster: Caster::of_translucent(mesh)?,
+            opacities: mesh.all_opacities(),
+        })
+    }
+
+    /// Depth and opacity of all surfaces in each sample of a map.
+    fn of_samples(&self, lens: &Lens, clip: &[Vec4], size: u32) -> Vec<Vec<[f32; 2]>> {
+        let row_len = (size * SAMPLES) as usize;
+        let mut all = vec![Vec::new(); row_len * size as usize];
+        in_bands(
+            &mut all,
+            row_len,
+            &mut |_| (),
+            |y, row: &mut [Vec<[f32; 2]>]| {
+                for (i, sample) in row.iter_mut().enumerate() {
+                    let texel = [i as u32 / SAMPLES, y as u32];
+                    let segment = lens.segment(texel, AT[i % AT.len()]);
+                    let surface = |hit| {
+                        let opacity = self.caster.at(&segment, hit, &self.opacities);
+                        [self.caster.depth(&segment, hit, clip), opacity]
+                    };
+                    *sample = self.caster.all(&segment).into_iter().map(surface).collect();
+                }
+            },
+        );
+        all
+    }
 }
 
 impl Pixels {
@@ -219,6 +260,7 @@ impl Pixels {
         let radius = f64::from(scene.area.radius);
         Self {
             caster: Caster::of(mesh),
+            translucent: Layers::of(mesh),
             lens: Lens::new(view.clip_from_world, scene.width, scene.height),
             diagonal: mesh.bounds().map_or(1.0, |b| f64::from(b.size().length())),
             toward: -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y),
@@ -228,23 +270,29 @@ impl Pixels {
     }
 
     /// The share of 256 rays through a pixel that meet nothing, or a place from which a ray reaches
-    /// the light. If the light has an area, each goes on towards another point of it, so that the
+    /// the light, each with the share of light that passes translucent surfaces on its way. If the light has an area, each goes on towards another point of it, so that the
     /// pixel's value is the visible share of the light, and the pixel's own average, at once. The
     /// points are a Hammersley set, moved in each pixel by another amount.
     #[must_use]
     pub fn light(&self, pixel: [u32; 2]) -> f32 {
-        let is_lit = |i: u32| {
+        let arriving = |i: u32| {
             let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
             let segment = self.lens.segment(pixel, at);
-            self.caster.first(&segment).is_none_or(|hit| {
+            self.caster.first(&segment).map_or(1.0, |hit| {
                 let toward = self.toward(pixel, i);
                 let from = segment.at(hit.t) + toward * (AWAY * self.diagonal);
                 let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
-                self.caster.first(&to_light).is_none()
+                if self.caster.first(&to_light).is_some() {
+                    return 0.0;
+                }
+                let translucent = self.translucent.as_ref();
+                translucent.map_or(1.0, |t| {
+                    f64::from(t.caster.transmittance(&to_light, &t.opacities))
+                })
             })
         };
-        let lit = (0..GRID * GRID).filter(|i| is_lit(*i)).count();
-        lit as f32 / (GRID * GRID) as f32
+        let sum: f64 = (0..GRID * GRID).map(arriving).sum();
+        (sum / f64::from(GRID * GRID)) as f32
     }
 
     /// Where ray `i` of a pixel goes on.
@@ -300,12 +348,26 @@ pub fn by_rays(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arri
 struct Filter {
     size: i64,
     depths: Vec<f32>,
+    /// Depth and opacity of the translucent surfaces in each sample; empty without any.
+    translucent: Vec<Vec<[f32; 2]>>,
     /// Of the taps from one side to the other; their sum is 1.
     weights: Vec<f64>,
 }
 
 impl Filter {
-    /// The share of the filter's depths around a texel that are nearer than `z`.
+    /// The share of light that does not get past a depth in a sample.
+    fn shadow(&self, sample: usize, z: f32) -> f64 {
+        if self.depths[sample] < z {
+            return 1.0;
+        }
+        let surfaces = self.translucent.get(sample).into_iter().flatten();
+        let nearer = surfaces.filter(|[depth, _]| *depth < z);
+        1.0 - nearer
+            .map(|[_, opacity]| 1.0 - f64::from(*opacity))
+            .product::<f64>()
+    }
+
+    /// The share of light that does not get past `z`, of the filter's depths around a texel.
     fn around(&self, x: i64, y: i64, z: f32) -> f64 {
         let radius = self.weights.len() as i64 / 2;
         let within = |i: i64| i.clamp(0, self.size - 1);
@@ -315,9 +377,9 @@ impl Filter {
             for (dx, wx) in (-radius..).zip(&self.weights) {
                 let texel = within(y + dy) * self.size + within(x + dx);
                 let first = texel as usize * samples;
-                let depths = &self.depths[first..first + samples];
-                let nearer = depths.iter().filter(|d| **d < z).count();
-                sum += wy * wx * nearer as f64;
+                let samples = first..first + samples;
+                let shadows = samples.map(|sample| self.shadow(sample, z)).sum::<f64>();
+                sum += wy * wx * shadows;
             }
         }
         sum / f64::from(SAMPLES)
@@ -343,7 +405,8 @@ impl Filter {
 }
 
 /// What percentage-closer filtering lets arrive that has the weights of the scene's filter and of
-/// bilinear lookup, and compares all depth samples. `leak_cut` is not part of it.
+/// bilinear lookup, and compares all depth samples, each with the list of all translucent surfaces in it.
+/// `leak_cut` is not part of it.
 #[must_use]
 pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
     let caster = Caster::of(mesh);
@@ -363,6 +426,7 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
     let sum: f64 = weights.iter().sum();
     let filter = Filter {
         size: i64::from(size),
+        translucent: Layers::of(mesh).map_or_else(Vec::new, |t| t.of_samples(&lens, &clip, size)),
         depths: caster.depths(&lens, &clip, [size; 2], &mut |share| advance(share * 0.4)),
         weights: weights.iter().map(|w| w / sum).collect(),
     };
@@ -476,9 +540,10 @@ mod tests {
         let mut depths = vec![0.2_f32; 4];
         depths.extend([0.8, 0.8, 0.8, 0.2]);
         depths.extend([0.9; 8]);
-        let filter = Filter {
+        let mut filter = Filter {
             size: 2,
             depths,
+            translucent: Vec::new(),
             weights: vec![1.0],
         };
         assert_eq!(filter.around(0, 0, 0.5), 1.0);
@@ -487,5 +552,9 @@ mod tests {
         // Half way between the two, and half way down.
         assert_eq!(filter.at(0.5, 0.25, 0.5), 0.625);
         assert_eq!(filter.at(0.5, 0.5, 0.5), 0.3125);
+        // Two surfaces in one sample, of which one is farther than the receiver; none in the others.
+        filter.translucent = vec![Vec::new(); 16];
+        filter.translucent[4] = vec![[0.3, 0.5], [0.4, 0.5], [0.6, 0.5]];
+        assert_eq!(filter.around(1, 0, 0.5), 0.25 + 0.75 / 4.0);
     }
 }

@@ -91,6 +91,13 @@ fn every_map_agrees_in_the_yard() {
 }
 
 #[test]
+fn glass_agrees() {
+    for technique in ["hamburger", "hausdorff", "pcf", "esm"] {
+        agree("glass", &format!("technique = '{technique}'"));
+    }
+}
+
+#[test]
 fn soft_shadows_agree_in_the_yard() {
     for technique in ["pcss", "vssm", "soft", "soft-6"] {
         let light = "radius = 0.1\nshape = 'square'";

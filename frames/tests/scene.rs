@@ -86,7 +86,15 @@ fn every_field_is_read() {
     )
     .unwrap();
     let file = PathBuf::from("folder/models/a.glb");
-    assert_eq!(scene.geometry, Geometry::Model { file, ground: 2.5 });
+    let opacity = 1.0;
+    assert_eq!(
+        scene.geometry,
+        Geometry::Model {
+            file,
+            ground: 2.5,
+            opacity
+        }
+    );
     assert_eq!(scene.camera.up, Vec3::Z);
     assert_eq!(scene.light, Vec3::NEG_Y);
     let (radius, shape) = (0.05, AreaShape::Square);
@@ -343,7 +351,11 @@ impl Model {
         let file = self.folder.path().join("m.gltf");
         fs::write(&file, bytes).unwrap();
         let mut scene = parse(LEAST).unwrap();
-        scene.geometry = Geometry::Model { file, ground: 0.0 };
+        scene.geometry = Geometry::Model {
+            file,
+            ground: 0.0,
+            opacity: 1.0,
+        };
         scene.mesh()
     }
 

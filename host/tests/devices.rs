@@ -7,8 +7,8 @@ use common::*;
 use hankel_dsl::native::describe::*;
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::{
-    Bind, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, NativeDevice, Pass, Program,
-    Shader, TextureShape, Topology, VulkanDevice,
+    Bind, Blend, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, NativeDevice, Pass,
+    Program, Shader, TextureShape, Topology, VulkanDevice,
 };
 
 const NEAREST: Sampler = Sampler::new(Filter::Nearest, Address::ClampToEdge);
@@ -301,12 +301,14 @@ fn draw_two(gpu: &mut dyn Device, way: Way, samples: u32) -> (Vec<f32>, Vec<f32>
             texture: single,
             resolve: None,
             clear: Some([0.0; 4]),
+            blend: Blend::Off,
         }
     } else {
         Colour {
             texture: many,
             resolve: Some(resolved),
             clear: Some([0.0; 4]),
+            blend: Blend::Off,
         }
     };
     gpu.draw(&Pass {
@@ -797,6 +799,7 @@ fn passes_whose_parts_do_not_fit_are_refused() {
         texture,
         resolve: None,
         clear: Some([0.0; 4]),
+        blend: Blend::Off,
     };
     let mut refuse = |colours: &[Colour], depth, draw: Draw<'_>| {
         gpu.draw(&Pass {

@@ -102,8 +102,8 @@ pub struct Run {
     pub unchanged: Vec<String>,
     /// Wall time of the whole.
     pub seconds: f64,
-    /// Share of the pixels whose samples see different triangles, of the last draw in colour that
-    /// counted them: rays do.
+    /// Share of the pixels whose samples see different triangles, of all draws of pictures that counted them
+    /// together, at most 1: rays do.
     pub edges: Option<f64>,
 }
 
@@ -440,7 +440,9 @@ impl<'d> Executor<'d> {
             let start = Instant::now();
             self.state.begin(&self.graph, &self.blocks, pass);
             let edges = self.run_pass(pass, &mut |share| progress.advance(share))?;
-            run.edges = edges.or(run.edges);
+            if let Some(edges) = edges {
+                run.edges = Some((run.edges.unwrap_or(0.0) + edges).min(1.0));
+            }
             let mut time = Duration::ZERO;
             if clock == Clock::Passes {
                 self.device.wait().map_err(during(&label))?;
@@ -538,17 +540,19 @@ impl<'d> Executor<'d> {
                 let (drawn, onto) = match target {
                     Target::Depth { depth } => (*depth, Onto::Depth(place.texture(*depth)?)),
                     Target::Colour {
-                        colour, background, ..
+                        colour,
+                        background,
+                        blend,
+                        before,
+                        ..
                     } => {
-                        let texture = place.texture(*colour)?;
-                        let background = *background;
-                        (
-                            *colour,
-                            Onto::Colour {
-                                texture,
-                                background,
-                            },
-                        )
+                        let onto = Onto::Colour {
+                            texture: place.texture(*colour)?,
+                            background: *background,
+                            blend: *blend,
+                            before: before.map(|depth| place.texture(depth)).transpose()?,
+                        };
+                        (*colour, onto)
                     }
                 };
                 let Shape::Texture(shape) = self.graph.values()[drawn.at()].shape else {

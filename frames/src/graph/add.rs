@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use hankel_dsl::native::describe::{Output, Role, Stage};
 use hankel_host::device::slots;
-use hankel_host::device::{Format, TextureShape};
+use hankel_host::device::{Blend, Format, TextureShape};
 
 use super::check::{GraphError, Place, allowed, listed, stage_name};
 use super::{
@@ -190,6 +190,8 @@ impl Graph {
             surfaces,
             vertex: Named::new(vertex),
             fragment: None,
+            blend: Blend::Off,
+            before: None,
         }
     }
 }
@@ -372,6 +374,8 @@ pub struct AddDraw<'g> {
     surfaces: Surfaces,
     vertex: Named,
     fragment: Option<Named>,
+    blend: Blend,
+    before: Option<Handle>,
 }
 
 impl AddDraw<'_> {
@@ -403,6 +407,18 @@ impl AddDraw<'_> {
         self
     }
 
+    /// Fragments are put together with what is there, in the order of the triangles, and do not hide each other.
+    pub const fn blend(mut self, blend: Blend) -> Self {
+        self.blend = blend;
+        self
+    }
+
+    /// Only fragments that are nearer than this depth are blended, sample by sample.
+    pub const fn before(mut self, depth: Handle) -> Self {
+        self.before = Some(depth);
+        self
+    }
+
     /// Adds the pass: depth alone, [`SAMPLES`] samples of each texel.
     ///
     /// # Errors
@@ -411,6 +427,12 @@ impl AddDraw<'_> {
         if let Some(fragment) = &self.fragment {
             let place = fragment.place(&self.label);
             return Err(place.kernel("depth is drawn without a fragment kernel: leave it out"));
+        }
+        if self.blend != Blend::Off || self.before.is_some() {
+            return Err(GraphError::Draw {
+                pass: self.label.into(),
+                problem: "depth is not blended: leave `blend` and `before` out".into(),
+            });
         }
         let shape = TextureShape::depth(width, height).multisampled(SAMPLES);
         self.finish(shape, |depth| Target::Depth { depth })
@@ -426,17 +448,39 @@ impl AddDraw<'_> {
         format: hankel_dsl::native::describe::TexelFormat,
         background: [f64; 4],
     ) -> Result<Handle> {
+        self.coloured(TextureShape::d2(width, height, format), background)
+    }
+
+    /// Adds the pass: a picture with all [`SAMPLES`] samples of each pixel.
+    ///
+    /// # Errors
+    /// [`GraphError`]; the graph is then as it was.
+    pub fn samples(
+        self,
+        [width, height]: [u32; 2],
+        format: hankel_dsl::native::describe::TexelFormat,
+        background: [f64; 4],
+    ) -> Result<Handle> {
+        let shape = TextureShape::d2(width, height, format).multisampled(SAMPLES);
+        self.coloured(shape, background)
+    }
+
+    fn coloured(self, shape: TextureShape, background: [f64; 4]) -> Result<Handle> {
         if self.fragment.is_none() {
             return Err(GraphError::Draw {
                 pass: self.label.into(),
                 problem: "a colour needs a fragment kernel: name one with `fragment`".into(),
             });
         }
-        let shape = TextureShape::d2(width, height, format);
+        self.graph
+            .check_blend(&self.label, self.blend, self.before, shape)?;
+        let (blend, before) = (self.blend, self.before);
         self.finish(shape, |colour| Target::Colour {
             colour,
             samples: SAMPLES,
             background,
+            blend,
+            before,
         })
     }
 
@@ -447,6 +491,8 @@ impl AddDraw<'_> {
             surfaces,
             vertex: named,
             fragment: named_fragment,
+            blend,
+            before,
         } = self;
         if shape.size.contains(&0) || shape.format.texel().is_integer() {
             let what = if shape.format == Format::Depth32 {
@@ -484,7 +530,8 @@ impl AddDraw<'_> {
             indices,
             clip_from_world,
         } = surfaces;
-        let first = [positions, indices, clip_from_world];
+        let mut first = vec![positions, indices, clip_from_world];
+        first.extend(before);
         let reads = reads(std::iter::once(&vertex).chain(&fragment), &first);
         let made = graph.made(label.clone(), Shape::Texture(shape));
         graph.passes.push(Pass {
@@ -497,7 +544,7 @@ impl AddDraw<'_> {
             },
             reads,
             writes: vec![made],
-            note: None,
+            note: (blend != Blend::Off).then(|| format!("{} blending", blend.name())),
         });
         Ok(made)
     }

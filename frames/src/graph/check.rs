@@ -6,10 +6,11 @@ use hankel_dsl::glam::{Vec3, Vec4};
 use hankel_dsl::native::describe::{Domain, Kernel, Layout, Output, Role, Scalar, Stage, Type};
 use hankel_dsl::native::layout::Element;
 use hankel_host::device::slots::{self, Given, Slot, Use};
-use hankel_host::device::{DeviceError, extent};
+use hankel_host::device::{Blend, DeviceError, TextureShape, extent};
 use hankel_shadows::depth::Transform;
 
 use super::{Argument, Call, Graph, Handle, Origin, Result, Shape, Surfaces};
+use crate::visibility::SAMPLES;
 
 /// Why a pass was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -336,6 +337,55 @@ impl Graph {
             }
         }
         Ok(())
+    }
+
+    /// Whether every device can blend into a target, and whether the depth before which that is done is one of
+    /// its own samples.
+    pub(super) fn check_blend(
+        &self,
+        pass: &str,
+        blend: Blend,
+        before: Option<Handle>,
+        target: TextureShape,
+    ) -> Result<()> {
+        let refuse = |problem: String| GraphError::Draw {
+            pass: pass.into(),
+            problem,
+        };
+        if blend != Blend::Off && !target.format.is_blendable() {
+            return Err(refuse(format!(
+                "its colour is {}, which not every device can blend: draw into floats or normalised integers \
+                 of at most 16 bits, or leave `blend` out",
+                target.format.name()
+            )));
+        }
+        let Some(before) = before else {
+            return Ok(());
+        };
+        if blend == Blend::Off {
+            return Err(refuse(
+                "`before` is for what is blended: name a mode with `blend`, or leave it out".into(),
+            ));
+        }
+        let value = self.current(before, |problem| refuse(format!("`before`: {problem}")))?;
+        let [width, height, _] = target.size;
+        let wanted = TextureShape::depth(width, height).multisampled(SAMPLES);
+        match &value.shape {
+            Shape::Texture(shape) if *shape == wanted => Ok(()),
+            Shape::Texture(shape) => Err(refuse(format!(
+                "`before`: `{}` is {}x{} texels of {} with {} samples, but depth of {width}x{height} with \
+                 {SAMPLES} is wanted",
+                value.label,
+                shape.size[0],
+                shape.size[1],
+                shape.format.name(),
+                shape.samples,
+            ))),
+            Shape::Buffer { .. } => Err(refuse(format!(
+                "`before`: `{}` is a buffer, but depth is wanted",
+                value.label
+            ))),
+        }
     }
 
     /// Each vertex has its attributes.

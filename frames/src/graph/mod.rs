@@ -41,7 +41,7 @@ use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::Layout;
 use hankel_dsl::native::layout::Element;
 use hankel_dsl::native::{Entry, Sampler};
-use hankel_host::device::TextureShape;
+use hankel_host::device::{Blend, TextureShape};
 
 pub use add::{AddCompute, AddDraw, Written};
 pub use check::GraphError;
@@ -190,8 +190,8 @@ pub enum Target {
         /// It.
         depth: Handle,
     },
-    /// One colour, the mean of each pixel's samples. What is nearest is seen; depth itself is
-    /// dropped.
+    /// One colour: all samples of it, or the mean of each pixel's, as its texture has one sample or several.
+    /// Without blending, what is nearest is seen, and depth itself is dropped.
     Colour {
         /// It.
         colour: Handle,
@@ -199,6 +199,10 @@ pub enum Target {
         samples: u32,
         /// The colour where nothing is.
         background: [f64; 4],
+        /// How fragments are put together with what is there. Those that blend do not hide each other.
+        blend: Blend,
+        /// Depth of what hides them, with as many samples; it stays as it is.
+        before: Option<Handle>,
     },
 }
 

@@ -12,6 +12,9 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Share of light that comes back, red, green and blue from 0 to 1, one for each vertex.
     pub colours: Vec<Vec3>,
+    /// Share of light that does not pass, from 0 to 1, one for each vertex; those beyond its end are opaque. A
+    /// triangle is translucent if one of its vertices is.
+    pub opacities: Vec<f32>,
     /// Three vertices each.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -69,12 +72,64 @@ impl Mesh {
         self.triangles.as_flattened()
     }
 
+    fn is_translucent(&self, triangle: &[u32; 3]) -> bool {
+        let opacity = |v: &u32| self.opacities.get(*v as usize);
+        triangle.iter().filter_map(opacity).any(|o| *o < 1.0)
+    }
+
+    /// The opaque triangles.
+    #[must_use]
+    pub fn opaque(&self) -> Vec<[u32; 3]> {
+        let all = self.triangles.iter();
+        all.filter(|t| !self.is_translucent(t)).copied().collect()
+    }
+
+    /// The translucent triangles.
+    #[must_use]
+    pub fn translucent(&self) -> Vec<[u32; 3]> {
+        let all = self.triangles.iter();
+        all.filter(|t| self.is_translucent(t)).copied().collect()
+    }
+
+    /// The translucent triangles from the farthest to the nearest as seen along a direction, by their middles.
+    #[must_use]
+    pub fn translucent_along(&self, direction: Vec3) -> Vec<[u32; 3]> {
+        let mut triangles = self.translucent();
+        let depth = |t: &[u32; 3]| -> f64 {
+            let along = |v: &u32| {
+                self.positions[*v as usize]
+                    .as_dvec3()
+                    .dot(direction.as_dvec3())
+            };
+            t.iter().map(along).sum()
+        };
+        triangles.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
+        triangles
+    }
+
+    /// The opacity of each vertex.
+    #[must_use]
+    pub fn all_opacities(&self) -> Vec<f32> {
+        let mut all = self.opacities.clone();
+        all.resize(self.positions.len(), 1.0);
+        all
+    }
+
+    /// Gives all vertices that have no opacity yet this one.
+    pub fn fade(&mut self, opacity: f32) {
+        self.opacities.resize(self.positions.len(), opacity);
+    }
+
     /// Adds another mesh's triangles.
     pub fn append(&mut self, other: &Self) {
         let base = self.positions.len() as u32;
         self.positions.extend_from_slice(&other.positions);
         self.normals.extend_from_slice(&other.normals);
         self.colours.extend_from_slice(&other.colours);
+        if !other.opacities.is_empty() {
+            self.opacities.resize(base as usize, 1.0);
+            self.opacities.extend_from_slice(&other.opacities);
+        }
         self.triangles
             .extend(other.triangles.iter().map(|t| t.map(|i| base + i)));
     }
@@ -293,6 +348,43 @@ mod tests {
         for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
             assert!(p.dot(*n) > 0.9);
         }
+    }
+
+    #[test]
+    fn translucent_triangles_come_from_the_farthest_to_the_nearest() {
+        let mut mesh = Mesh::default();
+        let pane = |y: f32| {
+            [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]].map(|[x, z]| Vec3::new(x, y, z))
+        };
+        mesh.quad(pane(0.0));
+        assert!(mesh.translucent().is_empty());
+        mesh.fade(1.0);
+        for y in [2.0, 1.0, 3.0] {
+            mesh.quad(pane(y));
+            mesh.fade(0.5);
+        }
+        mesh.quad(pane(4.0));
+        assert_eq!(
+            mesh.opaque(),
+            [[0, 1, 2], [0, 2, 3], [16, 17, 18], [16, 18, 19]]
+        );
+        let heights = |direction: Vec3| -> Vec<f32> {
+            let triangles = mesh.translucent_along(direction);
+            triangles
+                .iter()
+                .map(|t| mesh.positions[t[0] as usize].y)
+                .collect()
+        };
+        assert_eq!(heights(Vec3::NEG_Y), [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert_eq!(heights(Vec3::Y), [3.0, 3.0, 2.0, 2.0, 1.0, 1.0]);
+        assert_eq!(mesh.all_opacities()[..5], [1.0, 1.0, 1.0, 1.0, 0.5]);
+        assert_eq!(mesh.all_opacities()[16..], [1.0; 4]);
+        // What is added to an opaque mesh keeps its opacity.
+        let mut ground = Mesh::default();
+        ground.quad(pane(-1.0));
+        ground.append(&mesh);
+        assert_eq!(ground.opaque().len(), 6);
+        assert_eq!(ground.translucent().len(), 6);
     }
 
     #[test]

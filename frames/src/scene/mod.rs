@@ -6,6 +6,7 @@
 //! [geometry]
 //! model = "../models/brain.glb"   # beside the scene file; or: procedural = "yard"
 //! ground = 4.0                    # a square under the model, in model widths; 0: none
+//! opacity = 0.4                   # of the model, not of its ground: the share of light that does not pass
 //!
 //! [camera]
 //! eye = [0.2, 0.25, 0.3]
@@ -91,6 +92,8 @@ pub enum Geometry {
         /// Edge of a square of ground under the model, in units of the model's larger horizontal
         /// extent; 0 for none.
         ground: f32,
+        /// Share of light that the model does not let pass, 0 to 1; below 1 only with ground, which is opaque.
+        opacity: f32,
     },
     /// A built-in scene.
     Procedural(Procedural),
@@ -286,8 +289,13 @@ impl Scene {
     pub fn mesh(&self) -> Result<Mesh> {
         match &self.geometry {
             Geometry::Procedural(p) => Ok(p.mesh()),
-            Geometry::Model { file, ground } => {
+            Geometry::Model {
+                file,
+                ground,
+                opacity,
+            } => {
                 let mut mesh = model::load(file)?;
+                mesh.fade(*opacity);
                 if let Some(bounds) = mesh.bounds().filter(|_| *ground > 0.0) {
                     let size = bounds.size();
                     let half = size.x.max(size.z).max(size.y * 0.1) * ground * 0.5;

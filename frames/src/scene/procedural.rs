@@ -33,6 +33,8 @@ pub enum Procedural {
     Layers,
     /// A hall of columns on a long field, seen from one end: near and far shadows in one picture.
     Columns,
+    /// Panes of glass of several opacities one above the other, with opaque things between them, and a ball.
+    Glass,
     /// Open ground: nothing casts a shadow but on itself.
     Empty,
 }
@@ -66,6 +68,7 @@ impl Procedural {
             Self::Room => room(&mut mesh),
             Self::Layers => layers(&mut mesh),
             Self::Columns => columns(&mut mesh),
+            Self::Glass => glass(&mut mesh),
             Self::Empty => ground(&mut mesh, 5.0, 5.0, SOIL),
         }
         mesh.paint(PAINT);
@@ -440,11 +443,47 @@ fn columns(mesh: &mut Mesh) {
     }
 }
 
+/// Three panes on a frame of posts, one above the other and the topmost slanted; a block stands on the ground
+/// and a shelf lies between the panes. Beside them a ball of glass and an opaque one.
+fn glass(mesh: &mut Mesh) {
+    ground(mesh, 5.0, 5.0, SOIL);
+    for (x, z) in [(-1.5, -1.1), (-1.5, 1.1), (1.5, -1.1), (1.5, 1.1)] {
+        mesh.rod(Vec3::new(x, 0.0, z), Vec3::new(x, 2.3, z), 0.04, 10);
+    }
+    mesh.paint(METAL);
+    mesh.aligned_block(Vec3::new(-0.5, 0.0, -0.4), Vec3::new(0.1, 0.5, 0.2));
+    mesh.aligned_block(Vec3::new(-0.9, 1.18, -0.2), Vec3::new(0.9, 1.22, 0.5));
+    mesh.sphere(Vec3::new(2.7, 0.4, 1.0), 0.4, 20);
+    mesh.paint(WOOD);
+    mesh.fade(1.0);
+    let panes = [
+        (0.8, 0.0, 0.35, Vec3::new(0.2, 0.5, 0.8)),
+        (1.6, 0.0, 0.55, Vec3::new(0.8, 0.3, 0.2)),
+        (2.1, 0.25, 0.3, Vec3::new(0.3, 0.7, 0.3)),
+    ];
+    for (height, slope, opacity, colour) in panes {
+        let along = Vec3::new(1.3, slope, 0.0);
+        let across = Vec3::new(0.0, 0.0, 0.95);
+        let middle = Vec3::new(0.1 * height, height, 0.0);
+        mesh.quad([
+            middle - along + across,
+            middle + along + across,
+            middle + along - across,
+            middle - along - across,
+        ]);
+        mesh.paint(colour);
+        mesh.fade(opacity);
+    }
+    mesh.sphere(Vec3::new(-2.6, 0.7, 0.8), 0.7, 24);
+    mesh.paint(Vec3::new(0.5, 0.7, 0.8));
+    mesh.fade(0.4);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const ALL: [Procedural; 11] = [
+    const ALL: [Procedural; 12] = [
         Procedural::Yard,
         Procedural::Box,
         Procedural::Fence,
@@ -455,6 +494,7 @@ mod tests {
         Procedural::Room,
         Procedural::Layers,
         Procedural::Columns,
+        Procedural::Glass,
         Procedural::Empty,
     ];
 

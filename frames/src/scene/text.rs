@@ -32,6 +32,7 @@ struct GeometryText {
     model: Option<Spanned<PathBuf>>,
     procedural: Option<Procedural>,
     ground: Option<Spanned<f32>>,
+    opacity: Option<Spanned<f32>>,
 }
 
 #[derive(Deserialize)]
@@ -254,23 +255,37 @@ impl Reader<'_> {
                 if model.get_ref().as_os_str().is_empty() {
                     return self.refuse(model.span(), "geometry.model", "empty", "a glTF file");
                 }
+                let ground = self.number("geometry.ground", g.ground, 0.0, 0.0..=1000.0)?;
+                let place = g.opacity.as_ref().map_or(0..0, Spanned::span);
+                let opacity = self.number("geometry.opacity", g.opacity, 1.0, 0.0..=1.0)?;
+                if opacity < 1.0 && ground == 0.0 {
+                    let allowed = "1, or the model on a `ground`: without it nothing opaque would show a shadow";
+                    return self.refuse(place, "geometry.opacity", opacity, allowed);
+                }
                 Ok(Geometry::Model {
+                    ground,
+                    opacity,
                     file: self
                         .file
                         .parent()
                         .unwrap_or(Path::new(""))
                         .join(model.get_ref()),
-                    ground: self.number("geometry.ground", g.ground, 0.0, 0.0..=1000.0)?,
                 })
             }
-            (None, Some(procedural)) => match g.ground {
-                Some(ground) => self.refuse(
+            (None, Some(procedural)) => match (g.ground, g.opacity) {
+                (Some(ground), _) => self.refuse(
                     ground.span(),
                     "geometry.ground",
                     ground.get_ref(),
                     "left out: a procedural scene has its own ground",
                 ),
-                None => Ok(Geometry::Procedural(procedural)),
+                (None, Some(opacity)) => self.refuse(
+                    opacity.span(),
+                    "geometry.opacity",
+                    opacity.get_ref(),
+                    "left out: a procedural scene has its own opacities",
+                ),
+                (None, None) => Ok(Geometry::Procedural(procedural)),
             },
             (model, _) => self.refuse(
                 span,

@@ -3,7 +3,7 @@
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, Given, POWER_MOMENTS, blur, light_depth, moments, shade};
+use crate::passes::{BILINEAR, Given, POWER_MOMENTS, blur, moment_map, shade};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "hamburger",
@@ -17,8 +17,7 @@ pub const TECHNIQUE: Technique = Technique {
 };
 
 fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
-    let depth = light_depth(graph, given)?;
-    let map = moments(graph, given, depth)?;
+    let map = moment_map(graph, given)?;
     let map = blur(graph, given, map)?;
     shade(graph, given, "shade_hamburger", |pass| {
         pass.arg("map", map)

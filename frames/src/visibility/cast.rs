@@ -9,6 +9,7 @@
 //!
 //! The tree's crate has its own series of `glam`; points cross over as arrays.
 
+use std::cmp::Ordering;
 use std::collections::HashSet;
 
 use hankel_dsl::glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
@@ -28,6 +29,10 @@ pub const SAMPLES: [[f64; 2]; 4] = [
     [0.125, 0.625],
     [0.625, 0.875],
 ];
+
+/// Places along a segment that are no farther apart than this share of it are one, if the triangles there are
+/// neighbours.
+const SAME: f64 = 1e-9;
 
 /// Triangles that rays can be cast at.
 pub struct Caster {
@@ -89,6 +94,18 @@ impl Segment {
         weights.iter().all(|w| w.is_finite()).then_some(weights)
     }
 
+    /// The ray for the tree, as long as the segment and a little longer.
+    fn ray(&self) -> Ray {
+        let length = self.direction.length();
+        let direction = self.direction / length;
+        Ray::new(
+            self.origin.as_vec3().to_array().into(),
+            direction.as_vec3().to_array().into(),
+            0.0,
+            (length * 1.0001) as f32,
+        )
+    }
+
     /// Where the segment meets a triangle.
     #[must_use]
     pub fn meet(&self, corners: [Vec3; 3]) -> Option<f64> {
@@ -140,20 +157,31 @@ impl Lens {
 }
 
 impl Caster {
-    /// Builds the tree. Indices are in range: whoever fills a mesh sees to it.
+    /// Builds the tree for [`Caster::first`]. Indices are in range: whoever fills a mesh sees to it.
     #[must_use]
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let far = positions.iter().map(|p| p.abs().max_element());
-        let slack = 4e-6 * far.fold(0.0, f32::max);
-        let corners_of = |i: u32| triangles[i as usize].map(|v| positions[v as usize]);
         // Of triangles in the same place, a ray meets the first: the others only cost time, each
         // one in each ray.
         let mut places = HashSet::with_capacity(triangles.len());
         let is_new = |i: &u32| {
-            let corners = corners_of(*i);
+            let corners = triangles[*i as usize].map(|v| positions[v as usize]);
             places.insert(corners.map(|p| p.to_array().map(f32::to_bits)))
         };
-        let leaves: Vec<u32> = (0..triangles.len() as u32).filter(is_new).collect();
+        let leaves = (0..triangles.len() as u32).filter(is_new).collect();
+        Self::with_leaves(positions, triangles, leaves)
+    }
+
+    /// Builds the tree for [`Caster::all`]: of triangles in the same place, a ray meets each.
+    #[must_use]
+    pub fn of_layers(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let leaves = (0..triangles.len() as u32).collect();
+        Self::with_leaves(positions, triangles, leaves)
+    }
+
+    fn with_leaves(positions: &[Vec3], triangles: &[[u32; 3]], leaves: Vec<u32>) -> Self {
+        let far = positions.iter().map(|p| p.abs().max_element());
+        let slack = 4e-6 * far.fold(0.0, f32::max);
+        let corners_of = |i: u32| triangles[i as usize].map(|v| positions[v as usize]);
         let boxes: Vec<Aabb> = leaves
             .iter()
             .map(|&i| {
@@ -172,10 +200,17 @@ impl Caster {
         }
     }
 
-    /// A mesh's triangles.
+    /// A mesh's opaque triangles, for [`Caster::first`].
     #[must_use]
     pub fn of(mesh: &Mesh) -> Self {
-        Self::new(&mesh.positions, &mesh.triangles)
+        Self::new(&mesh.positions, &mesh.opaque())
+    }
+
+    /// A mesh's translucent triangles, for [`Caster::all`]; `None` if there are none.
+    #[must_use]
+    pub fn of_translucent(mesh: &Mesh) -> Option<Self> {
+        let triangles = mesh.translucent();
+        (!triangles.is_empty()).then(|| Self::of_layers(&mesh.positions, &triangles))
     }
 
     /// The vertices of a triangle.
@@ -200,13 +235,7 @@ impl Caster {
     #[must_use]
     pub fn first(&self, segment: &Segment) -> Option<Hit> {
         let length = segment.direction.length();
-        let direction = segment.direction / length;
-        let ray = Ray::new(
-            segment.origin.as_vec3().to_array().into(),
-            direction.as_vec3().to_array().into(),
-            0.0,
-            (length * 1.0001) as f32,
-        );
+        let ray = segment.ray();
         let mut best: Option<Hit> = None;
         let mut near = RayHit::none();
         near.t = ray.tmax;
@@ -223,6 +252,66 @@ impl Caster {
             ((t * length) as f32).next_up()
         });
         best
+    }
+
+    /// All triangles that a segment meets, from the nearest to the farthest. Where it passes through what
+    /// neighbours share, a corner or an edge, it meets one of them.
+    #[must_use]
+    pub fn all(&self, segment: &Segment) -> Vec<Hit> {
+        let ray = segment.ray();
+        let mut hits: Vec<Hit> = Vec::new();
+        let mut none = RayHit::none();
+        none.t = ray.tmax;
+        self.tree.ray_traverse(ray, &mut none, |_, slot| {
+            let triangle = self.leaves[self.tree.primitive_indices[slot] as usize];
+            hits.extend(
+                segment
+                    .meet(self.corners(triangle))
+                    .map(|t| Hit { t, triangle }),
+            );
+            // Nothing is hidden.
+            f32::INFINITY
+        });
+        hits.sort_by(|a, b| {
+            (a.t, a.triangle)
+                .partial_cmp(&(b.t, b.triangle))
+                .unwrap_or(Ordering::Equal)
+        });
+        let mut apart: Vec<Hit> = Vec::with_capacity(hits.len());
+        for hit in hits {
+            let own = self.corners(hit.triangle);
+            let is_met = |other: &Hit| {
+                let corners = self.corners(other.triangle);
+                let shared = own.iter().filter(|c| corners.contains(c)).count();
+                // Those that share all three are two surfaces in one place.
+                hit.t - other.t < SAME && (shared == 1 || shared == 2)
+            };
+            if !apart.iter().any(is_met) {
+                apart.push(hit);
+            }
+        }
+        apart
+    }
+
+    /// A value at the vertices, where a segment meets a triangle.
+    #[must_use]
+    pub fn at(&self, segment: &Segment, hit: Hit, values: &[f32]) -> f32 {
+        let [a, b, c] = self
+            .vertices(hit.triangle)
+            .map(|v| f64::from(values[v as usize]));
+        // Seen edge-on, any point of the triangle will do.
+        let weights = segment.weights(self.corners(hit.triangle));
+        let [wa, wb, wc] = weights.unwrap_or([1.0 / 3.0; 3]);
+        (wa * a + wb * b + wc * c) as f32
+    }
+
+    /// The share of light that passes all that a segment meets, of surfaces with these opacities at their
+    /// vertices: the product of 1 minus each.
+    #[must_use]
+    pub fn transmittance(&self, segment: &Segment, opacities: &[f32]) -> f32 {
+        let hits = self.all(segment).into_iter();
+        let passes = |hit| 1.0 - self.at(segment, hit, opacities).clamp(0.0, 1.0);
+        hits.map(passes).product()
     }
 
     /// The depth in every sample of a map: 1 where nothing is. `clip` is where the vertices go in
@@ -250,7 +339,8 @@ impl Caster {
         depths
     }
 
-    fn depth(&self, segment: &Segment, hit: Hit, clip: &[Vec4]) -> f32 {
+    /// The depth where a segment meets a triangle.
+    pub(crate) fn depth(&self, segment: &Segment, hit: Hit, clip: &[Vec4]) -> f32 {
         let vertices = self.vertices(hit.triangle).map(|v| clip[v as usize]);
         let Some(weights) = segment.weights(self.corners(hit.triangle)) else {
             return hit.t as f32;

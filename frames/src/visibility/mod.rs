@@ -7,7 +7,9 @@ mod raster;
 mod rays;
 
 use hankel_dsl::native::Entry;
-use hankel_host::device::{Backend, Bind, BufferId, Device, Program, TextureId, TextureShape};
+use hankel_host::device::{
+    Backend, Bind, Blend, BufferId, Device, Program, TextureId, TextureShape,
+};
 
 use crate::error::Result;
 use raster::Raster;
@@ -38,6 +40,8 @@ pub(crate) enum Onto {
     Colour {
         texture: TextureId,
         background: [f64; 4],
+        blend: Blend,
+        before: Option<TextureId>,
     },
 }
 

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use hankel_host::device::{
-    Colour, Cull, Depth, DepthTest, Device, Draw as DeviceDraw, Pass, TextureId, TextureShape,
-    Topology,
+    Blend, Colour, Cull, Depth, DepthTest, Device, Draw as DeviceDraw, Pass, TextureId,
+    TextureShape, Topology,
 };
 
 use super::{Draw, Onto, SAMPLES};
@@ -35,32 +35,51 @@ impl Raster {
 
     pub fn draw(&mut self, device: &mut dyn Device, draw: &Draw<'_>) -> Result<()> {
         let mut colours = Vec::new();
+        let cleared = |texture| Depth {
+            texture,
+            clear: Some(1.0),
+            test: DepthTest::Less,
+            write: true,
+        };
         let depth = match draw.onto {
-            Onto::Depth(texture) => texture,
+            Onto::Depth(texture) => Some(cleared(texture)),
             Onto::Colour {
                 texture,
                 background,
+                blend,
+                before,
             } => {
                 let shape = draw.shape.multisampled(SAMPLES);
+                let (texture, resolve) = if draw.shape.samples == 1 {
+                    (self.scratch(device, draw.label, shape)?, Some(texture))
+                } else {
+                    (texture, None)
+                };
                 colours.push(Colour {
-                    texture: self.scratch(device, draw.label, shape)?,
-                    resolve: Some(texture),
+                    texture,
+                    resolve,
                     clear: Some(background),
+                    blend,
                 });
                 let [width, height, _] = shape.size;
-                let depth = TextureShape::depth(width, height).multisampled(SAMPLES);
-                self.scratch(device, draw.label, depth)?
+                match before {
+                    Some(texture) => Some(Depth {
+                        clear: None,
+                        write: false,
+                        ..cleared(texture)
+                    }),
+                    None if blend == Blend::Off => {
+                        let depth = TextureShape::depth(width, height).multisampled(SAMPLES);
+                        Some(cleared(self.scratch(device, draw.label, depth)?))
+                    }
+                    None => None,
+                }
             }
         };
         let pass = Pass {
             label: draw.label,
             colours: &colours,
-            depth: Some(Depth {
-                texture: depth,
-                clear: Some(1.0),
-                test: DepthTest::Less,
-                write: true,
-            }),
+            depth,
             draws: &[DeviceDraw {
                 vertex: draw.vertex.program,
                 vertex_args: &draw.vertex.args,

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use hankel_dsl::glam::{Mat4, Vec3, Vec4};
 use hankel_dsl::native::describe::{Kernel, Output, Role, TexelFormat};
 use hankel_host::device::slots::{POSITION, type_bytes};
-use hankel_host::device::{Bind, BufferId, Device, Program};
+use hankel_host::device::{Bind, Blend, BufferId, Device, Program};
 
 use super::cast::{Caster, Lens, SAMPLES};
 use super::fragments::{Fragments, Varying};
@@ -29,8 +29,8 @@ struct Found {
 /// What is kept from run to run.
 #[derive(Default)]
 pub struct Rays {
-    /// By buffers of positions and indices; with their stamps.
-    casters: HashMap<[BufferId; 2], ([u64; 2], Caster)>,
+    /// By buffers of positions and indices, and whether nothing hides anything; with the buffers' stamps.
+    casters: HashMap<([BufferId; 2], bool), ([u64; 2], Caster)>,
     /// By pass: outputs of the vertex kernel.
     vertices: HashMap<usize, Vec<BufferId>>,
     /// By pass.
@@ -65,16 +65,34 @@ impl Rays {
                 Onto::Colour {
                     texture,
                     background,
+                    blend,
+                    before,
                 },
                 Some(stage),
             ) => {
-                self.find(draw, &lens, advance);
                 let vertices = self.run_vertices(device, draw)?;
-                let texels = self.shade(device, draw, stage, &lens, &vertices, background)?;
+                let depths = before.map(|depth| device.read_texture(depth)).transpose();
+                let depths = depths.map_err(during(draw.label))?;
+                let hidden = Hidden {
+                    blend,
+                    position: vertices.first().map_or(&[][..], Vec::as_slice),
+                    depths: depths.as_deref(),
+                };
+                self.find(draw, &lens, &hidden, advance);
+                let colour = |b: f64| b as f32;
+                let target = Samples {
+                    blend,
+                    background: Vec4::from(background.map(colour)),
+                    format: draw.shape.format.texel(),
+                    are_kept: draw.shape.samples > 1,
+                };
+                let texels = self.shade(device, draw, stage, &lens, &vertices, &target)?;
                 device
                     .write_texture(texture, &texels)
                     .map_err(during(draw.label))?;
-                Ok(self.found.get(&draw.pass).map(|f| f.fragments.edges()))
+                // A map's samples are no picture's.
+                let found = self.found.get(&draw.pass).filter(|_| !target.are_kept);
+                Ok(found.map(|f| f.fragments.edges()))
             }
             (Onto::Colour { texture, .. } | Onto::Depth(texture), _) => {
                 let vertices = self.run_vertices(device, draw)?;
@@ -92,13 +110,10 @@ impl Rays {
 
     /// Builds the tree if triangles have changed.
     fn build(&mut self, device: &mut dyn Device, draw: &Draw<'_>) -> Result<()> {
-        let buffers = [draw.positions.buffer, draw.indices.buffer];
+        let key = caster_of(draw);
+        let (buffers, is_blended) = key;
         let stamps = [draw.positions.stamp, draw.indices.stamp];
-        if self
-            .casters
-            .get(&buffers)
-            .is_some_and(|(s, _)| *s == stamps)
-        {
+        if self.casters.get(&key).is_some_and(|(s, _)| *s == stamps) {
             return Ok(());
         }
         let mut read = |id| device.read_buffer(id).map_err(during(draw.label));
@@ -114,34 +129,48 @@ impl Rays {
                 ),
             });
         }
-        let caster = Caster::new(&positions, &triangles);
-        self.casters.insert(buffers, (stamps, caster));
+        let caster = if is_blended {
+            Caster::of_layers(&positions, &triangles)
+        } else {
+            Caster::new(&positions, &triangles)
+        };
+        self.casters.insert(key, (stamps, caster));
         Ok(())
     }
 
     fn caster(&self, draw: &Draw<'_>) -> Result<&Caster> {
-        let buffers = [draw.positions.buffer, draw.indices.buffer];
-        let built = self.casters.get(&buffers).map(|(_, caster)| caster);
+        let built = self.casters.get(&caster_of(draw)).map(|(_, caster)| caster);
         built.ok_or_else(|| FrameError::Value {
             value: draw.label.into(),
             problem: "its triangles are not there".into(),
         })
     }
 
-    /// Casts rays through the pixels if triangles or view have changed.
-    fn find(&mut self, draw: &Draw<'_>, lens: &Lens, advance: &mut dyn FnMut(f32)) {
+    /// Casts rays through the pixels if triangles or view have changed, or what hides them may have.
+    fn find(
+        &mut self,
+        draw: &Draw<'_>,
+        lens: &Lens,
+        hidden: &Hidden<'_>,
+        advance: &mut dyn FnMut(f32),
+    ) {
         let stamps = [draw.positions, draw.indices, draw.clip_from_world].map(|s| s.stamp);
         let [width, height, _] = draw.shape.size;
         let size = [width, height];
         let same = |f: &Found| f.stamps == stamps && f.size == size;
-        if self.found.get(&draw.pass).is_some_and(same) {
+        if hidden.depths.is_none() && self.found.get(&draw.pass).is_some_and(same) {
             return;
         }
-        let buffers = [draw.positions.buffer, draw.indices.buffer];
-        if let Some((_, caster)) = self.casters.get(&buffers) {
+        if let Some((_, caster)) = self.casters.get(&caster_of(draw)) {
             // Shading is the rest.
             let mut cast = |share: f32| advance(share * 0.7);
-            let fragments = Fragments::find(caster, lens, size, &mut cast);
+            let fragments = if hidden.blend == Blend::Off {
+                Fragments::find(caster, lens, size, &mut cast)
+            } else {
+                let clip: Vec<Vec4> = bytemuck::pod_collect_to_vec(hidden.position);
+                let depths: Option<Vec<f32>> = hidden.depths.map(bytemuck::pod_collect_to_vec);
+                Fragments::layers(caster, lens, size, &clip, depths.as_deref(), &mut cast)
+            };
             let found = Found {
                 stamps,
                 size,
@@ -188,7 +217,7 @@ impl Rays {
         stage: &Stage<'_>,
         lens: &Lens,
         vertices: &[Vec<u8>],
-        background: [f64; 4],
+        target: &Samples,
     ) -> Result<Vec<u8>> {
         let batch = match self.batch {
             Some(batch) => batch,
@@ -231,13 +260,7 @@ impl Rays {
             let shaded: Vec<Vec4> = bytemuck::pod_collect_to_vec(&bytes);
             colours.extend_from_slice(&shaded[..count]);
         }
-        let background = Vec4::from(background.map(|c| c as f32));
-        Ok(resolve(
-            fragments,
-            &colours,
-            background,
-            draw.shape.format.texel(),
-        ))
+        Ok(target.drawn(fragments, &colours))
     }
 
     pub fn free(&mut self, device: &mut dyn Device) {
@@ -248,6 +271,13 @@ impl Rays {
         }
         self.bytes = 0;
     }
+}
+
+/// By what a draw's triangles are kept.
+fn caster_of(draw: &Draw<'_>) -> ([BufferId; 2], bool) {
+    let is_blended = matches!(draw.onto, Onto::Colour { blend, .. } if blend != Blend::Off);
+    let buffers = [draw.positions.buffer, draw.indices.buffer];
+    (buffers, is_blended)
 }
 
 /// The stage's kernel as the native device runs it.
@@ -311,28 +341,53 @@ fn arguments<'a>(
     })
 }
 
-/// The mean of each pixel's samples, stored as the colour targets store them.
-fn resolve(
-    fragments: &Fragments,
-    colours: &[Vec4],
+/// What hides fragments from each other.
+struct Hidden<'a> {
+    /// Without blending the nearest hides the others.
+    blend: Blend,
+    /// Where the vertices go in clip space.
+    position: &'a [u8],
+    /// What hides all of them, one depth for each sample.
+    depths: Option<&'a [u8]>,
+}
+
+/// How a colour target takes up fragments.
+struct Samples {
+    blend: Blend,
     background: Vec4,
     format: TexelFormat,
-) -> Vec<u8> {
-    let mut texel = vec![0; format.bytes()];
-    let mut through = |c: Vec4| {
-        format.store(&mut texel, c);
-        format.load(&texel)
-    };
-    let background = through(background);
-    let colours: Vec<Vec4> = colours.iter().map(|&c| through(c)).collect();
-    let mut picture = Vec::new();
-    for samples in fragments.samples() {
-        let sum: Vec4 = samples
-            .iter()
-            .map(|s| s.map_or(background, |i| colours[i]))
-            .sum();
-        format.store(&mut texel, sum / SAMPLES.len() as f32);
-        picture.extend_from_slice(&texel);
+    /// Whether all samples are kept, not their mean.
+    are_kept: bool,
+}
+
+impl Samples {
+    /// The texels after all fragments are drawn, stored as colour targets store them: each sample after each
+    /// fragment, and then their mean.
+    fn drawn(&self, fragments: &Fragments, colours: &[Vec4]) -> Vec<u8> {
+        let mut texel = vec![0; self.format.bytes()];
+        let mut through = |c: Vec4| {
+            self.format.store(&mut texel, c);
+            self.format.load(&texel)
+        };
+        let background = through(self.background);
+        let mut picture = Vec::new();
+        let mut stored = vec![0; self.format.bytes()];
+        for pixel in fragments.drawn() {
+            let mut samples = [background; SAMPLES.len()];
+            for (i, sees) in pixel {
+                for (sample, sees) in samples.iter_mut().zip(sees) {
+                    if sees {
+                        *sample = through(self.blend.apply(colours[i], *sample));
+                    }
+                }
+            }
+            let mean = [samples.iter().sum::<Vec4>() / SAMPLES.len() as f32];
+            let all: &[Vec4] = if self.are_kept { &samples } else { &mean };
+            for colour in all {
+                self.format.store(&mut stored, *colour);
+                picture.extend_from_slice(&stored);
+            }
+        }
+        picture
     }
-    picture
 }

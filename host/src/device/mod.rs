@@ -108,6 +108,16 @@ impl Format {
             Self::Depth32 => "depth32float",
         }
     }
+
+    /// Whether every device can blend what is drawn into it: colours of up to 16 bits in each channel. Blending
+    /// of 32-bit floats is optional in WebGPU, and integers have none.
+    #[must_use]
+    pub const fn is_blendable(self) -> bool {
+        match self {
+            Self::Texel(t) => !t.is_integer() && t.bytes() < 4 * t.channels(),
+            Self::Depth32 => false,
+        }
+    }
 }
 
 /// What a texture is to be.
@@ -380,6 +390,56 @@ pub enum Cull {
     Front,
 }
 
+/// How what is drawn is put together with what is there, fragment by fragment in the order of the triangles.
+/// `source` is the fragment's colour, `destination` what is there, `alpha` the fourth channel of `source`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Blend {
+    /// `source`.
+    #[default]
+    Off,
+    /// `alpha source + (1 - alpha) destination`; of the fourth channel itself
+    /// `alpha + (1 - alpha) destination`.
+    Alpha,
+    /// `source + destination`.
+    Additive,
+    /// `source destination`.
+    Multiplicative,
+    /// The smaller one of `source` and `destination`, channel by channel.
+    Least,
+}
+
+impl Blend {
+    /// Its name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Alpha => "alpha",
+            Self::Additive => "additive",
+            Self::Multiplicative => "multiplicative",
+            Self::Least => "least",
+        }
+    }
+
+    /// What is there afterwards, before it is stored.
+    #[must_use]
+    pub fn apply(self, source: Vec4, destination: Vec4) -> Vec4 {
+        match self {
+            Self::Off => source,
+            Self::Alpha => {
+                let alpha = source.w;
+                let mixed = source * alpha + destination * (1.0 - alpha);
+                mixed
+                    .truncate()
+                    .extend(alpha + destination.w * (1.0 - alpha))
+            }
+            Self::Additive => source + destination,
+            Self::Multiplicative => source * destination,
+            Self::Least => source.min(destination),
+        }
+    }
+}
+
 /// A colour target of a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Colour {
@@ -389,6 +449,9 @@ pub struct Colour {
     pub resolve: Option<TextureId>,
     /// What it is filled with first; `None` keeps what is there.
     pub clear: Option<[f64; 4]>,
+    /// How what is drawn is put together with what is there; other than [`Blend::Off`] for formats that are
+    /// [`Format::is_blendable`].
+    pub blend: Blend,
 }
 
 /// Which depths pass.

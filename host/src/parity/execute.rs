@@ -7,8 +7,8 @@ use hankel_dsl::native::describe::{
 use super::capture;
 use crate::device::slots::{self, Slot, Use};
 use crate::device::{
-    Arithmetic, Bind, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw, Pass,
-    Program, Shader, TextureId, TextureShape, Topology,
+    Arithmetic, Bind, Blend, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw,
+    Pass, Program, Shader, TextureId, TextureShape, Topology,
 };
 use crate::inputs::{Case, Input};
 
@@ -366,6 +366,7 @@ fn fragment(
             texture: id,
             resolve: None,
             clear: Some([0.0; 4]),
+            blend: Blend::Off,
         });
     }
     let draw = Draw {
@@ -523,6 +524,7 @@ fn vertex(
             texture,
             resolve: None,
             clear: Some([0.0; 4]),
+            blend: Blend::Off,
         }];
         device.draw(&pass(&colours, None, &[draw]))?;
         written.push(narrowed(

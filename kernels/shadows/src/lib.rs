@@ -8,12 +8,15 @@
 //! | to six | [`resolve_symmetric_6`](six::resolve_symmetric_6), [`resolve_plain_6`](six::resolve_plain_6) |
 //! | to trigonometric ones | [`resolve_trigonometric_unorm`](trigonometric::resolve_trigonometric_unorm), [`resolve_trigonometric_plain`](trigonometric::resolve_trigonometric_plain) |
 //! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm) |
+//! | translucent casters, blended | [`translucent`](translucent::translucent), [`translucent_moments`](translucent::translucent_moments) twice, [`resolve_translucent`](translucent::resolve_translucent) |
+//! | or hashed | [`stochastic_depths`](translucent::stochastic_depths) |
+//! | and what is seen through them | [`tint`](translucent::tint), [`tinted`](translucent::tinted) |
 //! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float) |
 //! | summed-area table of moments | [`resolve_summed`](soft::resolve_summed), [`prefix_sums`](soft::prefix_sums) twice |
 //! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) twice |
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -35,6 +38,7 @@ pub mod shade;
 pub mod six;
 pub mod soft;
 pub mod tiles;
+pub mod translucent;
 pub mod trigonometric;
 
 hankel_dsl::kernels![
@@ -75,6 +79,13 @@ hankel_dsl::kernels![
     tiles::blur_tiles,
     tiles::shade_hamburger_tiles,
     tiles::shade_pcf_gaussian_tiles,
+    translucent::translucent,
+    translucent::translucent_moments,
+    translucent::resolve_translucent,
+    translucent::stochastic_depths,
+    translucent::shade_stochastic,
+    translucent::tint,
+    translucent::tinted,
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,

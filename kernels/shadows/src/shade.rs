@@ -299,10 +299,15 @@ pub fn shade_variance(
     })
 }
 
-/// The share of a square of depths that is nearer than `z`, the first sample of each texel.
+/// The mean of what `compare` gives for the texels of a square around a place in a map.
 #[inline(always)]
-fn nearer(depth: Texture2dMultisampled<'_>, radius: i32, uv: Vec2, z: f32) -> f32 {
-    let size = depth.size();
+pub(crate) fn percentage(
+    size: UVec2,
+    radius: u32,
+    uv: Vec2,
+    compare: impl Fn(UVec2) -> f32,
+) -> f32 {
+    let radius = radius as i32;
     let nearest = |t: f32, size: u32| {
         let last = (size - 1) as f32;
         // Not negative, so that cutting the fraction off is rounding down.
@@ -315,7 +320,7 @@ fn nearer(depth: Texture2dMultisampled<'_>, radius: i32, uv: Vec2, z: f32) -> f3
         let mut dx = -radius;
         while dx <= radius {
             let at = UVec2::new(within(x + dx, size.x), within(y + dy, size.y));
-            shadowed += if depth.load(at, 0).x < z { 1.0 } else { 0.0 };
+            shadowed += compare(at);
             dx += 1;
         }
         dy += 1;
@@ -386,7 +391,9 @@ pub fn shade_pcf(
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
-        nearer(depth, light.filter_radius as i32, uv, z)
+        percentage(depth.size(), light.filter_radius, uv, |at| {
+            if depth.load(at, 0).x < z { 1.0 } else { 0.0 }
+        })
     })
 }
 

@@ -88,6 +88,7 @@ fn models() {
         let geometry = Geometry::Model {
             file: file.clone(),
             ground: 1.0,
+            opacity: 1.0,
         };
         Scene {
             geometry,
@@ -106,6 +107,7 @@ fn models() {
             let geometry = Geometry::Model {
                 file: file.clone(),
                 ground: 1.0,
+                opacity: 1.0,
             };
             let began = Instant::now();
             if let Err(error) = (Scene {

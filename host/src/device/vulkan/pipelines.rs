@@ -11,7 +11,7 @@ use hankel_dsl::native::describe::{
 use super::super::error::{DeviceError, Result};
 use super::super::slots::{self, Given, Slot, Use};
 use super::super::{
-    Bind, BufferId, Colour, Cull, Depth, DepthTest, Draw, Format, Pass, Program, Shader,
+    Bind, Blend, BufferId, Colour, Cull, Depth, DepthTest, Draw, Format, Pass, Program, Shader,
     TextureShape, Topology,
 };
 use super::{VulkanDevice, resources, words};
@@ -44,7 +44,7 @@ struct RenderKey {
     vertex: (wgpu::ShaderModule, String, wgpu::BindGroupLayout),
     fragment: Option<(wgpu::ShaderModule, String, wgpu::BindGroupLayout)>,
     attributes: Vec<(u32, wgpu::VertexFormat)>,
-    targets: Vec<wgpu::TextureFormat>,
+    targets: Vec<(wgpu::TextureFormat, Blend)>,
     depth: Option<(DepthTest, bool)>,
     samples: u32,
     topology: Topology,
@@ -707,7 +707,10 @@ impl VulkanDevice {
         for (
             i,
             Colour {
-                texture, resolve, ..
+                texture,
+                resolve,
+                blend,
+                ..
             },
         ) in pass.colours.iter().enumerate()
         {
@@ -715,6 +718,13 @@ impl VulkanDevice {
             let shape = target.shape;
             if shape.format == Format::Depth32 {
                 return Err(bad(format!("colour target {i} is a depth buffer")));
+            }
+            if *blend != Blend::Off && !shape.format.is_blendable() {
+                return Err(bad(format!(
+                    "colour target {i} is {}, which not every device can blend: use floats or normalised \
+                     integers of at most 16 bits",
+                    shape.format.name()
+                )));
             }
             if let Some(id) = resolve {
                 let to = self.image(*id)?.shape;
@@ -834,7 +844,10 @@ impl VulkanDevice {
         let targets = pass
             .colours
             .iter()
-            .map(|c| Ok(resources::format(self.image(c.texture)?.shape.format)))
+            .map(|c| {
+                let format = self.image(c.texture)?.shape.format;
+                Ok((resources::format(format), c.blend))
+            })
             .collect::<Result<Vec<_>>>()?;
         let key = RenderKey {
             vertex: vertex_stage,
@@ -1002,10 +1015,10 @@ impl VulkanDevice {
         let targets: Vec<Option<wgpu::ColorTargetState>> = key
             .targets
             .iter()
-            .map(|&format| {
+            .map(|&(format, blend)| {
                 Some(wgpu::ColorTargetState {
                     format,
-                    blend: None,
+                    blend: blend_state(blend),
                     write_mask: wgpu::ColorWrites::ALL,
                 })
             })
@@ -1082,6 +1095,29 @@ fn wrong_stage(kernel: &Kernel, wanted: &str) -> DeviceError {
         kernel: kernel.name.clone(),
         stage: model(&kernel.stage).1,
         problem: format!("it was given as the {wanted} stage of a draw call"),
+    }
+}
+
+/// [`Blend`] as wgpu has it.
+fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
+    use wgpu::{BlendFactor, BlendOperation};
+    let alike = |src_factor, dst_factor, operation| {
+        let component = wgpu::BlendComponent {
+            src_factor,
+            dst_factor,
+            operation,
+        };
+        Some(wgpu::BlendState {
+            color: component,
+            alpha: component,
+        })
+    };
+    match blend {
+        Blend::Off => None,
+        Blend::Alpha => Some(wgpu::BlendState::ALPHA_BLENDING),
+        Blend::Additive => alike(BlendFactor::One, BlendFactor::One, BlendOperation::Add),
+        Blend::Multiplicative => alike(BlendFactor::Dst, BlendFactor::Zero, BlendOperation::Add),
+        Blend::Least => alike(BlendFactor::One, BlendFactor::One, BlendOperation::Min),
     }
 }
 

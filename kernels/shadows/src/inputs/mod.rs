@@ -5,6 +5,7 @@
 pub mod maps;
 pub mod soft;
 pub mod tiles;
+pub mod translucent;
 
 use std::vec::Vec;
 

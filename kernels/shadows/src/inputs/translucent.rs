@@ -1,0 +1,104 @@
+//! What translucent casters give: two panes in the small scene of [`maps`], blended or hashed before its depths.
+
+use std::vec::Vec;
+
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_dsl::native::inputs::{Given, Request, Source};
+use hankel_moments::{Moments4, quantize_symmetric_4, quantize_unit_4};
+
+use super::maps::{self, SAMPLES, SIZE};
+use crate::shade::encoding;
+
+/// The panes from the farthest to the nearest: depth, opacity, and the share of the map's rows that they cover.
+const PANES: [[f64; 3]; 2] = [[0.7, 0.6, 0.8], [0.42, 0.25, 0.5]];
+
+/// Which panes are before the opaque surface, in each sample of each texel.
+fn panes() -> impl Iterator<Item = impl Iterator<Item = [f64; 3]>> {
+    let row = SIZE[0] as usize * SAMPLES;
+    let last = SIZE[1] as usize - 1;
+    maps::samples().into_iter().enumerate().map(move |(i, z)| {
+        let down = (i / row) as f64 / last as f64;
+        let is_there = move |&[depth, _, share]: &[f64; 3]| depth < z && down < share;
+        PANES.into_iter().filter(is_there)
+    })
+}
+
+fn texture(given: Given, name: &str, texels: impl IntoIterator<Item = Vec4>) -> Given {
+    given.texture(name, SIZE, SAMPLES as u32, TexelFormat::Rgba16Float, texels)
+}
+
+/// Depths of opaque surfaces, and what is blended before them, for the kernel's `encoding`.
+#[must_use]
+pub fn blended(request: &Request) -> Vec<Given> {
+    let is_unit = request.constant("encoding") == Some(encoding::UNIT);
+    let of = |z: f64| {
+        if is_unit {
+            quantize_unit_4(Moments4::of_depth(z))
+        } else {
+            quantize_symmetric_4(Moments4::of_depth(2.0 * z - 1.0))
+        }
+    };
+    let half = |second: bool| {
+        panes().map(move |panes| {
+            let sum = panes.fold([0.0; 3], |sum: [f64; 3], [depth, opacity, _]| {
+                let q = of(depth);
+                let pair = if second { [q.b, q.a] } else { [q.r, q.g] };
+                let source = [pair[0], pair[1], 1.0];
+                std::array::from_fn(|i| opacity * source[i] + (1.0 - opacity) * sum[i])
+            });
+            Vec4::new(sum[0] as f32, sum[1] as f32, 0.0, sum[2] as f32)
+        })
+    };
+    maps::depths(request)
+        .into_iter()
+        .map(|given| texture(given, "first", half(false)))
+        .map(|given| texture(given, "second", half(true)))
+        .collect()
+}
+
+/// Fragments in the middle of a map's texels, as a rasteriser has them.
+#[must_use]
+pub fn fragments(request: &Request) -> Vec<Given> {
+    let mut s = Source::new(request.seed);
+    let (mut surfaces, mut places) = (Vec::new(), Vec::new());
+    for _ in 0..1009 {
+        let opacity = match s.count(0, 4) {
+            0 => 0.0,
+            1 => 1.0,
+            _ => s.between(0.0, 1.0),
+        };
+        let mut middle = |size: u32| {
+            let texel = f64::from(s.count(0, size - 1));
+            (2.0 * (texel + 0.5) / f64::from(size) - 1.0) as f32
+        };
+        let (x, y) = (middle(SIZE[0]), middle(SIZE[1]));
+        places.push(Vec3::new(x, y, s.between(0.0, 1.0) as f32));
+        surfaces.push(Vec4::new(0.2, 0.4, 0.6, opacity as f32));
+    }
+    [Given::new("fragments of translucent surfaces")
+        .buffer("surface", &surfaces)
+        .buffer("place", &places)
+        .uniform("size", &UVec2::from_array(SIZE))]
+    .into()
+}
+
+/// What shading with hashed depths reads.
+#[must_use]
+pub fn shaded(request: &Request) -> Vec<Given> {
+    let mut s = Source::new(request.seed);
+    let kept = panes().map(|panes| {
+        panes.fold(Vec4::ONE, |kept, [depth, opacity, _]| {
+            let mut channel = |x: f32| {
+                let is_kept = s.between(0.0, 1.0) < opacity;
+                if is_kept { x.min(depth as f32) } else { x }
+            };
+            Vec4::from_array(kept.to_array().map(&mut channel))
+        })
+    });
+    let kept: Vec<Vec4> = kept.collect();
+    maps::shaded_depths(request)
+        .into_iter()
+        .map(|given| texture(given, "kept", kept.iter().copied()))
+        .collect()
+}
