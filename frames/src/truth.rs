@@ -5,8 +5,11 @@
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
+//! - [`scattering`] has the light that a medium scatters, by rays from along each pixel's rays.
 //!
 //! All of it runs on this machine's processor.
+
+pub mod scattering;
 
 use hankel_dsl::glam::{DVec3, Vec3, Vec4};
 use hankel_host::device::{Device, NativeDevice};
@@ -23,7 +26,8 @@ use crate::visibility::SAMPLES;
 use crate::visibility::cast::{Caster, Lens, Segment, in_bands};
 use crate::visibility::fragments::{Fragments, Varying};
 
-/// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is.
+/// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is. Or the share of light
+/// that a medium scatters there, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arriving {
     /// Pixels in a row.
@@ -154,7 +158,38 @@ pub fn by_technique_on(
     scene: &Scene,
     mesh: &Mesh,
 ) -> Result<Arriving> {
-    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Light)?;
+    shown(device, shaders, scene, mesh, Show::Light)
+}
+
+/// What the scene's medium scatters towards the camera, by the scene's technique: see [`Show::Scattered`].
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn scattered_by_technique(scene: &Scene, mesh: &Mesh) -> Result<Arriving> {
+    scattered_by_technique_on(&mut NativeDevice::new(), &NoShaders, scene, mesh)
+}
+
+/// The same on a device.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn scattered_by_technique_on(
+    device: &mut dyn Device,
+    shaders: &dyn Shaders,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Result<Arriving> {
+    shown(device, shaders, scene, mesh, Show::Scattered)
+}
+
+fn shown(
+    device: &mut dyn Device,
+    shaders: &dyn Shaders,
+    scene: &Scene,
+    mesh: &Mesh,
+    show: Show,
+) -> Result<Arriving> {
+    let mut frame = Frame::new(device, shaders, scene, mesh, show)?;
     frame.run(Clock::Frame, &mut Quiet)?;
     Ok(Arriving {
         width: scene.width,
@@ -164,12 +199,14 @@ pub fn by_technique_on(
 }
 
 /// A technique's errors on a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// Against [`by_rays`]: what an observer would say.
     pub rays: Errors,
     /// Against [`filtered`]: what the reconstruction adds. Only for a light that is a point.
     pub filtered: Option<Errors>,
+    /// Of what the medium scatters, against rays. Only of a scene with a medium.
+    pub scattered: Option<scattering::Compared>,
 }
 
 /// Measures the scene's technique.
@@ -177,14 +214,24 @@ pub struct Measured {
 /// # Errors
 /// See [`FrameError`].
 pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Result<Measured> {
-    progress.begin("light by the technique", 1, 3);
+    let steps = if scene.medium.is_some() { 5 } else { 3 };
+    progress.begin("light by the technique", 1, steps);
     let picture = by_technique(scene, mesh)?;
     let is_point = scene.area.radius == 0.0;
-    progress.begin("light by all samples", 2, 3);
+    progress.begin("light by all samples", 2, steps);
     let soft = is_point.then(|| filtered(scene, mesh, &mut |share| progress.advance(share)));
-    progress.begin("light by rays", 3, 3);
+    progress.begin("light by rays", 3, steps);
     let sharp = by_rays(scene, mesh, &mut |share| progress.advance(share));
+    let mut scattered = None;
+    if scene.medium.is_some() {
+        progress.begin("scattered light by the technique", 4, steps);
+        let picture = scattered_by_technique(scene, mesh)?;
+        progress.begin("scattered light by rays", 5, steps);
+        let mut advance = |share| progress.advance(share);
+        scattered = scattering::compare(scene, mesh, &[&picture], &mut advance)?;
+    }
     Ok(Measured {
+        scattered: scattered.map(|(compared, _)| compared),
         rays: picture.errors(&sharp)?,
         filtered: soft.map(|soft| picture.errors(&soft)).transpose()?,
     })
@@ -236,15 +283,18 @@ impl Pixels {
         let is_lit = |i: u32| {
             let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
             let segment = self.lens.segment(pixel, at);
-            self.caster.first(&segment).is_none_or(|hit| {
-                let toward = self.toward(pixel, i);
-                let from = segment.at(hit.t) + toward * (AWAY * self.diagonal);
-                let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
-                self.caster.first(&to_light).is_none()
-            })
+            let hit = self.caster.first(&segment);
+            hit.is_none_or(|hit| self.reaches_light(&segment, hit.t, self.toward(pixel, i)))
         };
         let lit = (0..GRID * GRID).filter(|i| is_lit(*i)).count();
         lit as f32 / (GRID * GRID) as f32
+    }
+
+    /// Whether a ray from a place of a segment on reaches the light.
+    fn reaches_light(&self, segment: &Segment, t: f64, toward: DVec3) -> bool {
+        let from = segment.at(t) + toward * (AWAY * self.diagonal);
+        let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
+        self.caster.first(&to_light).is_none()
     }
 
     /// Where ray `i` of a pixel goes on.
