@@ -18,13 +18,14 @@ use crate::graph::{self, Graph, Handle, Summary};
 use crate::passes::{Given, Translucent};
 use crate::picture::{Difference, Picture};
 use crate::scene::{Camera, CameraView, Fit, LightView, Mesh, Scene};
+use crate::volume::Space;
 
 /// What is seen where nothing is: a pale sky, in linear light.
 const BACKGROUND: [f32; 3] = [0.5, 0.6, 0.72];
 /// Light from the sky.
 const AMBIENT: Vec4 = Vec4::new(0.24, 0.28, 0.33, 0.0);
 /// What the light adds on a surface that faces it.
-const IRRADIANCE: f32 = 1.15;
+pub(crate) const IRRADIANCE: f32 = 1.15;
 /// What pictures are kept in until they are encoded: linear light.
 const PICTURE: TexelFormat = TexelFormat::Rgba16Float;
 
@@ -49,7 +50,11 @@ pub(crate) fn light_view(scene: &Scene, direction: Vec3, mesh: &Mesh) -> LightVi
         Fit::Scene => LightView::new(direction, mesh, shadow.size, margin),
         Fit::Camera => {
             let camera = camera_view(scene, &scene.camera, mesh);
-            LightView::fitted(direction, mesh, shadow.size, margin, &camera)
+            let fitted = match scene.medium {
+                Some(_) => LightView::fitted_to_space,
+                None => LightView::fitted,
+            };
+            fitted(direction, mesh, shadow.size, margin, &camera)
         }
     }
 }
@@ -62,6 +67,9 @@ pub enum Show {
     /// The share of light that arrives, 1 minus the shadow, in 32-bit floats: white surfaces that
     /// face the light everywhere, seen through translucent ones. The same passes by the same kernels make it.
     Light,
+    /// The share of light that the medium scatters towards the camera, but for its phase function and what it
+    /// absorbs, in 32-bit floats: black surfaces. The same passes by the same kernels make it.
+    Scattered,
 }
 
 /// The light as the shading kernels take it.
@@ -70,7 +78,7 @@ pub(crate) fn light(scene: &Scene, view: &LightView, show: Show) -> Light {
     let clip = view.clip_from_world;
     let (irradiance, ambient) = match show {
         Show::Picture => (IRRADIANCE, AMBIENT),
-        Show::Light => (1.0, Vec4::ZERO),
+        Show::Light | Show::Scattered => (1.0, Vec4::ZERO),
     };
     Light {
         row_u: clip.row(0) * 0.5 + Vec4::W * 0.5,
@@ -135,7 +143,14 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
             TexelFormat::Rgba32Float,
             [1.0; 3],
         ),
+        Show::Scattered => (
+            Cow::Borrowed(&mesh.normals),
+            Cow::Owned(vec![Vec3::ZERO; vertices]),
+            TexelFormat::Rgba32Float,
+            [0.0; 3],
+        ),
     };
+    let space = Space::of(scene, mesh, show);
     let given = Given {
         positions: graph.buffer("positions", &mesh.positions),
         normals: graph.buffer("normals", &normals),
@@ -147,13 +162,21 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         light: graph.parameter("light", &light(scene, &view, show)),
         area: graph.parameter("light's area", &area(scene, &view)),
         source: scene.area,
+        volume: space.map(|space| space.add_to(&mut graph)),
         shadow: scene.shadow,
         size: [scene.width, scene.height],
         format,
         background: [r, g, b, 1.0],
         is_tinted: show == Show::Picture,
     };
-    let picture = (scene.shadow.technique.add)(&mut graph, &given)?;
+    let mut picture = (scene.shadow.technique.add)(&mut graph, &given)?;
+    match (&scene.medium, given.volume) {
+        (Some(medium), Some(volume)) => {
+            picture = (medium.technique.add)(&mut graph, &given, &volume, picture)?;
+        }
+        (Some(_), None) => (),
+        (None, _) => graph.omit("scattering", "there is no medium"),
+    }
     graph.keep(picture);
     Ok((graph, given, picture))
 }
@@ -201,7 +224,7 @@ impl<'d> Frame<'d> {
         let transform = transform(view.clip_from_world);
         self.executor.set(self.given.camera, &transform)?;
         match self.scene.shadow.fit {
-            Fit::Scene => Ok(()),
+            Fit::Scene => self.set_space(),
             Fit::Camera => self.set_light(self.scene.light),
         }
     }
@@ -227,7 +250,20 @@ impl<'d> Frame<'d> {
         let area = area(&self.scene, &view);
         self.executor.set(self.given.area, &area)?;
         let transform = transform(view.clip_from_world);
-        self.executor.set(self.given.light_view, &transform)
+        self.executor.set(self.given.light_view, &transform)?;
+        self.set_space()
+    }
+
+    /// What the medium's kernels take of camera and light.
+    fn set_space(&mut self) -> Result<()> {
+        let space = Space::of(&self.scene, self.mesh, self.show);
+        let (Some(volume), Some(space)) = (self.given.volume, space) else {
+            return Ok(());
+        };
+        self.executor.set(volume.view, &space.view)?;
+        self.executor.set(volume.rectified, &space.rectified)?;
+        self.executor
+            .set_buffer(volume.extinctions, &space.extinctions)
     }
 
     /// Runs what has to run; see [`Executor::run`].

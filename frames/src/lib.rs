@@ -19,10 +19,12 @@ pub mod measure;
 pub mod passes;
 mod picture;
 pub mod plan;
+pub mod scattering;
 pub mod scene;
 pub mod techniques;
 pub mod truth;
 pub mod visibility;
+mod volume;
 
 pub use error::{FrameError, Result};
 pub use executor::{Clock, Executor, Memory, NoShaders, Progress, Quiet, Run, Shaders, Timing};

@@ -14,9 +14,28 @@ use hankel_shadows::soft::Lines;
 use crate::graph::{AddCompute, AddDraw, Graph, Handle, Result, Shape, Surfaces};
 use crate::scene::{Area, DepthRange, Shadow};
 use crate::techniques::Map;
+use crate::visibility::SAMPLES;
 
 /// How maps are looked up.
 pub const BILINEAR: Sampler = Sampler::new(Filter::Linear, Address::ClampToEdge);
+
+/// What techniques of scattering start from beside that.
+#[derive(Clone, Copy, Debug)]
+pub struct Volume {
+    /// How pixels look into the world, [`hankel_shadows::scattering::View`].
+    pub view: Handle,
+    /// What scatters, [`hankel_shadows::scattering::Medium`].
+    pub medium: Handle,
+    /// Coordinates in which rays from the camera are rows of the shadow map,
+    /// [`hankel_shadows::scattering::Rectified`].
+    pub rectified: Handle,
+    /// Each row's extinction per unit of radius.
+    pub extinctions: Handle,
+    /// Texels of a row, and rows.
+    pub texels: [u32; 2],
+    /// Steps along a ray, where one is marched along.
+    pub steps: u32,
+}
 
 /// What every technique starts from.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +60,8 @@ pub struct Given {
     pub area: Handle,
     /// The light's outline.
     pub source: Area,
+    /// What is between surfaces, if anything is.
+    pub volume: Option<Volume>,
     /// What the scene asks for.
     pub shadow: Shadow,
     /// Pixels of the picture.
@@ -97,6 +118,23 @@ pub fn opaque_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
         .arg("position", given.positions)
         .arg("light", given.light_view)
         .depth([given.shadow.size; 2])
+}
+
+/// Depth as the camera sees it.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn camera_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
+    let surfaces = Surfaces {
+        positions: given.positions,
+        indices: given.indices,
+        clip_from_world: given.camera,
+    };
+    graph
+        .draw("camera depth", surfaces, "light_depth")
+        .arg("position", given.positions)
+        .arg("light", given.camera)
+        .depth(given.size)
 }
 
 /// The maps of four power moments: the moment bias pulls towards a published target, by the published
@@ -343,6 +381,31 @@ pub fn summed_area(
         table = summed.changed("table").unwrap_or(table);
     }
     Ok(table)
+}
+
+/// A picture as it is seen through the medium, by a kernel that `kernel` with the picture's format names; `bind`
+/// gives it what it looks up.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn scatter(
+    graph: &mut Graph,
+    given: &Given,
+    volume: &Volume,
+    picture: Handle,
+    kernel: &str,
+    bind: impl FnOnce(AddCompute<'_>) -> AddCompute<'_>,
+) -> Result<Handle> {
+    let surfaces = camera_depth(graph, given)?;
+    let pass = graph
+        .compute("scatter", format!("{kernel}_{}", given.format.name()))
+        .constant("samples", SAMPLES)
+        .arg("view", volume.view)
+        .arg("medium", volume.medium)
+        .arg("light", given.light)
+        .arg("picture", picture)
+        .arg("surfaces", surfaces);
+    bind(pass).image(given.size)
 }
 
 /// The picture by a fragment kernel over `world`, `normal` and `colour`; `bind` gives it the map.

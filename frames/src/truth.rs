@@ -6,8 +6,11 @@
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
+//! - [`scattering`] has the light that a medium scatters, by rays from along each pixel's rays.
 //!
 //! All of it runs on this machine's processor.
+
+pub mod scattering;
 
 use hankel_dsl::glam::{DVec3, Vec3, Vec4};
 use hankel_host::device::{Device, NativeDevice};
@@ -24,7 +27,8 @@ use crate::visibility::SAMPLES;
 use crate::visibility::cast::{Caster, Lens, SAMPLES as AT, Segment, in_bands};
 use crate::visibility::fragments::{Fragments, Varying};
 
-/// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is.
+/// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is. Or the share of light
+/// that a medium scatters there, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arriving {
     /// Pixels in a row.
@@ -155,7 +159,38 @@ pub fn by_technique_on(
     scene: &Scene,
     mesh: &Mesh,
 ) -> Result<Arriving> {
-    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Light)?;
+    shown(device, shaders, scene, mesh, Show::Light)
+}
+
+/// What the scene's medium scatters towards the camera, by the scene's technique: see [`Show::Scattered`].
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn scattered_by_technique(scene: &Scene, mesh: &Mesh) -> Result<Arriving> {
+    scattered_by_technique_on(&mut NativeDevice::new(), &NoShaders, scene, mesh)
+}
+
+/// The same on a device.
+///
+/// # Errors
+/// See [`FrameError`].
+pub fn scattered_by_technique_on(
+    device: &mut dyn Device,
+    shaders: &dyn Shaders,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Result<Arriving> {
+    shown(device, shaders, scene, mesh, Show::Scattered)
+}
+
+fn shown(
+    device: &mut dyn Device,
+    shaders: &dyn Shaders,
+    scene: &Scene,
+    mesh: &Mesh,
+    show: Show,
+) -> Result<Arriving> {
+    let mut frame = Frame::new(device, shaders, scene, mesh, show)?;
     frame.run(Clock::Frame, &mut Quiet)?;
     Ok(Arriving {
         width: scene.width,
@@ -165,12 +200,14 @@ pub fn by_technique_on(
 }
 
 /// A technique's errors on a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// Against [`by_rays`]: what an observer would say.
     pub rays: Errors,
     /// Against [`filtered`]: what the reconstruction adds. Only for a light that is a point.
     pub filtered: Option<Errors>,
+    /// Of what the medium scatters, against rays. Only of a scene with a medium.
+    pub scattered: Option<scattering::Compared>,
 }
 
 /// Measures the scene's technique.
@@ -178,14 +215,24 @@ pub struct Measured {
 /// # Errors
 /// See [`FrameError`].
 pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Result<Measured> {
-    progress.begin("light by the technique", 1, 3);
+    let steps = if scene.medium.is_some() { 5 } else { 3 };
+    progress.begin("light by the technique", 1, steps);
     let picture = by_technique(scene, mesh)?;
     let is_point = scene.area.radius == 0.0;
-    progress.begin("light by all samples", 2, 3);
+    progress.begin("light by all samples", 2, steps);
     let soft = is_point.then(|| filtered(scene, mesh, &mut |share| progress.advance(share)));
-    progress.begin("light by rays", 3, 3);
+    progress.begin("light by rays", 3, steps);
     let sharp = by_rays(scene, mesh, &mut |share| progress.advance(share));
+    let mut scattered = None;
+    if scene.medium.is_some() {
+        progress.begin("scattered light by the technique", 4, steps);
+        let picture = scattered_by_technique(scene, mesh)?;
+        progress.begin("scattered light by rays", 5, steps);
+        let mut advance = |share| progress.advance(share);
+        scattered = scattering::compare(scene, mesh, &[&picture], &mut advance)?;
+    }
     Ok(Measured {
+        scattered: scattered.map(|(compared, _)| compared),
         rays: picture.errors(&sharp)?,
         filtered: soft.map(|soft| picture.errors(&soft)).transpose()?,
     })
@@ -278,21 +325,27 @@ impl Pixels {
         let arriving = |i: u32| {
             let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
             let segment = self.lens.segment(pixel, at);
-            self.caster.first(&segment).map_or(1.0, |hit| {
-                let toward = self.toward(pixel, i);
-                let from = segment.at(hit.t) + toward * (AWAY * self.diagonal);
-                let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
-                if self.caster.first(&to_light).is_some() {
-                    return 0.0;
-                }
-                let translucent = self.translucent.as_ref();
-                translucent.map_or(1.0, |t| {
-                    f64::from(t.caster.transmittance(&to_light, &t.opacities))
-                })
+            let hit = self.caster.first(&segment);
+            hit.map_or(1.0, |hit| {
+                self.reaching(&segment, hit.t, self.toward(pixel, i))
             })
         };
         let sum: f64 = (0..GRID * GRID).map(arriving).sum();
         (sum / f64::from(GRID * GRID)) as f32
+    }
+
+    /// The share of the light that reaches a place of a segment: none through an opaque caster, some through
+    /// a translucent one.
+    fn reaching(&self, segment: &Segment, t: f64, toward: DVec3) -> f64 {
+        let from = segment.at(t) + toward * (AWAY * self.diagonal);
+        let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
+        if self.caster.first(&to_light).is_some() {
+            return 0.0;
+        }
+        let translucent = self.translucent.as_ref();
+        translucent.map_or(1.0, |t| {
+            f64::from(t.caster.transmittance(&to_light, &t.opacities))
+        })
     }
 
     /// Where ray `i` of a pixel goes on.

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
+use hankel_frames::scattering::Scattering;
 use hankel_frames::scene::{
-    Area, AreaShape, DepthRange, Fit, Geometry, Mesh, Procedural, Scene, SceneError, Shadow,
+    Area, AreaShape, DepthRange, Fit, Geometry, Medium, Mesh, Procedural, Scene, SceneError, Shadow,
 };
 use hankel_frames::techniques::Technique;
 
@@ -41,6 +42,9 @@ fn the_least_scene_has_the_documented_defaults() {
     assert!((scene.light.length() - 1.0).abs() < 1e-6);
     assert_eq!((scene.width, scene.height), (960, 540));
     assert_eq!(scene.shadow, Shadow::default());
+    assert_eq!(scene.medium, None);
+    let medium = parse(&format!("{LEAST}[medium]\nextinction = 0.1")).unwrap();
+    assert_eq!(medium.medium, Some(Medium::default()));
     assert_eq!(scene.shadow.moment_bias, 6e-5);
     let pcf = parse(&format!("{LEAST}[shadow]\ntechnique = 'pcf'")).unwrap();
     assert_eq!(pcf.shadow.depth_bias, 2e-3);
@@ -68,6 +72,12 @@ fn every_field_is_read() {
         direction = [0.0, -3.0, 0.0]
         radius = 0.05
         shape = "square"
+        [medium]
+        extinction = 0.5
+        scattering = 0.25
+        anisotropy = -0.3
+        technique = "ray-marching"
+        steps = 20
         [shadow]
         technique = "hausdorff"
         size = 512
@@ -99,6 +109,16 @@ fn every_field_is_read() {
     assert_eq!(scene.light, Vec3::NEG_Y);
     let (radius, shape) = (0.05, AreaShape::Square);
     assert_eq!(scene.area, Area { radius, shape });
+    assert_eq!(
+        scene.medium,
+        Some(Medium {
+            extinction: 0.5,
+            scattering: 0.25,
+            anisotropy: -0.3,
+            technique: Scattering::named("ray-marching").unwrap(),
+            steps: 20,
+        })
+    );
     let map = POWER_MOMENTS[1];
     let stored = (map.format.name(), map.depth_range);
     assert_eq!(stored, ("rgba16unorm", DepthRange::Unit));
@@ -143,6 +163,43 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             with("[shadow]\nfilter = 33"),
             &["`shadow.filter` is 33", "1 to 31"],
+        ),
+        (
+            with("[medium]\nextinction = 0"),
+            &[
+                "scene.toml:10:14",
+                "`medium.extinction` is 0",
+                "0.000001 to 1000000",
+            ],
+        ),
+        (
+            with("[medium]\nscattering = 0.1"),
+            &["scene.toml:9:1", "extinction"],
+        ),
+        (
+            with("[medium]\nextinction = 0.2\nscattering = 0.3"),
+            &[
+                "scene.toml:11:14",
+                "`medium.scattering` is 0.3",
+                "0 to `medium.extinction`",
+                "0.2",
+            ],
+        ),
+        (
+            with("[medium]\nextinction = 0.2\nanisotropy = 1.0"),
+            &["`medium.anisotropy` is 1", "-0.9 to 0.9"],
+        ),
+        (
+            with("[medium]\nextinction = 0.2\ntechnique = 'fog'"),
+            &[
+                "`medium.technique` is `fog`",
+                "`prefiltered`",
+                "`ray-marching`",
+            ],
+        ),
+        (
+            with("[medium]\nextinction = 0.2\nsteps = 0"),
+            &["`medium.steps` is 0", "1 to 4096"],
         ),
         (
             with("[shadow]\nsamples = [32, 0]"),

@@ -228,10 +228,25 @@ fn print(args: &Render, quiet: bool, told: Told<'_>) {
             );
         }
     }
-    if let Some(Measured { rays, filtered }) = errors {
+    if let Some(Measured {
+        rays,
+        filtered,
+        scattered,
+    }) = errors
+    {
         say!("light against rays: {rays}");
         if let Some(filtered) = filtered {
             say!("light against all samples, filtered: {filtered}");
+        }
+        if let Some(scattered) = scattered {
+            for errors in &scattered.errors {
+                say!("scattered light against rays: {errors}");
+            }
+            say!(
+                "rays in {} steps; half as many change them by {:.5}",
+                scattered.steps,
+                scattered.change
+            );
         }
     }
     for p in &pictures {

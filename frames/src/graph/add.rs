@@ -231,12 +231,31 @@ impl AddCompute<'_> {
         self
     }
 
-    /// Adds the pass of a kernel whose one output is a texture of two dimensions.
+    /// Adds the pass of a kernel whose one output is a texture of two dimensions. If the same pass is there
+    /// already, by whichever technique, it gives what that one makes.
     ///
     /// # Errors
     /// [`GraphError`].
     pub fn image(self, [width, height]: [u32; 2]) -> Result<Handle> {
-        self.texels([width, height, 1]).only()
+        let shape = [width, height, 1];
+        if let Ok(call) = self.call.call(self.graph, &self.label, "compute") {
+            let made = self.graph.passes.iter().find_map(|pass| {
+                let (Work::Compute(there), [made]) = (&pass.work, &*pass.writes) else {
+                    return None;
+                };
+                let has_same = there.kernel == call.kernel
+                    && there.constants == call.constants
+                    && there.args.split_last() == Some((&Argument::Value(*made), &call.args));
+                has_same.then_some(*made)
+            });
+            if let Some(made) = made
+                && self.graph.is_current(made)
+                && matches!(&self.graph.values[made.at()].shape, Shape::Texture(t) if t.size == shape)
+            {
+                return Ok(made);
+            }
+        }
+        self.texels(shape).only()
     }
 
     /// Adds the pass of a kernel whose one output is a buffer.
@@ -484,7 +503,7 @@ impl AddDraw<'_> {
         })
     }
 
-    fn finish(self, shape: TextureShape, target: impl FnOnce(Handle) -> Target) -> Result<Handle> {
+    fn finish(self, shape: TextureShape, target: impl Fn(Handle) -> Target) -> Result<Handle> {
         let Self {
             graph,
             label,
@@ -532,6 +551,29 @@ impl AddDraw<'_> {
         } = surfaces;
         let mut first = vec![positions, indices, clip_from_world];
         first.extend(before);
+        let same = graph
+            .passes
+            .iter()
+            .find_map(|pass| match (&pass.work, &*pass.writes) {
+                (
+                    Work::Draw {
+                        surfaces: s,
+                        vertex: v,
+                        fragment: f,
+                        target: t,
+                    },
+                    [made],
+                ) => (*s == surfaces && *v == vertex && *f == fragment && *t == target(*made))
+                    .then_some(*made),
+                _ => None,
+            });
+        // What another technique has drawn already.
+        if let Some(made) = same
+            && graph.is_current(made)
+            && graph.values[made.at()].shape == Shape::Texture(shape)
+        {
+            return Ok(made);
+        }
         let reads = reads(std::iter::once(&vertex).chain(&fragment), &first);
         let made = graph.made(label.clone(), Shape::Texture(shape));
         graph.passes.push(Pass {

@@ -34,7 +34,10 @@ impl Subject {
     /// What it holds, as a number (FNV-1a) that is another for another content.
     fn fingerprint(&self) -> u64 {
         let (camera, light) = (&self.scene.camera, self.scene.light);
-        let view = format!("{camera:?} {light:?} {:?}", self.scene.area);
+        let mut view = format!("{camera:?} {light:?} {:?}", self.scene.area);
+        if let Some(medium) = &self.scene.medium {
+            view.push_str(&format!(" {medium:?}"));
+        }
         let mesh: &Mesh = &self.mesh;
         let parts: [&[u8]; 3] = [
             view.as_bytes(),

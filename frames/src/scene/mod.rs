@@ -31,6 +31,13 @@
 //! depth_bias = 0.0                # each technique has its default
 //! leak_cut = 0.02
 //!
+//! [medium]                        # a homogeneous medium all around; without it: none
+//! extinction = 0.1                # share of light lost per unit of length
+//! scattering = 0.1                # what of it is scattered, the rest is absorbed; all of it, default
+//! anisotropy = 0.0                # mean cosine of the angle of scattering, default: to all sides alike
+//! technique = "prefiltered"       # default; or another of `scattering::ALL`
+//! steps = 64                      # along a ray, where one is marched along
+//!
 //! [output]
 //! width = 960
 //! height = 540
@@ -52,6 +59,7 @@ use hankel_dsl::glam::Vec3;
 use hankel_system::input;
 use serde::Deserialize;
 
+use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
 
 pub use error::{Place, Result, SceneError};
@@ -74,6 +82,8 @@ pub struct Scene {
     pub light: Vec3,
     /// How large the light is.
     pub area: Area,
+    /// What fills the space between surfaces, if anything does.
+    pub medium: Option<Medium>,
     /// How shadows are made.
     pub shadow: Shadow,
     /// The picture's width in pixels, 1 to [`Scene::MAX_OUTPUT`].
@@ -155,6 +165,35 @@ impl Area {
         };
         let (sin, cos) = (part * std::f64::consts::FRAC_PI_4 + turn).sin_cos();
         [radius * cos, radius * sin]
+    }
+}
+
+/// A homogeneous medium that a light shines through. It ends with what the camera sees, or at the far plane of
+/// its view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Share of light that is lost per unit of length, for short ways: 1e-6 to 1e6.
+    pub extinction: f32,
+    /// What of it is scattered and not absorbed: 0 to `extinction`.
+    pub scattering: f32,
+    /// The mean cosine of the angle of scattering, -0.9 (backward) to 0.9 (forward): the parameter of Henyey and
+    /// Greenstein's phase function.
+    pub anisotropy: f32,
+    /// How its light is computed.
+    pub technique: &'static Scattering,
+    /// Steps along each ray, where the technique marches along rays: 1 to [`Scene::MAX_STEPS`].
+    pub steps: u32,
+}
+
+impl Default for Medium {
+    fn default() -> Self {
+        Self {
+            extinction: 0.1,
+            scattering: 0.1,
+            anisotropy: 0.0,
+            technique: scattering::ALL[0],
+            steps: 64,
+        }
     }
 }
 
@@ -262,6 +301,8 @@ impl Scene {
     pub const MAX_FILTER: u32 = 31;
     /// Most samples of a soft shadow's search and filter, each.
     pub const MAX_SAMPLES: u32 = 1024;
+    /// Most steps along a ray through a medium.
+    pub const MAX_STEPS: u32 = 4096;
     /// Width and height of a picture unless given.
     pub const DEFAULT_OUTPUT: [u32; 2] = [960, 540];
 

@@ -10,8 +10,9 @@ use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
 use super::{
-    Area, AreaShape, Camera, DepthRange, FAR_OFF, Fit, Geometry, Procedural, Scene, Shadow,
+    Area, AreaShape, Camera, DepthRange, FAR_OFF, Fit, Geometry, Medium, Procedural, Scene, Shadow,
 };
+use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
 
 #[derive(Deserialize)]
@@ -20,6 +21,7 @@ struct File {
     geometry: Spanned<GeometryText>,
     camera: CameraText,
     light: LightText,
+    medium: Option<MediumText>,
     #[serde(default)]
     shadow: ShadowText,
     #[serde(default)]
@@ -51,6 +53,16 @@ struct LightText {
     radius: Option<Spanned<f32>>,
     #[serde(default)]
     shape: AreaShape,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MediumText {
+    extinction: Spanned<f32>,
+    scattering: Option<Spanned<f32>>,
+    anisotropy: Option<Spanned<f32>>,
+    technique: Option<Spanned<String>>,
+    steps: Option<Spanned<i64>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -388,6 +400,43 @@ impl Reader<'_> {
         })
     }
 
+    fn medium(&self, m: MediumText) -> Result<Medium> {
+        let d = Medium::default();
+        let extinction = self.number("medium.extinction", Some(m.extinction), 0.0, 1e-6..=1e6)?;
+        if let Some(scattering) = &m.scattering
+            && !(0.0..=extinction).contains(scattering.get_ref())
+        {
+            return self.refuse(
+                scattering.span(),
+                "medium.scattering",
+                scattering.get_ref(),
+                format!("a number from 0 to `medium.extinction`, which is {extinction}"),
+            );
+        }
+        let technique = match &m.technique {
+            Some(name) => match Scattering::named(name.get_ref()) {
+                Some(technique) => technique,
+                None => {
+                    let names = scattering::ALL.map(|t| t.name.to_owned());
+                    return self.refuse(
+                        name.span(),
+                        "medium.technique",
+                        format!("`{}`", name.get_ref()),
+                        one_of(names.into()),
+                    );
+                }
+            },
+            None => d.technique,
+        };
+        Ok(Medium {
+            extinction,
+            scattering: m.scattering.map_or(extinction, Spanned::into_inner),
+            anisotropy: self.number("medium.anisotropy", m.anisotropy, d.anisotropy, -0.9..=0.9)?,
+            technique,
+            steps: self.integer("medium.steps", m.steps, d.steps, 1..=Scene::MAX_STEPS)?,
+        })
+    }
+
     fn scene(&self, mut f: File) -> Result<Scene> {
         let fov = f.camera.fov.take();
         let [width, height] = Scene::DEFAULT_OUTPUT;
@@ -400,6 +449,7 @@ impl Reader<'_> {
                 radius: self.number("light.radius", f.light.radius, 0.0, 0.0..=Area::MAX_RADIUS)?,
                 shape: f.light.shape,
             },
+            medium: f.medium.map(|m| self.medium(m)).transpose()?,
             shadow: self.shadow(f.shadow)?,
             width: self.integer("output.width", f.output.width, width, pixels.clone())?,
             height: self.integer("output.height", f.output.height, height, pixels)?,

@@ -14,6 +14,11 @@ pub struct CameraView {
     pub clip_from_world: Mat4,
     /// Where the camera is.
     pub eye: Vec3,
+    /// To the middle of the picture's right edge, to that of its upper edge, and to its middle, all at a distance
+    /// of 1 along the view; the first two from the third.
+    pub axes: [Vec3; 3],
+    /// Distances of the near and of the far plane along the view.
+    pub range: [f32; 2],
 }
 
 /// What a directional light sees of a mesh.
@@ -47,7 +52,15 @@ impl CameraView {
         let far = if far > 0.0 { far * 1.001 } else { 1.0 };
         let near = near.min(far * 0.5).max(far * 1e-4) * 0.999;
         let fov = camera.fov.to_radians();
+        let half = (0.5 * fov).tan();
+        let right = forward.cross(camera.up).normalize();
         Self {
+            axes: [
+                right * (half * aspect),
+                right.cross(forward) * half,
+                forward,
+            ],
+            range: [near, far],
             clip_from_world: perspective(fov, aspect, near, far)
                 * look_at_mat4(camera.eye, camera.target, camera.up),
             eye: camera.eye,
@@ -66,6 +79,14 @@ const CLIP: [DVec4; 6] = [
 ];
 
 impl CameraView {
+    /// From the camera to the corners of its far plane, one after the other around it.
+    #[must_use]
+    pub fn far_corners(&self) -> [DVec3; 4] {
+        let [right, up, forward] = self.axes.map(Vec3::as_dvec3);
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]| (forward + right * x + up * y) * f64::from(self.range[1]))
+    }
+
     /// The corners of what is left of a triangle within the view: at least three, or none.
     fn clipped(&self, corners: [Vec3; 3]) -> Vec<DVec3> {
         let clip = self.clip_from_world.as_dmat4();
@@ -151,8 +172,39 @@ impl LightView {
         for t in 0..mesh.triangles.len() {
             seen.and(&Extent::of(&axes, camera.clipped(mesh.corners(t))));
         }
+        Self::around(axes, seen, mesh, size, margin)
+    }
+
+    /// The same around all that a camera sees through, from itself to its far plane, as far as the mesh could cast
+    /// shadows there.
+    #[must_use]
+    pub fn fitted_to_space(
+        direction: Vec3,
+        mesh: &Mesh,
+        size: u32,
+        margin: u32,
+        camera: &CameraView,
+    ) -> Self {
+        let axes = axes(direction);
+        let eye = camera.eye.as_dvec3();
+        let corners = camera.far_corners().map(|q| eye + q);
+        let mut seen = Extent::of(&axes, corners.into_iter().chain([eye]));
+        let all = Extent::of(&axes, mesh.positions.iter().map(|p| p.as_dvec3()));
+        for i in 0..3 {
+            seen.low[i] = seen.low[i].max(all.low[i]);
+            seen.high[i] = seen.high[i].min(all.high[i]);
+        }
+        if (0..3).any(|i| seen.low[i] > seen.high[i]) {
+            seen = Extent::NONE;
+        }
+        Self::around(axes, seen, mesh, size, margin)
+    }
+
+    /// Around what is seen, and towards the light around what may cast shadows there.
+    fn around(axes: [DVec3; 3], mut seen: Extent, mesh: &Mesh, size: u32, margin: u32) -> Self {
         if seen.low[0] > seen.high[0] {
-            return Self::new(direction, mesh, size, margin);
+            let points = mesh.positions.iter().map(|p| p.as_dvec3());
+            return Self::of(axes, Extent::of(&axes, points), size, margin);
         }
         // With the filter's margin.
         let free = f64::from(margin) / f64::from(size);

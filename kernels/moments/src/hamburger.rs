@@ -2,7 +2,7 @@
 
 use hankel_dsl::{Real, lit};
 
-use crate::{Blockers, Moments4};
+use crate::{Blockers, Bounds, Moments4};
 
 /// What a query point makes of four moments: the polynomial whose roots are the other two points
 /// of the distribution that attains the bound (\[MSM\], Algorithm 2 and Proposition 10), up to a
@@ -75,6 +75,18 @@ impl<R: Real> Query<R> {
 pub fn hamburger_4<R: Real>(m: Moments4<R>, z: R) -> R {
     let query = Query::new(m.clamped(), z.clamp(lit!(-2.0), lit!(2.0)));
     query.below(&query.between())
+}
+
+/// As [`hamburger_4`], with the least upper bound of the share that lies at `z` or below: the lower one and the
+/// point's own weight.
+#[inline(always)]
+pub fn hamburger_4_bounds<R: Real>(m: Moments4<R>, z: R) -> Bounds<R> {
+    let query = Query::new(m.clamped(), z.clamp(lit!(-2.0), lit!(2.0)));
+    let lower = query.below(&query.between());
+    Bounds {
+        lower,
+        upper: (lower + query.own).min(lit!(1.0)),
+    }
 }
 
 /// Reads a distribution off four moments and a query point, and tells what of it blocks the light from

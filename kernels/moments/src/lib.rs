@@ -22,6 +22,7 @@
 //! - \[PCSS\] R. Fernando: *Percentage-Closer Soft Shadows* (2005).
 //! - \[ESM\] T. Annen, T. Mertens, H.-P. Seidel, E. Flerackers, J. Kautz: *Exponential Shadow Maps*
 //!   (2008).
+//! - \[PSS\] O. Klehm, H.-P. Seidel, E. Eisemann: *Prefiltered Single Scattering* (2014).
 //! - \[LVSM\] A. Lauritzen, M. McCool: *Layered Variance Shadow Maps* (2008).
 #![no_std]
 
@@ -36,6 +37,7 @@ mod leak;
 mod moments;
 mod orthogonal;
 mod quantization;
+mod scattering;
 mod six;
 mod sparse;
 mod trigonometric;
@@ -50,7 +52,7 @@ pub use bound::{
 };
 pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
 pub use exponential::{markov_1, warped_2};
-pub use hamburger::{blockers_4, hamburger_4};
+pub use hamburger::{blockers_4, hamburger_4, hamburger_4_bounds};
 pub use hausdorff::{hausdorff_4, hausdorff_4_symmetric};
 pub use leak::cut_leak;
 pub use moments::{Moments4, Moments6};
@@ -59,6 +61,10 @@ pub use quantization::{
     Span, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6,
     from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, quantize_unit_6,
     to_unorm,
+};
+pub use scattering::{
+    RectifiedBounds, henyey_greenstein, inclination, rectified_bounds, rectified_depth,
+    row_extinction, row_inclinations, transmittance,
 };
 pub use six::{blockers_6, hamburger_6};
 pub use sparse::{TwoPoints, sparse_2};

@@ -3,7 +3,9 @@
 mod common;
 
 use common::{Distribution, distribution};
-use hankel_moments::{Moments4, hamburger_4, hausdorff_4, hausdorff_4_symmetric, variance_2};
+use hankel_moments::{
+    Moments4, hamburger_4, hamburger_4_bounds, hausdorff_4, hausdorff_4_symmetric, variance_2,
+};
 use microlp::{ComparisonOp, OptimizationDirection, Problem};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -32,6 +34,19 @@ proptest! {
         prop_assert!(hamburger_4(m, z) <= most);
         prop_assert!(hausdorff_4(m, z) <= most);
         prop_assert!(variance_2(m.b1, m.b2, z, 0.0) <= most);
+    }
+
+    /// The upper bound is the lower one of what is mirrored at 0, taken from 1; between the two lies every
+    /// distribution with the moments.
+    #[test]
+    fn an_upper_bound_is_a_mirrored_lower_one(d in distribution(6), z in 0.0..=1.0_f64) {
+        let m = d.moments();
+        let bounds = hamburger_4_bounds(m, z);
+        prop_assert_eq!(bounds.lower, hamburger_4(m, z));
+        let allowed = TOLERANCE + d.rounding(z, 2);
+        prop_assert!(bounds.upper + allowed >= d.below(z) && bounds.upper <= 1.0);
+        let mirrored = Moments4 { b1: -m.b1, b3: -m.b3, ..m };
+        prop_assert!((bounds.upper + hamburger_4(mirrored, -z) - 1.0).abs() <= 2.0 * allowed);
     }
 
     /// Two surfaces are reconstructed exactly: the case that most filter regions are.

@@ -17,6 +17,8 @@
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface) |
 //! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
+//! | single scattering, marched | [`scatter_march`](scattering::scatter_march) |
+//! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -34,6 +36,7 @@ pub mod moment_bounds;
 pub mod points;
 pub mod quantize;
 pub mod resolve;
+pub mod scattering;
 pub mod shade;
 pub mod six;
 pub mod soft;
@@ -86,6 +89,11 @@ hankel_dsl::kernels![
     translucent::shade_stochastic,
     translucent::tint,
     translucent::tinted,
+    scattering::scatter_march,
+    scattering::rectify,
+    scattering::prefix_means,
+    scattering::scatter_prefiltered,
+    scattering::scatter_prefiltered_6,
     bounds::hamburger_4msm,
     bounds::hausdorff_4msm,
     bounds::vsm,

@@ -226,7 +226,7 @@ prefix_sums!(
 
 /// The texel that an element of a table belongs to: rows from the top, one after the other.
 #[inline(always)]
-fn texel(i: u32, size: UVec2) -> UVec2 {
+pub(crate) fn texel(i: u32, size: UVec2) -> UVec2 {
     // A division that has no branch which leaves the kernel: a texture is a texel wide at least.
     let (x, y) = (i.checked_rem(size.x), i.checked_div(size.x));
     UVec2::new(x.unwrap_or(0), within(y.unwrap_or(0) as i32, size.y))
@@ -357,7 +357,7 @@ impl Table6<'_> {
 
 /// A place in the map in texels.
 #[inline(always)]
-fn in_texels(uv: Vec2, size: UVec2) -> Vec2 {
+pub(crate) fn in_texels(uv: Vec2, size: UVec2) -> Vec2 {
     Vec2::new(uv.x * size.x as f32, uv.y * size.y as f32)
 }
 
@@ -453,7 +453,7 @@ pub fn shade_soft_6(
 
 /// The texel of a place that is given in texels; beyond the map, the nearest one.
 #[inline(always)]
-fn nearest(place: Vec2, size: UVec2) -> UVec2 {
+pub(crate) fn nearest(place: Vec2, size: UVec2) -> UVec2 {
     let within = |x: f32, size: u32| to_i32(Real::clamp(x, 0.0, (size - 1) as f32)) as u32;
     UVec2::new(within(place.x, size.x), within(place.y, size.y))
 }

@@ -38,7 +38,7 @@ const BOXES: [[f64; 5]; 4] = [
 ];
 
 /// The depth that the light sees at a place of the map, from 0 to 1.
-fn depth(u: f64, v: f64) -> f64 {
+pub(super) fn depth(u: f64, v: f64) -> f64 {
     let ground = 0.75 + 0.2 * v;
     let wall = if u > 0.8 { 0.45 + 0.5 * (1.0 - u) } else { 1.0 };
     let mut nearest = f64::min(ground, wall);
@@ -216,7 +216,7 @@ pub(super) fn fragments_and_light(s: &mut Source, what: &str, light: &Light) -> 
 }
 
 /// A map of floats.
-fn with_map(given: Given, name: &str, map: &[Vec4]) -> Given {
+pub(super) fn with_map(given: Given, name: &str, map: &[Vec4]) -> Given {
     let texels = map.iter().copied();
     given.texture(name, SIZE, 1, TexelFormat::Rgba32Float, texels)
 }

@@ -1,0 +1,120 @@
+//! From a scene's medium to what the kernels of single scattering take.
+
+use std::f64::consts::PI;
+
+use hankel_dsl::glam::{DVec3, Vec3, Vec4};
+use hankel_moments::{rectified_bounds, row_extinction, row_inclinations};
+use hankel_shadows::scattering::{Medium, Rectified, View};
+
+use crate::frame::{IRRADIANCE, Show, camera_view, light, light_view};
+use crate::graph::Graph;
+use crate::passes::Volume;
+use crate::scene::{CameraView, LightView, Mesh, Scene};
+
+/// How much of a harmless distribution is mixed into means of moments: 32-bit sums of a few hundred of them
+/// are rounded by some 1e-6.
+const MOMENT_BIAS: f32 = 5e-6;
+
+/// What kernels take.
+pub(crate) struct Space {
+    pub view: View,
+    pub medium: Medium,
+    pub rectified: Rectified,
+    pub extinctions: Vec<f32>,
+}
+
+impl Space {
+    /// Of a scene's camera and light; `None` for a scene without a medium, and where what is shown is not behind
+    /// it.
+    pub fn of(scene: &Scene, mesh: &Mesh, show: Show) -> Option<Self> {
+        let medium = scene.medium.filter(|_| show != Show::Light)?;
+        let camera = camera_view(scene, &scene.camera, mesh);
+        let light_view = light_view(scene, scene.light, mesh);
+        let (source, anisotropy) = match show {
+            // Surfaces take the irradiance as what a white one sends out: divided by π.
+            Show::Picture => {
+                let albedo = medium.scattering / medium.extinction;
+                (albedo * IRRADIANCE * PI as f32, medium.anisotropy)
+            }
+            // All that is scattered counts as 1.
+            Show::Scattered | Show::Light => (4.0 * PI as f32, 0.0),
+        };
+        let (rectified, extinctions) = rectified(scene, &camera, &light_view, medium.extinction);
+        Some(Self {
+            view: view(&camera, [scene.width, scene.height]),
+            medium: Medium {
+                extinction: medium.extinction,
+                source,
+                anisotropy,
+                steps: medium.steps,
+            },
+            rectified,
+            extinctions,
+        })
+    }
+
+    pub fn add_to(&self, graph: &mut Graph) -> Volume {
+        Volume {
+            view: graph.parameter("view", &self.view),
+            medium: graph.parameter("medium", &self.medium),
+            rectified: graph.parameter("rectified", &self.rectified),
+            extinctions: graph.buffer("extinctions", &self.extinctions),
+            texels: [self.rectified.columns, self.rectified.rows],
+            steps: self.medium.steps,
+        }
+    }
+}
+
+fn view(camera: &CameraView, size: [u32; 2]) -> View {
+    let [right, up, forward] = camera.axes;
+    let [width, height] = size.map(|n| n as f32);
+    let [near, far] = camera.range.map(f64::from);
+    let first = forward + right * (1.0 / width - 1.0) + up * (1.0 - 1.0 / height);
+    View {
+        eye: camera.eye.extend((1.0 / near) as f32),
+        first: first.extend((1.0 / far - 1.0 / near) as f32),
+        right: (right * (2.0 / width)).extend(0.0),
+        down: (up * (-2.0 / height)).extend(0.0),
+    }
+}
+
+/// The rectified map, which has as many texels as the shadow map, and each row's extinction.
+fn rectified(
+    scene: &Scene,
+    camera: &CameraView,
+    light_view: &LightView,
+    extinction: f32,
+) -> (Rectified, Vec<f32>) {
+    let clip = light_view.clip_from_world;
+    let axis = |i: usize| clip.row(i).truncate().as_dvec3().normalize();
+    let axes: [DVec3; 3] = [0, 1, 2].map(axis);
+    let corners = camera.far_corners().map(|q| axes.map(|axis| axis.dot(q)));
+    let bounds = rectified_bounds(corners);
+    let (sin, cos) = bounds.azimuth.sin_cos();
+    let across = axes[0] * cos + axes[1] * sin;
+    let aside = axes[1] * cos - axes[0] * sin;
+    let uniform = light(scene, light_view, Show::Light);
+    let in_map = |row: Vec4| {
+        let row = row.as_dvec4();
+        (row.truncate().dot(camera.eye.as_dvec3()) + row.w) as f32
+    };
+    let eye = [uniform.row_u, uniform.row_v, uniform.row_depth].map(in_map);
+    let size = scene.shadow.size;
+    let extinctions = (0..size).map(|row| {
+        let share = 2.0 * (f64::from(row) + 0.5) / f64::from(size) - 1.0;
+        let azimuth = bounds.azimuth + share * bounds.half_azimuth;
+        let (least, largest) = row_inclinations(corners, azimuth);
+        row_extinction(f64::from(extinction), least, largest) as f32
+    });
+    let rectified = Rectified {
+        across: across.as_vec3().extend(bounds.radius as f32),
+        aside: aside.as_vec3().extend(bounds.half_azimuth as f32),
+        along: axes[2].as_vec3().extend(light_view.depth),
+        eye: Vec3::from_array(eye).extend(MOMENT_BIAS),
+        middle: (0.5 * (bounds.least + bounds.largest)) as f32,
+        scale: (2.0 / (bounds.largest - bounds.least).max(1e-6)) as f32,
+        columns: size,
+        rows: size,
+    };
+    (rectified, extinctions.collect())
+}

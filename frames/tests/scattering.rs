@@ -1,0 +1,206 @@
+//! What a medium scatters: techniques against rays, and what a medium does to a frame.
+
+use std::path::Path;
+
+use hankel_frames::scattering::{self, Scattering};
+use hankel_frames::scene::{Mesh, Scene};
+use hankel_frames::truth::scattering::{Scattered, compare};
+use hankel_frames::truth::{Arriving, by_technique, scattered_by_technique};
+use hankel_frames::{Clock, Frame, NoShaders, Quiet, Show, graph_of, render_on};
+use hankel_host::device::NativeDevice;
+
+fn parsed(text: &str) -> (Scene, Mesh) {
+    let scene = Scene::parse(text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let mesh = scene.mesh().unwrap_or_else(|e| panic!("{e}"));
+    (scene, mesh)
+}
+
+/// A file of `scenes/`, in a small picture.
+fn file(name: &str, size: u32) -> (Scene, Mesh) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenes/{name}.toml"));
+    let mut scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
+    (scene.width, scene.height) = (96, 54);
+    scene.shadow.size = size;
+    let mesh = scene.mesh().unwrap_or_else(|e| panic!("{e}"));
+    (scene, mesh)
+}
+
+fn by(scene: &Scene, mesh: &Mesh, technique: &str, steps: u32) -> Arriving {
+    let mut scene = scene.clone();
+    let medium = scene.medium.as_mut().unwrap();
+    medium.technique = Scattering::named(technique).unwrap();
+    medium.steps = steps;
+    scattered_by_technique(&scene, mesh).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// An open field under an empty sky, which nothing shades.
+fn open(camera: &str, medium: &str) -> (Scene, Mesh) {
+    parsed(&format!(
+        "[geometry]\nprocedural = 'empty'\n[camera]\n{camera}\n[light]\ndirection = [0.3, -1.0, 0.2]\n\
+         [medium]\n{medium}\n[shadow]\nsize = 128\n[output]\nwidth = 48\nheight = 30\n"
+    ))
+}
+
+/// What a medium without shadow scatters is 1 - exp(-σ d) for rays of length d: by every technique, and by rays.
+#[test]
+fn a_medium_in_light_alone_has_its_analytic_picture() {
+    for camera in [
+        "eye = [1.0, 2.0, 6.0]\ntarget = [0, 0.5, 0]",
+        // With the light, so that azimuths go all around.
+        "eye = [-0.6, 4.0, -0.4]\ntarget = [0.6, 0.0, 0.4]",
+    ] {
+        let (scene, mesh) = open(camera, "extinction = 0.2");
+        let mut truth = Scattered::new(&scene, &mesh).unwrap();
+        let picture = truth.picture();
+        assert!(truth.refine(&mut |_| ()).unwrap() < 1e-3);
+        assert!(picture.values.iter().all(|v| *v > 0.3 && *v < 0.99));
+        for technique in scattering::ALL {
+            let name = technique.name;
+            let errors = by(&scene, &mesh, name, 16).errors(&picture).unwrap();
+            println!("{camera:?}, {name}: {errors}");
+            // Sixteen rays of a pixel against four samples, one ray's direction for all. Moments do not tell the
+            // ground before a ray's end from what would shade the ray.
+            let limit = if name == "ray-marching" { 0.006 } else { 0.02 };
+            assert!(errors.rms < limit, "{name}: {errors}");
+        }
+    }
+}
+
+/// Root of the mean square error of each technique. What they reach is measured, with a tenth on top.
+#[test]
+fn scattered_light_is_near_the_rays() {
+    for (name, limits) in [
+        ("shafts", [0.0082, 0.0030, 0.0019, 0.0132, 0.0091]),
+        ("mist", [0.0180, 0.0110, 0.0091, 0.0328, 0.0201]),
+    ] {
+        let (scene, mesh) = file(name, 512);
+        let ways = [
+            ("ray-marching", 8),
+            ("ray-marching", 32),
+            ("ray-marching", 128),
+            ("prefiltered", 1),
+            ("prefiltered-6", 1),
+        ];
+        let pictures = ways.map(|(technique, steps)| by(&scene, &mesh, technique, steps));
+        let all: Vec<&Arriving> = pictures.iter().collect();
+        let (compared, truth) = compare(&scene, &mesh, &all, &mut |_| ()).unwrap().unwrap();
+        let least = compared.errors.iter().map(|e| e.rms).fold(1.0, f64::min);
+        println!(
+            "{name}: {} steps of the truth, the last doubling changed it by {:.5}",
+            compared.steps, compared.change
+        );
+        assert!(compared.change <= 0.1 * least);
+        let unshadowed = Scattered::new(&scene, &mesh).unwrap().unshadowed();
+        println!(
+            "{name}, without shadow: {}",
+            unshadowed.errors(&truth).unwrap()
+        );
+        for (((technique, steps), errors), limit) in ways.iter().zip(&compared.errors).zip(limits) {
+            println!("{name}, {technique}, {steps} steps: {errors}");
+            assert!(errors.rms < limit, "{name}, {technique}, {steps}: {errors}");
+        }
+        // More steps bring marching nearer to the truth.
+        let marched = &compared.errors[..3];
+        assert!(marched.is_sorted_by(|a, b| a.rms > b.rms), "{name}");
+    }
+}
+
+/// A surface's light is weakened by what the medium takes, and nothing is added where nothing is scattered.
+#[test]
+fn what_is_seen_is_weakened_by_the_way() {
+    let camera = "eye = [1.0, 2.0, 6.0]\ntarget = [0, 0.5, 0]";
+    let linear = |text: &str| {
+        let (mut scene, mesh) = open(camera, text);
+        if text.is_empty() {
+            scene.medium = None;
+        }
+        let mut device = NativeDevice::new();
+        let mut frame = Frame::new(&mut device, &NoShaders, &scene, &mesh, Show::Picture).unwrap();
+        frame.run(Clock::Frame, &mut Quiet).unwrap();
+        frame.linear().unwrap()
+    };
+    let absorbing = "extinction = 0.2\nscattering = 0.0";
+    let (weak, strong) = (linear(absorbing), linear("extinction = 1e-6"));
+    let (scene, mesh) = open(camera, absorbing);
+    // Marched along, as nothing is shaded: what is scattered is what is taken.
+    let taken = by(&scene, &mesh, "ray-marching", 16);
+    for ((weak, strong), taken) in weak.iter().zip(&strong).zip(&taken.values) {
+        let wanted = strong.x * (1.0 - taken);
+        assert!(
+            (weak.x - wanted).abs() < 2e-3 * strong.x + 1e-3,
+            "{weak} {strong} {taken}"
+        );
+    }
+}
+
+/// Passes of scattering are there only with a medium; those of the light's map are shared with the surfaces.
+#[test]
+fn without_a_medium_nothing_of_it_is_there() {
+    let (mut scene, mesh) = file("shafts", 64);
+    let passes = |scene: &Scene, show| {
+        let (graph, _, _) = graph_of(scene, &mesh, show).unwrap();
+        let summary = graph.summary();
+        let names: Vec<String> = summary.passes.iter().map(|p| p.pass.clone()).collect();
+        let left_out = graph.omitted().iter().any(|o| o.what == "scattering");
+        (names, left_out)
+    };
+    let (with, is_left_out) = passes(&scene, Show::Picture);
+    assert!(!is_left_out);
+    let count = |names: &[String], name: &str| names.iter().filter(|n| *n == name).count();
+    for name in [
+        "depth",
+        "resolve",
+        "blur rows",
+        "blur columns",
+        "shade",
+        "rectify",
+        "means",
+        "camera depth",
+        "scatter",
+    ] {
+        assert_eq!(count(&with, name), 1, "{name}: {with:?}");
+    }
+    // Light on surfaces is what it is without.
+    assert_eq!(count(&passes(&scene, Show::Light).0, "scatter"), 0);
+    let medium = scene.medium.take();
+    let (without, is_left_out) = passes(&scene, Show::Picture);
+    assert!(
+        is_left_out && count(&without, "scatter") == 0,
+        "{without:?}"
+    );
+    let mut device = NativeDevice::new();
+    let rendering = render_on(&mut device, &scene, &mesh, &NoShaders, &mut Quiet).unwrap();
+    assert!(rendering.plan.to_string().contains("there is no medium"));
+    let before = by_technique(&scene, &mesh).unwrap();
+    scene.medium = medium;
+    assert_eq!(by_technique(&scene, &mesh).unwrap(), before);
+}
+
+/// A frame whose camera and light are moved is the frame that is made there.
+#[test]
+fn a_medium_follows_camera_and_light() {
+    for fit in ["scene", "camera"] {
+        for technique in scattering::ALL {
+            let text = |eye: &str, direction: &str| {
+                format!(
+                    "[geometry]\nprocedural = 'box'\n[camera]\neye = {eye}\ntarget = [0, 0.5, 0]\n\
+                     [light]\ndirection = {direction}\n[medium]\nextinction = 0.2\ntechnique = '{}'\n\
+                     [shadow]\nsize = 64\nfit = '{fit}'\n[output]\nwidth = 32\nheight = 20\n",
+                    technique.name
+                )
+            };
+            let (first, mesh) = parsed(&text("[2, 2, 4]", "[0.5, -1, 0.2]"));
+            let (second, _) = parsed(&text("[-3, 1, 2]", "[-0.7, -0.4, 0.1]"));
+            let mut device = NativeDevice::new();
+            let mut moved =
+                Frame::new(&mut device, &NoShaders, &first, &mesh, Show::Scattered).unwrap();
+            moved.run(Clock::Frame, &mut Quiet).unwrap();
+            moved.set_camera(&second.camera).unwrap();
+            moved.set_light(second.light).unwrap();
+            moved.run(Clock::Frame, &mut Quiet).unwrap();
+            let picture: Vec<f32> = moved.linear().unwrap().iter().map(|c| c.x).collect();
+            let wanted = scattered_by_technique(&second, &mesh).unwrap();
+            assert_eq!(picture, wanted.values, "{}, {fit}", technique.name);
+        }
+    }
+}
