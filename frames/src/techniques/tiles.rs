@@ -51,15 +51,16 @@ fn known(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Known> {
     let count = across as usize * across as usize;
     // The filter and bilinear lookup.
     let reach = (given.shadow.filter / 2 + 1).div_ceil(EDGE);
-    let depths = graph
-        .compute("tile depths", "tile_depths")
-        .arg("depth", depth)
-        .constant("samples", SAMPLES)
-        .elements(count)?;
     let tiles = Tiles {
         across: UVec2::splat(across),
     };
     let tiles = graph.constant("tiles", &tiles);
+    let depths = graph
+        .compute("tile depths", "tile_depths")
+        .arg("tiles", tiles)
+        .arg("depth", depth)
+        .constant("samples", SAMPLES)
+        .elements(count)?;
     let listed = graph.zeros::<Listed>("listed", 1);
     let list = graph.zeros::<u32>("list", count);
     let written = graph

@@ -52,10 +52,34 @@ impl Values {
             .map(|leaf| Ok((leaf, self.resolved(leaf.inputs.within(outer).domain)?)))
             .collect::<Result<_, InputError>>()?;
         let mut bytes = vec![0; stride * count];
-        for element in bytes.chunks_exact_mut(stride.max(1)) {
-            self.element(&leaves, element);
+        let distinct = match leaves[..] {
+            [(leaf, Some(Domain::Distinct))] => self.distinct(leaf.scalar, count),
+            _ => None,
+        };
+        for (i, element) in bytes.chunks_exact_mut(stride.max(1)).enumerate() {
+            match &distinct {
+                Some(numbers) => element[..4].copy_from_slice(&numbers[i].to_le_bytes()),
+                None => self.element(&leaves, element),
+            }
         }
         Ok(bytes)
+    }
+
+    /// So many integers of 32 bits in any order, no two alike: from 0 on; of hostile inputs anywhere.
+    fn distinct(&mut self, scalar: Scalar, count: usize) -> Option<Vec<u32>> {
+        if !matches!(scalar, Scalar::U32 | Scalar::I32) {
+            return None;
+        }
+        let mut numbers: Vec<u32> = (0..u32::try_from(count).ok()?).collect();
+        self.rng.shuffle(&mut numbers);
+        if self.class == Class::Hostile {
+            // An odd factor maps no two numbers to one.
+            let factor = self.rng.u32(..) | 1;
+            for n in &mut numbers {
+                *n = n.wrapping_mul(factor);
+            }
+        }
+        Some(numbers)
     }
 
     /// Counts and indices as the numbers that they are here.
@@ -396,6 +420,22 @@ mod tests {
                 }
             }
             assert_eq!(beyond > 500, class == Class::Hostile);
+        }
+    }
+
+    #[test]
+    fn distinct_integers_are_distinct() {
+        let leaves = [leaf("place", Scalar::U32, 0, Some(Domain::Distinct))];
+        for class in Class::ALL {
+            let bytes = values(class)
+                .elements(&leaves, &Inputs::default(), 4, 5000)
+                .unwrap();
+            let mut all: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+            assert!(!all.is_sorted(), "{class}");
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), 5000, "{class}");
+            assert_eq!(all.last() == Some(&4999), class != Class::Hostile);
         }
     }
 

@@ -10,11 +10,12 @@ use syn::spanned::Spanned;
 use syn::{Attribute, BinOp, Expr, ExprLit, Lit, LitInt, LitStr, Meta, RangeLimits, Token};
 
 /// The attributes' names.
-const WORDS: [&str; 16] = [
+const WORDS: [&str; 17] = [
     "range",
     "magnitude",
     "values",
     "unit_vector",
+    "distinct",
     "count_of",
     "index_of",
     "default",
@@ -75,6 +76,7 @@ enum Domain {
     Magnitude(Expr, Expr),
     Values(Vec<Expr>),
     UnitVector,
+    Distinct,
     CountOf(Ident),
     IndexOf(Ident),
 }
@@ -172,6 +174,10 @@ impl Inputs {
                 attribute.meta.require_path_only()?;
                 Domain::UnitVector
             }
+            "distinct" => {
+                attribute.meta.require_path_only()?;
+                Domain::Distinct
+            }
             "count_of" => Domain::CountOf(attribute.parse_args()?),
             "index_of" => Domain::IndexOf(attribute.parse_args()?),
             "default" => {
@@ -268,7 +274,7 @@ impl Inputs {
             None => Ok(()),
             Some(_) => Err(syn::Error::new(
                 span,
-                "range, magnitude, values, unit_vector, count_of and index_of exclude each other: keep one of them",
+                "range, magnitude, values, unit_vector, distinct, count_of and index_of exclude each other: keep one of them",
             )),
         }
     }
@@ -306,6 +312,9 @@ impl Inputs {
                     if matches!(holder, Holder::Texture { .. } | Holder::Constant) =>
                 {
                     return error(*span, "only vectors have a length");
+                }
+                Domain::Distinct if holder != Holder::Buffer => {
+                    return error(*span, "only the elements of a buffer can be told apart");
                 }
                 Domain::CountOf(_) | Domain::IndexOf(_)
                     if matches!(holder, Holder::Texture { .. }) =>
@@ -417,6 +426,7 @@ impl Inputs {
                         quote!(Values { values: [#(#values),*].into() })
                     }
                     Domain::UnitVector => quote!(UnitVector),
+                    Domain::Distinct => quote!(Distinct),
                     Domain::CountOf(param) => {
                         let param = param.to_string();
                         quote!(CountOf { param: #param.into() })

@@ -74,6 +74,7 @@ use syn::parse_macro_input;
 /// | `#[magnitude(1e-7..=1e-2)]` | of any order of magnitude between two positive numbers |
 /// | `#[values(0, 1, 2)]` | one of these; of a constant, each of them is run |
 /// | `#[unit_vector]` | the vector's length is 1 |
+/// | `#[distinct]` | no two integers of a buffer are alike |
 /// | `#[count_of(PARAM)]`, `#[index_of(PARAM)]` | the number of elements of another parameter; the number of one of its elements |
 /// | `#[default(0.5)]` | a uniform's number unless somebody gives another one; 0 without it |
 /// | `#[unit = "m"]` | the unit |

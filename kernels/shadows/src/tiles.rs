@@ -48,7 +48,7 @@ pub struct Listed {
 #[repr(C)]
 pub struct Tiles {
     /// Tiles along u and v, the last ones not always whole.
-    #[range(1..=2048)]
+    #[range(1..=8192)]
     pub across: UVec2,
 }
 
@@ -70,7 +70,7 @@ pub struct Bounds {
 /// How many tiles `texels` need.
 #[inline(always)]
 pub const fn tiles_of(texels: u32) -> u32 {
-    texels.div_ceil(EDGE)
+    (texels + EDGE - 1) / EDGE
 }
 
 /// From a tile's middle to the centre of its texel `i`.
@@ -83,24 +83,28 @@ fn from_middle(i: u32) -> f32 {
 /// plane's slope is that of the depths between opposite edges of the tile.
 #[kernel(
     compute,
-    threads(64),
-    inputs = crate::inputs::maps::depths,
+    threads(8, 8),
+    range(tiles.across),
+    inputs = crate::inputs::tiles::depths,
     parity(
         ulp = 0,
         absolute = 1e-6,
-        why = "drivers may contract products and sums, once in each of three terms of a plane's depth"
+        non_finite,
+        why = "drivers may contract products and sums, once in each of three terms of a plane's depth; absurd depths overflow"
     )
 )]
 pub fn tile_depths(
-    #[index] i: u32,
+    #[index] tile: UVec2,
+    #[uniform] tiles: &Tiles,
     #[constant(id = 0, default = 4)]
     #[values(1, 4)]
     samples: u32,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Bounds {
+    // It says the range.
+    let _ = tiles;
     let size = depth.size();
-    let across = tiles_of(size.x);
-    let (left, top) = (EDGE * (i % across), EDGE * (i / across));
+    let (left, top) = (EDGE * tile.x, EDGE * tile.y);
     let load = |x: u32, y: u32, sample: u32| {
         let at = UVec2::new(
             within((left + x) as i32, size.x),
@@ -135,19 +139,21 @@ pub fn tile_depths(
 }
 
 /// What the depths of each tile and of those around it lie between, by the slope of the tile. Where one of
-/// the depths is nearer than the far end, 1, the tile is listed.
+/// the depths is nearer than the far end, 1, the tile is listed: its place along u in 16 bits, and along v.
 #[kernel(
     compute,
-    threads(64),
+    threads(8, 8),
+    range(tiles.across),
     inputs = crate::inputs::tiles::of_depths,
     parity(
         ulp = 0,
         absolute = 1e-6,
-        why = "drivers may contract products and sums, once in each of three terms of a plane's depth"
+        non_finite,
+        why = "drivers may contract products and sums, once in each of three terms of a plane's depth; absurd depths overflow"
     )
 )]
 pub fn tile_list(
-    #[index] i: u32,
+    #[index] at: UVec2,
     #[uniform] tiles: &Tiles,
     #[storage] depths: Buffer<'_, Bounds>,
     #[constant(id = 0, default = 1)]
@@ -156,12 +162,12 @@ pub fn tile_list(
     #[atomic] listed: Atomics<'_>,
     #[storage(unordered)] list: StorageMut<'_, u32>,
 ) -> Bounds {
-    let (x, y) = (i % tiles.across.x, i / tiles.across.x);
+    let (x, y) = (at.x as i32, at.y as i32);
     let tile = |x: i32, y: i32| {
         let (x, y) = (within(x, tiles.across.x), within(y, tiles.across.y));
         depths.get(within((y * tiles.across.x + x) as i32, depths.len()))
     };
-    let slope = tile(x as i32, y as i32).slope;
+    let slope = tile(x, y).slope;
     let (mut least, mut most) = (2.0, 0.0);
     let mut is_empty = true;
     let reach = reach as i32;
@@ -169,7 +175,7 @@ pub fn tile_list(
     while dy <= reach {
         let mut dx = -reach;
         while dx <= reach {
-            let other = tile(x as i32 + dx, y as i32 + dy);
+            let other = tile(x + dx, y + dy);
             // Of the difference of both planes, the least is at a corner of the other tile.
             let half = 0.5 * EDGE as f32;
             let turned = Real::abs(other.slope.x - slope.x) + Real::abs(other.slope.y - slope.y);
@@ -187,7 +193,7 @@ pub fn tile_list(
         listed.max(0, ACROSS * TEXELS);
         listed.max(1, place / ACROSS + 1);
         if place < list.len() {
-            list.set(place, i);
+            list.set(place, at.x | (at.y << 16));
         }
     }
     Bounds { slope, least, most }
@@ -198,13 +204,12 @@ pub fn tile_list(
 fn texel(at: UVec2, listed: &Listed, list: Buffer<'_, u32>, map: UVec2) -> UVec2 {
     let place = at.y * ACROSS + at.x / TEXELS;
     let mut texel = map;
-    if place < listed.tiles {
-        let across = tiles_of(map.x);
-        let tile = list.get(within(place as i32, list.len()));
+    if (place < listed.tiles) & (place < list.len()) {
+        let tile = list.get(place);
         let inside = at.x % TEXELS;
         texel = UVec2::new(
-            EDGE * (tile % across) + inside % EDGE,
-            EDGE * (tile / across) + inside / EDGE,
+            EDGE * (tile & 0xffff) + inside % EDGE,
+            EDGE * (tile >> 16) + inside / EDGE,
         );
     }
     texel
@@ -225,7 +230,9 @@ fn texel(at: UVec2, listed: &Listed, list: Buffer<'_, u32>, map: UVec2) -> UVec2
 pub fn resolve_symmetric_tiles(
     #[index] at: UVec2,
     #[uniform] listed: &Listed,
-    #[storage] list: Buffer<'_, u32>,
+    #[storage]
+    #[distinct]
+    list: Buffer<'_, u32>,
     #[constant(id = 0, default = 4)]
     #[values(1, 4)]
     samples: u32,
@@ -255,7 +262,9 @@ pub fn resolve_symmetric_tiles(
 pub fn blur_tiles(
     #[index] at: UVec2,
     #[uniform] listed: &Listed,
-    #[storage] list: Buffer<'_, u32>,
+    #[storage]
+    #[distinct]
+    list: Buffer<'_, u32>,
     #[uniform] direction: &Direction,
     #[storage]
     #[length(1..=7)]

@@ -212,6 +212,8 @@ pub enum Domain {
     },
     /// The vector's length is 1.
     UnitVector,
+    /// Integers of a buffer of which no two are alike.
+    Distinct,
     /// How many elements a buffer, or texels a texture, has.
     CountOf {
         /// The parameter.

@@ -53,6 +53,15 @@ fn tiles(reach: i32) -> Vec<Bounds> {
         .collect()
 }
 
+/// Depths of several samples.
+#[must_use]
+pub fn depths(request: &Request) -> Vec<Given> {
+    let across = across();
+    let all = maps::depths(request).into_iter();
+    all.map(|given| given.uniform("tiles", &Tiles { across }))
+        .collect()
+}
+
 /// Depths of tiles: of the scene, which fills its map, and of maps that casters hardly touch.
 #[must_use]
 pub fn of_depths(request: &Request) -> Vec<Given> {
@@ -92,16 +101,14 @@ pub fn of_depths(request: &Request) -> Vec<Given> {
 
 /// A list of two rows of workgroups: every other tile of the map, among others that lie beyond it.
 fn with_list(given: Given) -> Given {
-    let count = across().x * across().y;
+    let across = across();
     let tiles = ACROSS + 9;
     // One more than is listed, which is not to be looked at.
     let list: Vec<u32> = (0..=tiles)
         .map(|place| {
-            if place % 13 == 0 {
-                place / 13
-            } else {
-                count + place
-            }
+            let (i, is_beyond) = (place / 13, u32::from(place % 13 != 0));
+            let beyond = is_beyond * (across.y + place);
+            (i % across.x) | ((i / across.x + beyond) << 16)
         })
         .collect();
     let listed = Listed {
