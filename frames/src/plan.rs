@@ -568,11 +568,9 @@ fn blind(configurations: &[Configuration], scene: &Scene, mesh: &Mesh) -> Result
         // It is the same for all sizes.
         if let Entry::Vacant(method) = seen.entry(c.method()) {
             let (graph, ..) = graph(&c.on(scene), mesh, Show::Light)?;
-            let omitted = graph.omitted().iter();
-            let why = omitted
-                .filter(|o| o.what == TRANSLUCENT)
-                .map(|o| o.why.clone());
-            method.insert(why.last());
+            let mut omitted = graph.omitted().iter();
+            let why = omitted.find(|o| o.what == TRANSLUCENT);
+            method.insert(why.map(|o| o.why.clone()));
         }
     }
     let blind = seen.into_iter().filter_map(|(method, why)| {

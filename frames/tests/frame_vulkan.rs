@@ -10,10 +10,10 @@ use hankel_frames::scene::Scene;
 use hankel_frames::{Comparison, Quiet, compare, techniques};
 
 fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
-    let eye = if geometry == "box" {
-        "[1.9, 1.6, 3.1]"
-    } else {
-        "[7.4, 6.2, 12.4]"
+    let eye = match geometry {
+        "box" => "[1.9, 1.6, 3.1]",
+        "glass" => "[3.4, 2.6, 4.6]",
+        _ => "[7.4, 6.2, 12.4]",
     };
     let text = format!(
         r#"

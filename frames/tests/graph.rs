@@ -14,8 +14,9 @@ use hankel_shadows::depth::Transform;
 use hankel_shadows::shade::Light;
 
 fn kernels() -> Vec<Entry> {
-    let mut all = hankel_shadows::entries();
-    all.extend(hankel_conformance::entries());
+    // Of two with one name the first is found: both crates have a `tint`.
+    let mut all = hankel_conformance::entries();
+    all.extend(hankel_shadows::entries());
     all
 }
 
