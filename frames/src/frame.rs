@@ -146,6 +146,31 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         format,
         background: [r, g, b, 1.0],
     };
+    for (value, meaning) in [
+        (given.positions, "Positions of the vertices in world space."),
+        (
+            given.normals,
+            "Unit normals of the vertices in world space.",
+        ),
+        (given.colours, "Colours of the vertices, linear."),
+        (given.indices, "Three vertices for each triangle."),
+        (
+            given.light_view,
+            "From world space to the clip space of the shadow map.",
+        ),
+        (
+            given.camera,
+            "From world space to the clip space of the picture.",
+        ),
+        (
+            given.light,
+            "The light, and how its shadow map is read. The rows follow from the transform to the shadow \
+             map's clip space: u and v are half of x and of -y plus a half, depth is z.",
+        ),
+        (given.area, "The light's area, as its shadow map sees it."),
+    ] {
+        graph.describe(value, meaning);
+    }
     let picture = (scene.shadow.technique.add)(&mut graph, &given)?;
     graph.keep(picture);
     Ok((graph, given, picture))

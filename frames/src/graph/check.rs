@@ -226,6 +226,19 @@ impl Graph {
         }
     }
 
+    /// How many invocations of a compute kernel run along x, y, z, with what is given at first.
+    pub(crate) fn invocations(&self, call: &Call) -> [u32; 3] {
+        let kernel = &self.kernels[call.kernel].kernel;
+        let slots = slots::slots(kernel);
+        let given: Vec<Given<'_>> = slots
+            .iter()
+            .zip(&call.args)
+            .map(|(slot, argument)| self.seen(slot, argument))
+            .collect();
+        // It was found when the pass was added.
+        extent::extent(kernel, &slots, &given).unwrap_or_default()
+    }
+
     /// Checks a compute kernel's call, or a stage's.
     pub(super) fn check(&self, place: Place<'_>, call: &Call) -> Result<()> {
         let kernel = &self.kernels[call.kernel].kernel;

@@ -33,6 +33,7 @@ mod check;
 mod print;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -254,6 +255,8 @@ pub struct Graph {
     passes: Vec<Pass>,
     kept: Vec<Handle>,
     omitted: Vec<Omission>,
+    /// What given values are, by their numbers.
+    meanings: BTreeMap<u32, Cow<'static, str>>,
 }
 
 impl Graph {
@@ -268,6 +271,7 @@ impl Graph {
             passes: Vec::new(),
             kept: Vec::new(),
             omitted: Vec::new(),
+            meanings: BTreeMap::new(),
         }
     }
 
@@ -410,6 +414,25 @@ impl Graph {
         if !self.kept.contains(&value) {
             self.kept.push(value);
         }
+    }
+
+    /// Says what a given value is, to those who will give others in its place.
+    ///
+    /// # Panics
+    /// For another graph's handle.
+    pub fn describe(&mut self, value: Handle, meaning: impl Into<Cow<'static, str>>) {
+        assert!(
+            value.graph == self.number,
+            "this handle belongs to another graph"
+        );
+        self.meanings.insert(value.index, meaning.into());
+    }
+
+    /// What a given value is, if that was said.
+    #[must_use]
+    pub fn meaning(&self, value: Handle) -> Option<&str> {
+        self.value(value)?;
+        self.meanings.get(&value.index).map(|meaning| &**meaning)
     }
 
     /// Notes what a technique leaves out, and why; the same is noted once.
