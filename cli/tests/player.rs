@@ -30,8 +30,9 @@ width = 96
 height = 64
 "#;
 
-/// Share of the pixels that may differ by more than 1/255: drivers may contract the arithmetic of the
-/// WGSL otherwise than that of the SPIR-V, which shows where a depth is compared with itself.
+/// Share of the pixels that may differ by more than 1/255. SPIR-V forbids drivers to contract sums where
+/// a kernel asks for it, WGSL cannot, and where a bound is steep the last bit shows: in this scene with
+/// `soft` 0.3 % of the pixels differ, and 0.7 % between the native picture and that of Vulkan.
 const ROUNDED: f64 = 0.005;
 
 fn json(desk: &Desk, file: &str) -> Value {
