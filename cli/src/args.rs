@@ -159,6 +159,8 @@ Examples:
   hankel build --out shaders --hlsl-space 2 --wgsl-group 1 --msl-slot-base 8 --bindings places.toml
   hankel build --out shaders --manifest-path my-kernels/Cargo.toml
   hankel build --form functions --out libraries
+  hankel build --scene scenes/fence.toml --out frame
+  hankel build --scene scenes/fence.toml --technique auto --error 0.1 --target wgsl --out frame
 
 The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. Files that are right already
 are left alone. A build that was stopped is finished by the next one.
@@ -171,11 +173,17 @@ The file of --bindings puts single bindings elsewhere, with names as in manifest
   glsl = { binding = 3 }
   essl310 = { binding = 1 }
 
+With --scene it gets the shaders of that scene's frame only, their constants frozen, frame.json, which says
+how to run them in another engine, and what buffers hold in frame/NAME.bin.
+
 With --form functions it gets FORM/PREFIX_LIBRARY.EXTENSION, libraries of functions to include and call,
 and functions.json, for each form: wgsl, naga-oil, wesl, hlsl, glsl, godot, msl, tsl, slang, c, rust.")]
 pub struct Build {
     #[command(flatten)]
     pub generate: Generate,
+    #[cfg(feature = "frames")]
+    #[command(flatten)]
+    pub frame: OfScene,
     /// What is generated: shaders with entry points, or libraries of functions.
     #[arg(long, value_enum, default_value_t)]
     pub form: Form,
@@ -216,6 +224,7 @@ pub enum Form {
 Examples:
   hankel check shaders
   hankel check shaders --budget hankel.toml --format json
+  hankel check frame --scene scenes/fence.toml
 
 A budget is a TOML file:
   [budget]
@@ -234,6 +243,15 @@ pub struct Check {
     pub folder: PathBuf,
     #[command(flatten)]
     pub generate: Generate,
+    /// The scene (TOML) whose frame the folder holds.
+    #[cfg(feature = "frames")]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// With --scene: the technique that the frame was built with, if not the scene's; `auto`: the one
+    /// that a plan chose then, as frame.json has it.
+    #[cfg(feature = "frames")]
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub technique: Option<String>,
     /// Limits of the kernels' cost [default: hankel.toml in the present folder, if there is one].
     #[arg(long, value_name = "FILE")]
     pub budget: Option<PathBuf>,
@@ -523,6 +541,28 @@ pub struct Render {
     pub format: Format,
 }
 
+/// The frame of a scene, to be built.
+#[cfg(feature = "frames")]
+#[derive(Debug, Args)]
+pub struct OfScene {
+    /// Write the shaders of the frame of this scene (TOML) only, and frame.json.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// With --scene: the technique, whatever the scene says; `auto`: the fastest within --error, as
+    /// `hankel plan` finds it for the backend, with its map's size, filter and format.
+    #[arg(long, value_name = "NAME", requires = "scene")]
+    pub technique: Option<String>,
+    /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
+    /// --filter and --fit are what is chosen from.
+    #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
+    pub error: Option<f64>,
+    /// With --technique auto: where the frame will run [default: native].
+    #[arg(long, value_enum, requires = "error")]
+    pub backend: Option<Backend>,
+    #[command(flatten)]
+    pub maps: Maps,
+}
+
 /// Ways to make shadows.
 #[cfg(feature = "frames")]
 #[derive(Debug, Args)]
@@ -551,6 +591,14 @@ pub struct Maps {
     /// [default: both].
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     pub fit: Vec<Fitted>,
+}
+
+#[cfg(feature = "frames")]
+impl Maps {
+    /// Whether nothing was said of them.
+    pub const fn is_empty(&self) -> bool {
+        self.size.is_empty() && self.filter.is_empty() && self.fit.is_empty()
+    }
 }
 
 /// What a shadow map holds.

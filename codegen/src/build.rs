@@ -23,6 +23,7 @@ use crate::error::{Error, Failure, Result, Step};
 use crate::files::sha256;
 use crate::finish::{self, Finished};
 use crate::folder::{Change, Folder, Found, Owned};
+use crate::frame;
 use crate::headers::{self, InWgsl, Layouts};
 use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
@@ -168,6 +169,7 @@ impl Request {
                 of: kernel.name.clone(),
                 kernel: (*kernel).clone(),
                 options: self.options.clone(),
+                set: 0,
             });
             jobs.extend(copies.map(|(suffix, values)| {
                 let name = format!("{}{suffix}", kernel.name);
@@ -181,6 +183,7 @@ impl Request {
                         ..(*kernel).clone()
                     },
                     options,
+                    set: 0,
                 }
             }));
         }
@@ -195,8 +198,17 @@ impl Request {
         }
     }
 
-    /// Hash of everything that the files follow from.
-    fn inputs_sha256(&self, chosen: &[&Kernel], spirv: &BTreeMap<&str, String>) -> String {
+    /// Hash of everything that the files follow from; `beside` are those that are no shaders.
+    fn inputs_sha256(
+        &self,
+        chosen: &[&Kernel],
+        spirv: &BTreeMap<&str, String>,
+        beside: &[(String, Vec<u8>)],
+    ) -> String {
+        let beside: BTreeMap<&str, String> = beside
+            .iter()
+            .map(|(path, bytes)| (path.as_str(), sha256(bytes)))
+            .collect();
         let options = WriteOptions::of(&self.options);
         let versions = Versions::with(&self.rust_gpu);
         let inputs = (
@@ -208,6 +220,7 @@ impl Request {
             versions,
             env!("HANKEL_CODEGEN_SHA256"),
             spirv,
+            beside,
         );
         // Nothing in it can fail to become JSON.
         sha256(&serde_json::to_vec(&inputs).unwrap_or_default())
@@ -215,13 +228,15 @@ impl Request {
 }
 
 /// A kernel that is written: itself, or once more with constants fixed and under another name.
-struct Variant {
+pub(crate) struct Variant {
     /// The kernel whose module it has.
-    of: String,
+    pub of: String,
     /// With the name that is written.
-    kernel: Kernel,
+    pub kernel: Kernel,
     /// With the constants' values.
-    options: Options,
+    pub options: Options,
+    /// Descriptor set of its bindings in the SPIR-V that is written.
+    pub set: u32,
 }
 
 fn has_all(kernel: &Kernel, values: &BTreeMap<String, u32>) -> bool {
@@ -230,7 +245,7 @@ fn has_all(kernel: &Kernel, values: &BTreeMap<String, u32>) -> bool {
         .all(|name| constants(kernel).any(|constant| constant == name))
 }
 
-fn constants(kernel: &Kernel) -> impl Iterator<Item = &str> {
+pub(crate) fn constants(kernel: &Kernel) -> impl Iterator<Item = &str> {
     kernel
         .params
         .iter()
@@ -276,10 +291,22 @@ pub(crate) fn collect<T, C: FromIterator<T>>(results: Vec<Result<T, Failure>>) -
 /// The request asks for what is not there, or kernels fail: all of those are named.
 pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
     let chosen = request.chosen()?;
+    let jobs = request.jobs(&chosen);
+    assemble(request, &chosen, &jobs, modules, |_| Ok(Files::new()))
+}
+
+/// Makes the files of `jobs`, which are copies of the kernels `chosen`, and what `beside` makes of their
+/// entries in the manifest.
+pub(crate) fn assemble(
+    request: &Request,
+    chosen: &[&Kernel],
+    jobs: &[Variant],
+    modules: &Modules,
+    beside: impl FnOnce(&BTreeMap<String, KernelEntry>) -> Result<Files>,
+) -> Result<Generated> {
     let all: Vec<Kernel> = chosen.iter().map(|kernel| (*kernel).clone()).collect();
     let layouts = Layouts::of(&all);
     let targets = request.targets();
-    let jobs = request.jobs(&chosen);
     let results: Vec<Result<_, Failure>> = jobs
         .par_iter()
         .map(|job| one(job, modules, &targets, &layouts))
@@ -306,11 +333,14 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
         sha256: sha256(bytes),
         bytes: bytes.len() as u64,
     };
+    let beside = beside(&kernels)?;
+    let inputs_sha256 = request.inputs_sha256(chosen, &spirv, &beside);
+    files.extend(beside);
     let manifest = Manifest {
         format: manifest::FORMAT,
         made_by: Versions::with(&request.rust_gpu),
         crate_name: request.crate_name.clone(),
-        inputs_sha256: request.inputs_sha256(&chosen, &spirv),
+        inputs_sha256,
         options: WriteOptions::of(&request.options),
         kernels,
         layouts: manifest::layouts(&layouts),
@@ -324,7 +354,7 @@ pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
 }
 
 /// Paths and contents.
-type Files = Vec<(String, Vec<u8>)>;
+pub(crate) type Files = Vec<(String, Vec<u8>)>;
 
 /// A kernel as naga reads it, as often as it is asked for.
 struct Readings<'a> {
@@ -365,6 +395,7 @@ fn one(
         of,
         kernel,
         options,
+        set,
     } = job;
     let open = open_module(of, kernel, modules, options)?;
     let mut entry = manifest::entry(kernel, layouts, options, open.cost);
@@ -391,18 +422,23 @@ fn one(
         };
         if language == Language::Spirv {
             for binding in &mut entry.bindings {
+                binding.set = *set;
                 let place = Place {
                     name: Some(binding.name.clone()),
                     class: "binding".into(),
                     index: Some(binding.binding),
-                    space: Some(0),
+                    space: Some(*set),
                     block: None,
                     combined_with: Vec::new(),
                 };
                 binding.places.insert(language, place);
             }
             entry.languages.insert(language, file);
-            files.push((path, open.spirv.clone()));
+            let module = match set {
+                0 => open.spirv.clone(),
+                _ => frame::in_set(&open.spirv, &kernel.name, *set)?,
+            };
+            files.push((path, module));
             continue;
         }
         // Only WGSL can express a specialisation constant: the others get its value before
@@ -503,7 +539,15 @@ fn open_module(
 /// cannot be written. Nothing is written unless everything could be made. A build that is stopped
 /// while it writes is finished by the next one.
 pub fn build(request: &Request, modules: &Modules, out: &Path, force: bool) -> Result<Report> {
-    let generated = generate(request, modules)?;
+    write(&generate(request, modules)?, out, force)
+}
+
+/// Writes what was made into the folder `out`, as [`build`] does.
+///
+/// # Errors
+///
+/// A file that hankel did not write is in the way, unless `force`; a file cannot be written.
+pub fn write(generated: &Generated, out: &Path, force: bool) -> Result<Report> {
     let folder = Folder::create(out)?;
     let owned = written_before(&folder)?;
     let change = folder.update(&generated.files, MANIFEST_FILE, owned, force)?;

@@ -11,6 +11,7 @@ use crate::build::Generated;
 use crate::error::{Error, Failure, Result};
 use crate::finish;
 use crate::folder::{Folder, Found, STAGE, SUBFOLDERS};
+use crate::frame::{CONTENTS, FRAME_FILE};
 use crate::lint::Finding;
 use crate::manifest::KernelEntry;
 use crate::spirv;
@@ -290,7 +291,12 @@ fn diff(name: &str, there: &[u8], expected: &[u8]) -> String {
 /// business; hidden files are an editor's or the system's.
 fn extra(folder: &Folder, generated: &Generated) -> Result<Vec<String>> {
     let mut extra = Vec::new();
+    let has_frame = generated.files.contains_key(FRAME_FILE);
     for sub in SUBFOLDERS {
+        // A name that others may use, too.
+        if sub == CONTENTS && !has_frame {
+            continue;
+        }
         for file in folder.files_in(sub)? {
             let name = format!("{sub}/{file}");
             if !file.starts_with('.') && !generated.files.contains_key(&name) {

@@ -275,6 +275,14 @@ pub enum Error {
         /// What is wrong.
         problem: String,
     },
+    /// A frame that cannot be written.
+    #[error("{what}: {problem}")]
+    Frame {
+        /// The pass, shader or buffer.
+        what: String,
+        /// Why not, and what to do.
+        problem: String,
+    },
     /// hankel.toml is wrong.
     #[error("{}: {problem}", path.display())]
     Budget {
@@ -398,6 +406,7 @@ impl Error {
             | Self::NotAFile { .. }
             | Self::UnknownTarget { .. }
             | Self::Option { .. }
+            | Self::Frame { .. }
             | Self::Budget { .. }
             | Self::Scaffold { .. } => return None,
         })

@@ -25,6 +25,7 @@ use cap_std::fs::{Dir, FileType, OpenOptions};
 use crate::Language;
 use crate::error::{During, Error, Result};
 use crate::files::sha256;
+use crate::frame::{CONTENTS, FRAME_FILE};
 use crate::functions::FORMS;
 
 /// Where a change is prepared.
@@ -39,14 +40,15 @@ pub(crate) const MOST_BYTES: u64 = 64 << 20;
 /// How long to wait for another process that changes the folder. It does so for milliseconds.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Folders of a build: one for each language, and the headers'.
-pub(crate) const SUBFOLDERS: [&str; Language::ALL.len() + 1] = {
-    let mut names = ["include"; Language::ALL.len() + 1];
+/// Folders of a build: one for each language, the headers', and that of a frame's buffers.
+pub(crate) const SUBFOLDERS: [&str; Language::ALL.len() + 2] = {
+    let mut names = ["include"; Language::ALL.len() + 2];
     let mut i = 0;
     while i < Language::ALL.len() {
         names[i] = Language::ALL[i].name();
         i += 1;
     }
+    names[i] = CONTENTS;
     names
 };
 
@@ -454,7 +456,7 @@ fn can_be_removed(name: &str) -> bool {
     let plain = !file.contains(['/', '\\']) && !file.starts_with('.');
     plain
         && match folder {
-            None => file.ends_with(".spv"),
+            None => file.ends_with(".spv") || file == FRAME_FILE,
             Some(folder) => {
                 SUBFOLDERS.contains(&folder) || FORMS.iter().any(|form| form.name == folder)
             }

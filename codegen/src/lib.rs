@@ -26,6 +26,7 @@ pub mod files;
 pub mod finish;
 pub mod finished;
 mod folder;
+pub mod frame;
 pub mod functions;
 mod gather;
 pub mod headers;

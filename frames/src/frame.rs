@@ -169,6 +169,48 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         background: [r, g, b, 1.0],
         is_tinted: show == Show::Picture,
     };
+    for (value, meaning) in [
+        (given.positions, "Positions of the vertices in world space."),
+        (
+            given.normals,
+            "Unit normals of the vertices in world space.",
+        ),
+        (given.colours, "Colours of the vertices, linear."),
+        (given.indices, "Three vertices for each triangle."),
+        (
+            given.light_view,
+            "From world space to the clip space of the shadow map.",
+        ),
+        (
+            given.camera,
+            "From world space to the clip space of the picture.",
+        ),
+        (
+            given.light,
+            "The light, and how its shadow map is read. The rows follow from the transform to the shadow \
+             map's clip space: u and v are half of x and of -y plus a half, depth is z.",
+        ),
+        (given.area, "The light's area, as its shadow map sees it."),
+    ] {
+        graph.describe(value, meaning);
+    }
+    if let Some(volume) = given.volume {
+        for (value, meaning) in [
+            (volume.view, "How pixels look into the world; it follows from the camera."),
+            (volume.medium, "What scatters between surfaces."),
+            (
+                volume.rectified,
+                "Coordinates in which rays from the camera are rows of the shadow map; they follow from the camera \
+                 and the light.",
+            ),
+            (
+                volume.extinctions,
+                "Of each such row the extinction per unit of radius; it follows from the camera and the light.",
+            ),
+        ] {
+            graph.describe(value, meaning);
+        }
+    }
     let mut picture = (scene.shadow.technique.add)(&mut graph, &given)?;
     match (&scene.medium, given.volume) {
         (Some(medium), Some(volume)) => {

@@ -13,6 +13,7 @@
 
 mod error;
 mod executor;
+mod export;
 mod frame;
 pub mod graph;
 pub mod measure;
@@ -28,6 +29,7 @@ mod volume;
 
 pub use error::{FrameError, Result};
 pub use executor::{Clock, Executor, Memory, NoShaders, Progress, Quiet, Run, Shaders, Timing};
+pub use export::{export, recorded};
 pub use frame::{
     AMPLIFICATION, Comparison, Frame, Rendering, Show, compare, graph as graph_of, render,
     render_on,

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use hankel_codegen::Language;
-use hankel_codegen::build::{MANIFEST_FILE, build, check_output};
+use hankel_codegen::build::{MANIFEST_FILE, Report, build, check_output};
 use hankel_codegen::functions::api;
 use hankel_system::output::Output;
 
@@ -16,6 +16,17 @@ use crate::session::Session;
 use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
+    #[cfg(feature = "frames")]
+    match &args.frame.scene {
+        Some(scene) => return super::frame::build(args, scene, quiet),
+        None if !args.frame.maps.is_empty() => {
+            return Err(Failure::input(
+                "--size, --filter and --fit are for the maps of a scene",
+                "Give the scene with --scene, and --technique auto --error 0.05.",
+            ));
+        }
+        None => {}
+    }
     if args.form == Form::Functions
         && let Some(option) = of_shaders_alone(args)
     {
@@ -80,14 +91,20 @@ fn once(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
         Form::Functions => (functions::build(args, quiet)?, api::FILE),
         Form::Kernels => (shaders(args, quiet)?, MANIFEST_FILE),
     };
+    depend(args, record, &inputs)?;
+    Ok(inputs)
+}
+
+/// Writes what the file `record` of the output follows from, if that was asked for.
+pub fn depend(args: &Build, record: &str, inputs: &[PathBuf]) -> Result<()> {
     if let Some(file) = &args.depfile {
         let record = args.out.join(record);
-        let text = depfile::rule(&record, &inputs);
+        let text = depfile::rule(&record, inputs);
         Output::create(file, &[])?.finish(text.as_bytes())?;
         // Make compares times: a record that stays as it was must not be older than its inputs.
         touch(&record)?;
     }
-    Ok(inputs)
+    Ok(())
 }
 
 /// The file with places of bindings, as an absolute path.
@@ -122,12 +139,18 @@ fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
         true => [session.inputs()?, places(args)?].concat(),
         false => Vec::new(),
     };
+    tell(args, &report, quiet);
+    Ok(inputs)
+}
+
+/// Prints what a build did.
+pub fn tell(args: &Build, report: &Report, quiet: bool) {
     if args.format == Format::Json {
-        print::json(&report);
-        return Ok(inputs);
+        print::json(report);
+        return;
     }
     if quiet {
-        return Ok(inputs);
+        return;
     }
     say!(
         "{}: {} kernels, {} files written, {} unchanged, {} removed",
@@ -145,5 +168,4 @@ fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     for ((language, why), kernels) in missing {
         say!("no {language} of {}: {why}", kernels.join(", "));
     }
-    Ok(inputs)
 }

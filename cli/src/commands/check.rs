@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use hankel_codegen::build::generate;
+use hankel_codegen::build::{Generated, generate};
 use hankel_codegen::check::{Config, check};
 
 use super::functions;
@@ -35,11 +35,7 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
         }
         None => Config::default().budget,
     };
-    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
-    let request = session.request(&args.generate)?;
-    // What is wrong with the request is told before anything is compiled.
-    request.chosen()?;
-    let generated = generate(&request, &session.modules()?)?;
+    let generated = expected(args, quiet)?;
     let report = check(&generated, &args.folder, &budget)?;
     if args.format == Format::Json {
         print::json(&report);
@@ -47,4 +43,20 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
         say!("{report}");
     }
     Ok(Outcome::of(report.is_fine()))
+}
+
+/// What the folder must hold.
+fn expected(args: &Check, quiet: bool) -> Result<Generated> {
+    #[cfg(feature = "frames")]
+    {
+        if let Some(scene) = &args.scene {
+            return super::frame::expected(args, scene, quiet);
+        }
+        super::frame::refuse_without_scene(args)?;
+    }
+    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
+    let request = session.request(&args.generate)?;
+    // What is wrong with the request is told before anything is compiled.
+    request.chosen()?;
+    Ok(generate(&request, &session.modules()?)?)
 }

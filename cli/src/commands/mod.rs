@@ -6,6 +6,8 @@ pub mod completions;
 pub mod diff;
 pub mod doctor;
 pub mod eval;
+#[cfg(feature = "frames")]
+pub mod frame;
 pub mod functions;
 pub mod list;
 pub mod new;
@@ -15,4 +17,6 @@ pub mod plan;
 #[cfg(feature = "frames")]
 pub mod render;
 pub mod sanitize;
+#[cfg(feature = "frames")]
+pub mod scene;
 pub mod toolchain;

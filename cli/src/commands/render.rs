@@ -2,23 +2,19 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hankel_frames::graph::Summary;
-use hankel_frames::plan::Wanted;
-use hankel_frames::scene::{Geometry, Scene, Shadow};
+use hankel_frames::scene::{Geometry, Scene};
 use hankel_frames::truth::{Measured, measure};
 use hankel_frames::{Difference, Memory, Picture, Rendering, Timing, compare, render};
 use hankel_host::device::Backend;
 use hankel_system::output::{self, Output};
 use serde::Serialize;
 
-use crate::args::{Format, Maps, Render};
-use crate::commands::plan::{of_maps, of_scene, technique};
-use crate::failure::{Failure, Outcome, Result};
+use crate::args::{Format, Render};
+use crate::commands::scene::Asked;
+use crate::failure::{Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
 use crate::session::Session;
-
-/// The technique that a plan chooses.
-const AUTO: &str = "auto";
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -38,32 +34,13 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
-    let mut scene = Scene::read(&args.scene)?;
-    let is_planned = match args.technique.as_deref() {
-        Some(AUTO) => true,
-        Some(name) => {
-            let technique = technique(name)?;
-            let Shadow {
-                size, filter, fit, ..
-            } = scene.shadow;
-            scene.shadow = Shadow {
-                size,
-                filter,
-                fit,
-                ..Shadow::of(technique, technique.maps[0])
-            };
-            false
-        }
-        None => false,
+    let asked = Asked {
+        technique: args.technique.as_deref(),
+        error: args.error,
+        maps: &args.maps,
+        backend: args.backend,
     };
-    let Maps { size, filter, fit } = &args.maps;
-    let has_maps = !(size.is_empty() && filter.is_empty() && fit.is_empty());
-    if is_planned != args.error.is_some() || (has_maps && !is_planned) {
-        return Err(Failure::input(
-            "--technique auto needs --error, and --error, --size, --filter and --fit need --technique auto",
-            "Write --technique auto --error 0.05, or a technique's name: then the scene file says the rest.",
-        ));
-    }
+    let scene = asked.read(&args.scene)?;
     let pictures = if args.compare {
         let (vulkan, difference) = (beside(&args.out, "vulkan"), beside(&args.out, "difference"));
         vec![args.out.clone(), vulkan, difference]
@@ -78,27 +55,9 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
     // Whether they can be written shows before the long work starts.
     let outputs = output::create_all(&places, &inputs)?;
     let session = Session::linked(quiet);
-    if let Some(error) = args.error {
-        let wanted = Wanted {
-            error,
-            seconds: None,
-            bytes: None,
-        };
-        let quiet = quiet || args.format == Format::Json;
-        let (mesh, choices) = (scene.mesh()?, of_maps(&args.maps));
-        match of_scene(&scene, &mesh, &choices, wanted, args.backend, quiet)? {
-            Ok(plan) => {
-                if !quiet {
-                    say!("{plan}");
-                }
-                scene = plan.scene;
-            }
-            Err(none) => {
-                print::note(format_args!("{none}"));
-                return Ok(Outcome::CheckFailed);
-            }
-        }
-    }
+    let Some(scene) = asked.planned(scene, quiet || args.format == Format::Json)? else {
+        return Ok(Outcome::CheckFailed);
+    };
     let mut progress = Progress::new(quiet || args.format == Format::Json);
     if !args.compare {
         let backend = Backend::from(args.backend);

@@ -76,6 +76,7 @@ impl Named {
             kernel,
             args,
             constants: self.constants(graph, place, kernel)?,
+            most: None,
         })
     }
 
@@ -158,6 +159,7 @@ pub struct AddCompute<'g> {
     label: Cow<'static, str>,
     call: Named,
     sizes: Vec<Size>,
+    most: Option<[u32; 3]>,
     note: Option<String>,
 }
 
@@ -173,6 +175,7 @@ impl Graph {
             label: label.into(),
             call: Named::new(kernel),
             sizes: Vec::new(),
+            most: None,
             note: None,
         }
     }
@@ -228,6 +231,12 @@ impl AddCompute<'_> {
     /// The next output is a buffer of so many elements.
     pub fn of(mut self, elements: usize) -> Self {
         self.sizes.push(Size::Elements(elements));
+        self
+    }
+
+    /// Says how far a kernel runs at most along x, y, z, if an earlier pass says how far in a buffer.
+    pub const fn at_most(mut self, invocations: [u32; 3]) -> Self {
+        self.most = Some(invocations);
         self
     }
 
@@ -288,6 +297,7 @@ impl AddCompute<'_> {
         let graph = self.graph;
         let place = self.call.place(&self.label);
         let mut call = self.call.call(graph, &self.label, "compute")?;
+        call.most = self.most;
         let kernel = graph.kernels[call.kernel].kernel.clone();
         if kernel.outputs.len() != self.sizes.len() {
             return Err(place.kernel(format!(

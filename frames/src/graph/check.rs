@@ -5,8 +5,9 @@ use std::fmt;
 use hankel_dsl::glam::{Vec3, Vec4};
 use hankel_dsl::native::describe::{Domain, Kernel, Layout, Output, Role, Scalar, Stage, Type};
 use hankel_dsl::native::layout::Element;
+use hankel_host::device::extent::{self, Extent};
 use hankel_host::device::slots::{self, Given, Slot, Use};
-use hankel_host::device::{Blend, DeviceError, TextureShape, extent};
+use hankel_host::device::{Blend, DeviceError, TextureShape};
 use hankel_shadows::depth::Transform;
 
 use super::{Argument, Call, Graph, Handle, Origin, Result, Shape, Surfaces};
@@ -235,6 +236,48 @@ impl Graph {
         }
     }
 
+    /// How many invocations of a compute kernel run along x, y, z, with what is given at first.
+    pub(crate) fn invocations(&self, call: &Call) -> [u32; 3] {
+        let kernel = &self.kernels[call.kernel].kernel;
+        let slots = slots::slots(kernel);
+        let given: Vec<Given<'_>> = slots
+            .iter()
+            .zip(&call.args)
+            .map(|(slot, argument)| self.seen(slot, argument))
+            .collect();
+        // Both were found when the pass was added.
+        match extent::extent(kernel, &slots, &given) {
+            Ok(Extent::Known(extent)) => extent,
+            _ => call.most.unwrap_or_default(),
+        }
+    }
+
+    /// Where a buffer that a pass writes says how far a compute kernel runs: it, where its numbers begin in bytes,
+    /// and how many they are.
+    pub(crate) fn said_in(&self, call: &Call) -> Option<(Handle, u32, u32)> {
+        let kernel = &self.kernels[call.kernel].kernel;
+        let slots = slots::slots(kernel);
+        let given: Vec<Given<'_>> = slots
+            .iter()
+            .zip(&call.args)
+            .map(|(slot, argument)| self.seen(slot, argument))
+            .collect();
+        match (extent::extent(kernel, &slots, &given), &call.args) {
+            (
+                Ok(Extent::InBuffer {
+                    slot,
+                    offset,
+                    dimensions,
+                }),
+                args,
+            ) => match args[slot] {
+                Argument::Value(handle) => Some((handle, offset, dimensions)),
+                Argument::Sampler(_) => None,
+            },
+            _ => None,
+        }
+    }
+
     /// Checks a compute kernel's call, or a stage's.
     pub(super) fn check(&self, place: Place<'_>, call: &Call) -> Result<()> {
         let kernel = &self.kernels[call.kernel].kernel;
@@ -254,7 +297,22 @@ impl Graph {
         }
         slots::check(kernel, &slots, &given).map_err(|e| place.device(&slots, e))?;
         if is_compute {
-            extent::extent(kernel, &slots, &given).map_err(|e| place.device(&slots, e))?;
+            let extent = extent::extent(kernel, &slots, &given);
+            let extent = extent.map_err(|e| place.device(&slots, e))?;
+            match (extent, call.most) {
+                (Extent::InBuffer { slot, .. }, None) => {
+                    return Err(place.argument(
+                        &slots[slot].name,
+                        "a pass writes how far the kernel runs: say how far at most with `at_most`",
+                    ));
+                }
+                (Extent::Known(_), Some(_)) => {
+                    return Err(place.kernel(
+                        "it is known how far it runs: leave `at_most` out",
+                    ));
+                }
+                _ => {}
+            }
         }
         Ok(())
     }

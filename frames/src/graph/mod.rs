@@ -33,6 +33,7 @@ mod check;
 mod print;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -168,6 +169,8 @@ pub struct Call {
     pub args: Vec<Argument>,
     /// Values of the specialisation constants, in the order of the parameters.
     pub constants: Vec<u32>,
+    /// Where a buffer says how far a compute kernel runs: no farther than this along x, y, z.
+    pub most: Option<[u32; 3]>,
 }
 
 /// What a draw is made of: triangles, and the transform by which its vertex kernel puts them into
@@ -259,6 +262,8 @@ pub struct Graph {
     passes: Vec<Pass>,
     kept: Vec<Handle>,
     omitted: Vec<Omission>,
+    /// What given values are, by their numbers.
+    meanings: BTreeMap<u32, Cow<'static, str>>,
 }
 
 impl Graph {
@@ -273,6 +278,7 @@ impl Graph {
             passes: Vec::new(),
             kept: Vec::new(),
             omitted: Vec::new(),
+            meanings: BTreeMap::new(),
         }
     }
 
@@ -455,6 +461,25 @@ impl Graph {
         if !self.kept.contains(&value) {
             self.kept.push(value);
         }
+    }
+
+    /// Says what a given value is, to those who will give others in its place.
+    ///
+    /// # Panics
+    /// For another graph's handle.
+    pub fn describe(&mut self, value: Handle, meaning: impl Into<Cow<'static, str>>) {
+        assert!(
+            value.graph == self.number,
+            "this handle belongs to another graph"
+        );
+        self.meanings.insert(value.index, meaning.into());
+    }
+
+    /// What a given value is, if that was said.
+    #[must_use]
+    pub fn meaning(&self, value: Handle) -> Option<&str> {
+        self.value(value)?;
+        self.meanings.get(&value.index).map(|meaning| &**meaning)
     }
 
     /// Notes what a technique leaves out, and why; the same is noted once.

@@ -6,7 +6,7 @@ use hankel_dsl::glam::{IVec2, UVec2, Vec4};
 use hankel_host::device::TextureShape;
 use hankel_moments::{Moments4, quantize_symmetric_4};
 use hankel_shadows::blur::Direction;
-use hankel_shadows::tiles::{EDGE, Listed, Tiles, tiles_of};
+use hankel_shadows::tiles::{ACROSS, EDGE, Listed, TEXELS, Tiles, tiles_of};
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
@@ -44,6 +44,8 @@ struct Known {
     list: Handle,
     /// How many.
     listed: Handle,
+    /// Invocations over all tiles, if all are listed.
+    most: [u32; 3],
 }
 
 fn known(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Known> {
@@ -77,6 +79,7 @@ fn known(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Known> {
         between: written.outputs.first().copied().unwrap_or(depths),
         list: written.changed("list").unwrap_or(list),
         listed: written.changed("listed").unwrap_or(listed),
+        most: [ACROSS * TEXELS, (across * across).div_ceil(ACROSS), 1],
     })
 }
 
@@ -94,6 +97,7 @@ fn hamburger(graph: &mut Graph, given: &Given) -> Result<Handle> {
         between,
         list,
         listed,
+        most,
     } = known(graph, given, depth)?;
     let map = empty(graph, given, "map")?;
     let written = graph
@@ -103,6 +107,7 @@ fn hamburger(graph: &mut Graph, given: &Given) -> Result<Handle> {
         .arg("depth", depth)
         .arg("map", map)
         .constant("samples", SAMPLES)
+        .at_most(most)
         .note("listed tiles")
         .finish()?;
     let mut map = written.changed("map").unwrap_or(map);
@@ -125,6 +130,7 @@ fn hamburger(graph: &mut Graph, given: &Given) -> Result<Handle> {
                 .arg("weights", weights)
                 .arg("source", map)
                 .arg("map", target)
+                .at_most(most)
                 .note(format!("{taps} taps, listed tiles"))
                 .finish()?;
             map = written.changed("map").unwrap_or(target);

@@ -8,7 +8,8 @@ mod rays;
 
 use hankel_dsl::native::Entry;
 use hankel_host::device::{
-    Backend, Bind, Blend, BufferId, Device, Program, TextureId, TextureShape,
+    Backend, Bind, Blend, BufferId, Cull, DepthTest, Device, Program, TextureId, TextureShape,
+    Topology,
 };
 
 use crate::error::Result;
@@ -17,6 +18,15 @@ use rays::Rays;
 
 /// Samples of a pixel or texel.
 pub const SAMPLES: u32 = cast::SAMPLES.len() as u32;
+
+/// The depth where nothing is.
+pub(crate) const FAR: f32 = 1.0;
+/// Which depths are seen.
+pub(crate) const SEEN: DepthTest = DepthTest::Less;
+/// What indices make.
+pub(crate) const TOPOLOGY: Topology = Topology::Triangles;
+/// Both faces are seen.
+pub(crate) const CULL: Cull = Cull::None;
 
 /// A buffer, and a number that is another whenever its content is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,11 +3,10 @@
 use std::collections::HashMap;
 
 use hankel_host::device::{
-    Blend, Colour, Cull, Depth, DepthTest, Device, Draw as DeviceDraw, Pass, TextureId,
-    TextureShape, Topology,
+    Blend, Colour, Depth, Device, Draw as DeviceDraw, Pass, TextureId, TextureShape,
 };
 
-use super::{Draw, Onto, SAMPLES};
+use super::{CULL, Draw, FAR, Onto, SAMPLES, SEEN, TOPOLOGY};
 use crate::error::{Result, during};
 
 /// What draws need beside their targets: one of each shape, since draws follow one another.
@@ -37,8 +36,8 @@ impl Raster {
         let mut colours = Vec::new();
         let cleared = |texture| Depth {
             texture,
-            clear: Some(1.0),
-            test: DepthTest::Less,
+            clear: Some(FAR),
+            test: SEEN,
             write: true,
         };
         let depth = match draw.onto {
@@ -87,8 +86,8 @@ impl Raster {
                 fragment_args: draw.fragment.as_ref().map_or(&[], |f| &f.args),
                 indices: Some(draw.indices.buffer),
                 count: draw.count,
-                topology: Topology::Triangles,
-                cull: Cull::None,
+                topology: TOPOLOGY,
+                cull: CULL,
             }],
         };
         device.draw(&pass).map_err(during(draw.label))
