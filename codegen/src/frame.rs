@@ -285,7 +285,7 @@ pub enum Pass {
         workgroups: [u32; 3],
     },
     /// Draws triangles.
-    Draw(Draw),
+    Draw(Box<Draw>),
 }
 
 /// A pass that draws.
@@ -419,7 +419,7 @@ impl Frame {
 
     fn draws(&self) -> impl Iterator<Item = &Draw> {
         self.passes.iter().filter_map(|pass| match pass {
-            Pass::Draw(draw) => Some(draw),
+            Pass::Draw(draw) => Some(&**draw),
             Pass::Clear { .. } | Pass::Compute { .. } => None,
         })
     }
