@@ -293,7 +293,7 @@ pub enum Pass {
         said_in: Option<SaidIn>,
     },
     /// Draws triangles.
-    Draw(Draw),
+    Draw(Box<Draw>),
 }
 
 /// Where a buffer says how many invocations of a compute pass have something to do.
@@ -463,7 +463,7 @@ impl Frame {
 
     fn draws(&self) -> impl Iterator<Item = &Draw> {
         self.passes.iter().filter_map(|pass| match pass {
-            Pass::Draw(draw) => Some(draw),
+            Pass::Draw(draw) => Some(&**draw),
             Pass::Clear { .. } | Pass::Compute { .. } => None,
         })
     }

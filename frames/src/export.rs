@@ -402,7 +402,10 @@ impl<'g> Export<'g> {
                 vertex,
                 fragment,
                 target,
-            } => FramePass::Draw(self.draw(label, surfaces, vertex, fragment.as_ref(), target)?),
+            } => {
+                let draw = self.draw(label, surfaces, vertex, fragment.as_ref(), target)?;
+                FramePass::Draw(Box::new(draw))
+            }
         })
     }
 
