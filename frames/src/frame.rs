@@ -196,7 +196,10 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
     }
     if let Some(volume) = given.volume {
         for (value, meaning) in [
-            (volume.view, "How pixels look into the world; it follows from the camera."),
+            (
+                volume.view,
+                "How pixels look into the world; it follows from the camera.",
+            ),
             (volume.medium, "What scatters between surfaces."),
             (
                 volume.rectified,

@@ -307,9 +307,7 @@ impl Graph {
                     ));
                 }
                 (Extent::Known(_), Some(_)) => {
-                    return Err(place.kernel(
-                        "it is known how far it runs: leave `at_most` out",
-                    ));
+                    return Err(place.kernel("it is known how far it runs: leave `at_most` out"));
                 }
                 _ => {}
             }
