@@ -58,13 +58,17 @@ fn passes_of_scattering_have_their_times() {
     for (technique, steps) in WAYS {
         let (scene, mesh) = file("shafts", technique, steps, [960, 540], 512);
         let mut device = device::open(Backend::Vulkan).unwrap_or_else(|e| panic!("{e}"));
-        let mut frame =
-            Frame::new(&mut *device, &shaders, &scene, &mesh, Show::Picture).unwrap();
+        let mut frame = Frame::new(&mut *device, &shaders, &scene, &mesh, Show::Picture).unwrap();
         frame.run(Clock::Frame, &mut Quiet).unwrap();
         let passes = frame.executor().steady(5).unwrap();
-        let text = passes.iter().map(|p| format!("{} {:.1}", p.name, p.seconds * 1e3));
+        let text = passes
+            .iter()
+            .map(|p| format!("{} {:.1}", p.name, p.seconds * 1e3));
         let text: Vec<String> = text.collect();
-        println!("{technique}, {steps} steps, 960x540, map of 512² [ms]: {}", text.join(", "));
+        println!(
+            "{technique}, {steps} steps, 960x540, map of 512² [ms]: {}",
+            text.join(", ")
+        );
         assert_eq!(text.iter().filter(|p| p.starts_with("scatter ")).count(), 1);
     }
 }
