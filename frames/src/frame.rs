@@ -307,8 +307,7 @@ impl<'d> Frame<'d> {
         };
         self.executor.set(volume.view, &space.view)?;
         self.executor.set(volume.rectified, &space.rectified)?;
-        self.executor
-            .set_buffer(volume.extinctions, &space.extinctions)
+        self.executor.set_buffer(volume.rows, &space.rows)
     }
 
     /// Runs what has to run; see [`Executor::run`].

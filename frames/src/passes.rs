@@ -29,8 +29,8 @@ pub struct Volume {
     /// Coordinates in which rays from the camera are rows of the shadow map,
     /// [`hankel_shadows::scattering::Rectified`].
     pub rectified: Handle,
-    /// Each row's extinction per unit of radius.
-    pub extinctions: Handle,
+    /// Each row's direction, and its extinction per unit of radius.
+    pub rows: Handle,
     /// Texels of a row, and rows.
     pub texels: [u32; 2],
     /// Steps along a ray, where one is marched along.

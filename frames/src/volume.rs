@@ -20,7 +20,7 @@ pub(crate) struct Space {
     pub view: View,
     pub medium: Medium,
     pub rectified: Rectified,
-    pub extinctions: Vec<f32>,
+    pub rows: Vec<Vec4>,
 }
 
 impl Space {
@@ -39,7 +39,7 @@ impl Space {
             // All that is scattered counts as 1.
             Show::Scattered | Show::Light => (4.0 * PI as f32, 0.0),
         };
-        let (rectified, extinctions) = rectified(scene, &camera, &light_view, medium.extinction);
+        let (rectified, rows) = rectified(scene, &camera, &light_view, medium.extinction);
         Some(Self {
             view: view(&camera, [scene.width, scene.height]),
             medium: Medium {
@@ -49,7 +49,7 @@ impl Space {
                 steps: medium.steps,
             },
             rectified,
-            extinctions,
+            rows,
         })
     }
 
@@ -58,7 +58,7 @@ impl Space {
             view: graph.parameter("view", &self.view),
             medium: graph.parameter("medium", &self.medium),
             rectified: graph.parameter("rectified", &self.rectified),
-            extinctions: graph.buffer("extinctions", &self.extinctions),
+            rows: graph.buffer("rows", &self.rows),
             texels: [self.rectified.columns, self.rectified.rows],
             steps: self.medium.steps,
         }
@@ -78,21 +78,21 @@ fn view(camera: &CameraView, size: [u32; 2]) -> View {
     }
 }
 
-/// The rectified map, which has as many texels as the shadow map, and each row's extinction.
+/// The rectified map, which has as many texels as the shadow map, and its rows.
 fn rectified(
     scene: &Scene,
     camera: &CameraView,
     light_view: &LightView,
     extinction: f32,
-) -> (Rectified, Vec<f32>) {
+) -> (Rectified, Vec<Vec4>) {
     let clip = light_view.clip_from_world;
     let axis = |i: usize| clip.row(i).truncate().as_dvec3().normalize();
     let axes: [DVec3; 3] = [0, 1, 2].map(axis);
     let corners = camera.far_corners().map(|q| axes.map(|axis| axis.dot(q)));
     let bounds = rectified_bounds(corners);
-    let (sin, cos) = bounds.azimuth.sin_cos();
-    let across = axes[0] * cos + axes[1] * sin;
-    let aside = axes[1] * cos - axes[0] * sin;
+    let away = |azimuth: f64| axes[0] * azimuth.cos() + axes[1] * azimuth.sin();
+    let across = away(bounds.azimuth);
+    let aside = away(bounds.azimuth + 0.5 * PI);
     let uniform = light(scene, light_view, Show::Light);
     let in_map = |row: Vec4| {
         let row = row.as_dvec4();
@@ -100,11 +100,12 @@ fn rectified(
     };
     let eye = [uniform.row_u, uniform.row_v, uniform.row_depth].map(in_map);
     let size = scene.shadow.size;
-    let extinctions = (0..size).map(|row| {
+    let rows = (0..size).map(|row| {
         let share = 2.0 * (f64::from(row) + 0.5) / f64::from(size) - 1.0;
         let azimuth = bounds.azimuth + share * bounds.half_azimuth;
         let (least, largest) = row_inclinations(corners, azimuth);
-        row_extinction(f64::from(extinction), least, largest) as f32
+        let extinction = row_extinction(f64::from(extinction), least, largest);
+        away(azimuth).as_vec3().extend(extinction as f32)
     });
     let rectified = Rectified {
         across: across.as_vec3().extend(bounds.radius as f32),
@@ -116,5 +117,5 @@ fn rectified(
         columns: size,
         rows: size,
     };
-    (rectified, extinctions.collect())
+    (rectified, rows.collect())
 }

@@ -58,9 +58,9 @@ fn a_medium_in_light_alone_has_its_analytic_picture() {
             let name = technique.name;
             let errors = by(&scene, &mesh, name, 16).errors(&picture).unwrap();
             println!("{camera:?}, {name}: {errors}");
-            // Sixteen rays of a pixel against four samples, one ray's direction for all. Moments do not tell the
-            // ground before a ray's end from what would shade the ray.
-            let limit = if name == "ray-marching" { 0.006 } else { 0.02 };
+            // One ray stands for a pixel's samples: as far as the farthest of them it is below the ground. Moments
+            // do not tell the ground before a ray's end from what would shade the ray.
+            let limit = if name == "ray-marching" { 0.009 } else { 0.02 };
             assert!(errors.rms < limit, "{name}: {errors}");
         }
     }
@@ -122,15 +122,22 @@ fn what_is_seen_is_weakened_by_the_way() {
     let absorbing = "extinction = 0.2\nscattering = 0.0";
     let (weak, strong) = (linear(absorbing), linear("extinction = 1e-6"));
     let (scene, mesh) = open(camera, absorbing);
-    // Marched along, as nothing is shaded: what is scattered is what is taken.
-    let taken = by(&scene, &mesh, "ray-marching", 16);
-    for ((weak, strong), taken) in weak.iter().zip(&strong).zip(&taken.values) {
-        let wanted = strong.x * (1.0 - taken);
-        assert!(
-            (weak.x - wanted).abs() < 2e-3 * strong.x + 1e-3,
-            "{weak} {strong} {taken}"
-        );
+    let taken = Scattered::new(&scene, &mesh).unwrap().unshadowed();
+    let width = scene.width as usize;
+    let mut compared = 0;
+    for i in width..taken.values.len() - width {
+        let around = [i, i - 1, i + 1, i - width, i + width].map(|i| taken.values[i]);
+        let most = around.into_iter().fold(0.0, f32::max);
+        let least = around.into_iter().fold(1.0, f32::min);
+        // On an edge the means over a pixel's samples are those of different things.
+        if most - least < 0.05 {
+            let (weak, strong) = (weak[i].x, strong[i].x);
+            let wanted = strong * (1.0 - around[0]);
+            assert!((weak - wanted).abs() < 0.01 * strong, "{i}: {weak} {wanted}");
+            compared += 1;
+        }
     }
+    assert!(compared > 800, "{compared}");
 }
 
 /// Passes of scattering are there only with a medium; those of the light's map are shared with the surfaces.

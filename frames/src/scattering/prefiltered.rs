@@ -49,6 +49,7 @@ fn means(
         .constant("order", order)
         .arg("light", given.light)
         .arg("rectified", volume.rectified)
+        .arg("rows", volume.rows)
         .arg("map", map)
         .elements(columns as usize * rows as usize)?;
     let lines = Lines {
@@ -62,7 +63,7 @@ fn means(
         .compute("means", "prefix_means")
         .arg("lines", lines)
         .arg("rectified", volume.rectified)
-        .arg("extinctions", volume.extinctions)
+        .arg("rows", volume.rows)
         .arg("table", table)
         .finish()?;
     // The kernel writes its table.

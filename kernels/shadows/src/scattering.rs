@@ -304,9 +304,20 @@ fn bilinear(place: Vec2, size: UVec2, load: impl Fn(UVec2) -> Vec4) -> Vec4 {
 /// shadows is kept off both ends of the map's range by this much.
 const FARTHEST: f32 = 0.995;
 
+/// What there is to know of a row; nothing of one that is not there.
+#[inline(always)]
+fn row_of(rows: Buffer<'_, Vec4>, row: u32) -> Vec4 {
+    if row < rows.len() {
+        rows.get(row)
+    } else {
+        Vec4::ZERO
+    }
+}
+
 /// A filtered map of four moments in rectified coordinates, row after row. Of a place's moments three are
 /// told by two depths (\[BHS\], section 2 of the supplement), each of which becomes another depth there.
-/// `order` 0 gives the first four moments of these, 1 the fifth and the sixth.
+/// `order` 0 gives the first four moments of these, 1 the fifth and the sixth. `rows` has for each row the direction
+/// of its azimuth (x, y, z), of length 1, and its extinction per unit of radius (w).
 #[kernel(compute, threads(64), pinned, inputs = crate::inputs::scattering::rectified)]
 pub fn rectify(
     #[index] i: u32,
@@ -315,19 +326,17 @@ pub fn rectify(
     order: u32,
     #[uniform] light: &Light,
     #[uniform] rectified: &Rectified,
+    #[storage]
+    #[length(1..=16)]
+    #[range(-1.0..=1.0)]
+    rows: Buffer<'_, Vec4>,
     #[texture] map: Texture2d<'_>,
 ) -> Vec4 {
     let at = texel(i, rectified.size());
     let share = |i: u32, count: u32| (i as f32 + 0.5) / Real::max(count as f32, 1.0);
     let radius = share(at.x, rectified.columns) * rectified.across.w;
-    let azimuth = (2.0 * share(at.y, rectified.rows) - 1.0) * rectified.aside.w;
-    let (sin, cos) = math::sin_cos(azimuth);
-    let away = |across: f32, aside: f32| radius * (cos * across + sin * aside);
-    let away = Vec3::new(
-        away(rectified.across.x, rectified.aside.x),
-        away(rectified.across.y, rectified.aside.y),
-        away(rectified.across.z, rectified.aside.z),
-    );
+    let row = row_of(rows, at.y);
+    let away = Vec3::new(radius * row.x, radius * row.y, radius * row.z);
     let near = |x: f32| Real::clamp(x, -16.0, 16.0);
     let uv = Vec2::new(
         near(rectified.eye.x + dot(light.row_u, away)),
@@ -368,7 +377,7 @@ pub fn rectify(
 
 /// Means along rows of a map in rectified coordinates, in its place: each texel becomes the mean of those
 /// before it in its row, and of itself. A texel's weight is what the medium in it scatters that reaches the
-/// camera, with an extinction per unit of radius that is the row's own.
+/// camera, by the extinction of `rows` (see [`rectify`]).
 ///
 /// A workgroup of 64 invocations has a row. Each adds up a 64th of it; a scan of these totals tells each what
 /// comes before its part, as in [`crate::soft::prefix_sums`].
@@ -377,7 +386,8 @@ pub fn rectify(
     threads(64),
     pinned,
     range(lines.invocations),
-    inputs = crate::inputs::scattering::means
+    inputs = crate::inputs::scattering::means,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
 )]
 pub fn prefix_means(
     #[local_index] me: u32,
@@ -388,19 +398,15 @@ pub fn prefix_means(
     #[uniform] rectified: &Rectified,
     #[storage]
     #[length(1..=16)]
-    #[range(0.0..=2.0)]
-    extinctions: Buffer<'_, f32>,
+    #[range(-1.0..=1.0)]
+    rows: Buffer<'_, Vec4>,
     #[storage] table: StorageMut<'_, Vec4>,
 ) {
     // Rows do not reach beyond the table, whatever the uniform says.
     let entries = table.len();
     let length = lines.length;
     let place = |k: u32| row * length + k;
-    let extinction = if row < extinctions.len() {
-        extinctions.get(row)
-    } else {
-        0.0
-    };
+    let extinction = row_of(rows, row).w;
     let width = rectified.across.w / Real::max(length as f32, 1.0);
     let weight = |k: u32| transmittance(extinction, k as f32 * width);
     let share = length.div_ceil(64);
@@ -499,19 +505,14 @@ fn scattered(ray: &Ray, rectified: &Rectified, lit: impl Fn(Vec2, f32) -> f32) -
             of.x * ray.passed.x + of.y * ray.passed.y + of.z * ray.passed.z + of.w * ray.passed.w;
         (ends / Real::max(count, 1.0), 0.25 * (count - passed))
     };
+    let lookups = if is_split { 2 } else { 1 };
+    let mut of = if is_split { Vec4::ONE - far } else { Vec4::ONE };
     let mut share = 0.0;
     let mut i = 0;
-    while i < 2 {
-        if (i == 0) | is_split {
-            let near = Vec4::ONE - far;
-            let of = if is_split {
-                if i == 0 { near } else { far }
-            } else {
-                Vec4::ONE
-            };
-            let (end, most) = part(of);
-            share += most * lit(Vec2::new(column(end), row), depth);
-        }
+    while i < lookups {
+        let (end, most) = part(of);
+        share += most * lit(Vec2::new(column(end), row), depth);
+        of = far;
         i += 1;
     }
     Real::saturate(share)

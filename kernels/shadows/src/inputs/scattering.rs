@@ -160,11 +160,14 @@ impl Camera {
         b.azimuth + (2.0 * share - 1.0) * b.half_azimuth
     }
 
-    /// Each row's extinction per unit of radius.
-    fn extinctions(&self, medium: &Medium, rows: u32) -> Vec<f32> {
+    /// Each row's direction, and its extinction per unit of radius.
+    fn rows(&self, medium: &Medium, rows: u32) -> Vec<Vec4> {
         let row = |i| {
-            let (least, largest) = row_inclinations(self.corners(), self.azimuth(i, rows));
-            row_extinction(f64::from(medium.extinction), least, largest) as f32
+            let azimuth = self.azimuth(i, rows);
+            let (least, largest) = row_inclinations(self.corners(), azimuth);
+            let extinction = row_extinction(f64::from(medium.extinction), least, largest);
+            let (sin, cos) = azimuth.sin_cos();
+            Vec4::new(cos as f32, 0.0, sin as f32, extinction as f32)
         };
         (0..rows).map(row).collect()
     }
@@ -173,10 +176,10 @@ impl Camera {
     fn tables(&self, medium: &Medium, [columns, rows]: [u32; 2]) -> [Vec<[f64; 6]>; 2] {
         let b = self.bounds();
         let (middle, scale) = (0.5 * (b.least + b.largest), 2.0 / (b.largest - b.least));
-        let extinctions = self.extinctions(medium, rows);
+        let all = self.rows(medium, rows);
         let width = b.radius / f64::from(columns);
         let (mut texels, mut means) = (Vec::new(), Vec::new());
-        for (row, extinction) in (0..rows).zip(extinctions) {
+        for (row, extinction) in (0..rows).zip(all.iter().map(|row| row.w)) {
             let (sin, cos) = self.azimuth(row, rows).sin_cos();
             let (mut sum, mut weight) = ([0.0; 6], 0.0);
             for column in 0..columns {
@@ -305,10 +308,12 @@ pub fn rectified(_: &Request) -> Vec<Given> {
     let map = maps::texels(encoding::SYMMETRIC);
     cameras()
         .iter()
-        .map(|camera| {
+        .zip(media())
+        .map(|(camera, medium)| {
             let given = Given::new(camera.what)
                 .uniform("light", &light())
-                .uniform("rectified", &camera.rectified(TABLE));
+                .uniform("rectified", &camera.rectified(TABLE))
+                .buffer("rows", &camera.rows(&medium, TABLE[1]));
             maps::with_map(given, "map", &map)
         })
         .collect()
@@ -335,7 +340,7 @@ pub fn means(_: &Request) -> Vec<Given> {
                     },
                 )
                 .uniform("rectified", &camera.rectified(size))
-                .buffer("extinctions", &camera.extinctions(&medium, size[1]))
+                .buffer("rows", &camera.rows(&medium, size[1]))
                 .buffer("table", &four(&texels, 0))
         })
         .collect()
