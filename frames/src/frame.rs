@@ -207,8 +207,8 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
                  and the light.",
             ),
             (
-                volume.extinctions,
-                "Of each such row the extinction per unit of radius; it follows from the camera and the light.",
+                volume.rows,
+                "What differs from row to row of the rectified map; it follows from the camera and the light.",
             ),
         ] {
             graph.describe(value, meaning);
