@@ -133,7 +133,10 @@ fn what_is_seen_is_weakened_by_the_way() {
         if most - least < 0.05 {
             let (weak, strong) = (weak[i].x, strong[i].x);
             let wanted = strong * (1.0 - around[0]);
-            assert!((weak - wanted).abs() < 0.01 * strong, "{i}: {weak} {wanted}");
+            assert!(
+                (weak - wanted).abs() < 0.01 * strong,
+                "{i}: {weak} {wanted}"
+            );
             compared += 1;
         }
     }
