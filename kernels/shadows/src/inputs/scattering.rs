@@ -244,19 +244,13 @@ fn pictures(request: &Request, of: impl Fn(Given, &Camera, &Medium) -> Given) ->
                 .uniform("view", &camera.view())
                 .uniform("medium", &medium)
                 .uniform("light", &light())
-                .texture(
-                    "picture",
-                    SIZE,
-                    1,
-                    TexelFormat::Rgba32Float,
-                    picture.into_iter(),
-                )
+                .texture("picture", SIZE, 1, TexelFormat::Rgba32Float, picture)
                 .texture(
                     "surfaces",
                     SIZE,
                     SAMPLES as u32,
                     TexelFormat::R32Float,
-                    camera.surfaces().into_iter(),
+                    camera.surfaces(),
                 );
             of(given, camera, &medium)
         })
