@@ -143,9 +143,6 @@ fn stored(how: u32, m: Moments4<f64>) -> Vec4 {
     unorm([q.r, q.g, q.b, q.a])
 }
 
-/// Where the light is.
-const TOWARD: Vec3 = Vec3::new(0.36, -0.8, 0.48);
-
 /// A light whose map's coordinates are the world's x and z, each from 0 to 1, and whose depth is y.
 pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32) -> Light {
     let target = bias.four();
@@ -153,7 +150,7 @@ pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32)
         row_u: Vec4::new(1.0, 0.0, 0.0, 0.0),
         row_v: Vec4::new(0.0, 0.0, 1.0, 0.0),
         row_depth: Vec4::new(0.0, 1.0, 0.0, 0.0),
-        toward: TOWARD.extend(2.5),
+        toward: Vec4::new(0.36, -0.8, 0.48, 2.5),
         ambient: Vec4::new(0.1, 0.12, 0.15, 0.0),
         bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
         moment_bias,
@@ -190,11 +187,7 @@ pub(super) fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
         world.push(Vec3::new(u as f32, z as f32, v as f32));
         let n = Vec3::new(s.normal() as f32, s.normal() as f32, s.normal() as f32);
         let up = Vec3::new(0.0, -1.0, 0.0);
-        let n = if n.length() > 1e-3 { n.normalize() } else { up };
-        // Most faces see the light; the others read no map.
-        let is_turned = n.dot(TOWARD) < 0.0;
-        let turns_back = is_turned && s.count(0, 7) > 0;
-        normals.push(if turns_back { -n } else { n });
+        normals.push(if n.length() > 1e-3 { n.normalize() } else { up });
         let mut channel = || s.between(0.0, 1.0) as f32;
         colours.push(Vec3::new(channel(), channel(), channel()));
     }
