@@ -120,10 +120,7 @@ fn a_player_that_knows_no_hankel_draws_the_same() {
 #[test]
 fn glass_and_a_medium_are_played() {
     let desk = Desk::new();
-    let glass = SCENE.replace(
-        "procedural = \"box\"",
-        "procedural = \"box\"\nopacity = 0.4",
-    );
+    let glass = SCENE.replace("procedural = \"box\"", "procedural = \"glass\"");
     let medium = |technique: &str| {
         format!("{SCENE}[medium]\nextinction = 0.2\ntechnique = \"{technique}\"\n")
     };

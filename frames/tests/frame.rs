@@ -106,9 +106,10 @@ fn every_technique_makes_a_graph_for_every_map() {
             let kept = text
                 .lines()
                 .any(|l| l.contains("resolve_") && l.contains(map.format.name()));
-            // A table is a buffer.
+            // A table is a buffer; who compares depths themselves says so.
             let is_table = passes.contains(&"sum columns".to_owned());
-            assert!(kept || is_table || passes.len() == 2, "{text}");
+            let has_no_map = text.contains("no moments: ");
+            assert!(kept || is_table || has_no_map, "{text}");
         }
     }
 }
