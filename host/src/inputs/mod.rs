@@ -511,18 +511,7 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
             if let Some(problem) = kind.misfit(*layers) {
                 return Err(problem);
             }
-            if shape.bytes() == bytes.len() && !bytes.is_empty() {
-                Ok(Input::Texture {
-                    shape,
-                    bytes: bytes.clone(),
-                })
-            } else {
-                Err(format!(
-                    "{} bytes, but its size makes {}",
-                    bytes.len(),
-                    shape.bytes()
-                ))
-            }
+            texels_of_shape(shape, bytes)
         }
         (
             Value::Texture {
@@ -553,18 +542,7 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
             if dimensions == 2 && size[2] != 1 {
                 return Err("it has two dimensions".into());
             }
-            if shape.bytes() == bytes.len() && !bytes.is_empty() {
-                Ok(Input::Texture {
-                    shape,
-                    bytes: bytes.clone(),
-                })
-            } else {
-                Err(format!(
-                    "{} bytes, but its size makes {}",
-                    bytes.len(),
-                    shape.bytes()
-                ))
-            }
+            texels_of_shape(shape, bytes)
         }
         (Value::Sampler(sampler), Use::Sampler { comparison })
             if sampler.compare.is_some() == comparison =>
@@ -572,6 +550,22 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
             Ok(Input::Sampler(*sampler))
         }
         _ => Err("it is of another kind".into()),
+    }
+}
+
+/// A texture, if the author's bytes fill it.
+fn texels_of_shape(shape: TextureShape, bytes: &[u8]) -> Result<Input, String> {
+    if shape.bytes() == bytes.len() && !bytes.is_empty() {
+        Ok(Input::Texture {
+            shape,
+            bytes: bytes.to_vec(),
+        })
+    } else {
+        Err(format!(
+            "{} bytes, but its size makes {}",
+            bytes.len(),
+            shape.bytes()
+        ))
     }
 }
 
