@@ -215,12 +215,12 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         }
     }
     let mut picture = (scene.shadow.technique.add)(&mut graph, &given)?;
-    match (&scene.medium, given.volume) {
-        (Some(medium), Some(volume)) => {
+    // Where there is a medium, there is its volume.
+    match scene.medium.as_ref().zip(given.volume) {
+        Some((medium, volume)) => {
             picture = (medium.technique.add)(&mut graph, &given, &volume, picture)?;
         }
-        (Some(_), None) => (),
-        (None, _) => graph.omit("scattering", "there is no medium"),
+        None => graph.omit("scattering", "there is no medium"),
     }
     graph.keep(picture);
     Ok((graph, given, picture))

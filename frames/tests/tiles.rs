@@ -12,7 +12,9 @@ use hankel_frames::graph::{Graph, Handle};
 use hankel_frames::scene::{Mesh, Scene};
 use hankel_frames::truth::{by_rays, by_technique};
 use hankel_frames::{Clock, Executor, Quiet, Show, graph_of};
-use hankel_host::device::{Bind, Device, NativeDevice, Program, Shader, VulkanDevice};
+use hankel_host::device::{
+    Bind, Device, NativeDevice, Program, Shader, TextureShape, VulkanDevice,
+};
 use hankel_shadows::soft::Lines;
 use hankel_shadows::tiles::{Listed, tiles_of};
 
@@ -175,5 +177,47 @@ fn a_buffer_says_how_many_run() {
         assert_ne!(expected, table);
         assert_eq!(summed(5 * 64, true), expected);
         assert_eq!(summed(0, true), table);
+    }
+}
+
+/// Where a pass writes how far a kernel runs, the graph has to know how far that may be.
+#[test]
+fn how_far_at_most_is_said_and_checked() {
+    let added = |most: Option<[u32; 3]>, is_known: bool| {
+        let mut graph = Graph::new(hankel_shadows::entries());
+        let depth = TextureShape::depth(64, 64).multisampled(4);
+        let depth = graph.cleared("depth", depth);
+        let map = TextureShape::d2(64, 64, TexelFormat::Rgba16Unorm);
+        let map = graph.cleared("map", map);
+        let list = graph.constants("list", &[0_u32, 1]);
+        let known = Listed {
+            size: [64, 1].into(),
+            tiles: 1,
+            padding: 0,
+        };
+        let listed = match is_known {
+            true => graph.parameter("listed", &known),
+            false => graph.zeros::<Listed>("listed", 1),
+        };
+        let mut pass = graph
+            .compute("resolve", "resolve_symmetric_tiles")
+            .arg("listed", listed)
+            .arg("list", list)
+            .arg("depth", depth)
+            .arg("map", map);
+        if let Some(most) = most {
+            pass = pass.at_most(most);
+        }
+        pass.finish().map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(added(Some([64, 65535, 1]), false), Ok(()));
+    assert_eq!(added(None, true), Ok(()));
+    for (most, is_known, wanted) in [
+        (None, false, "`listed`: a pass writes how far"),
+        (Some([64, 65536, 1]), false, "[1, 65536, 1] workgroups"),
+        (Some([64, 1, 1]), true, "leave `at_most` out"),
+    ] {
+        let error = added(most, is_known).unwrap_err();
+        assert!(error.contains(wanted), "{error}");
     }
 }

@@ -236,18 +236,24 @@ impl Graph {
         }
     }
 
-    /// How many invocations of a compute kernel run along x, y, z, with what is given at first.
-    pub(crate) fn invocations(&self, call: &Call) -> [u32; 3] {
+    /// A call's arguments as the devices' rules take them.
+    fn all_seen(&self, slots: &[Slot<'_>], call: &Call) -> Vec<Given<'_>> {
+        let pairs = slots.iter().zip(&call.args);
+        pairs.map(|(slot, arg)| self.seen(slot, arg)).collect()
+    }
+
+    /// How far a compute kernel runs; none of a pass that was refused.
+    fn extent(&self, call: &Call) -> Option<Extent> {
         let kernel = &self.kernels[call.kernel].kernel;
         let slots = slots::slots(kernel);
-        let given: Vec<Given<'_>> = slots
-            .iter()
-            .zip(&call.args)
-            .map(|(slot, argument)| self.seen(slot, argument))
-            .collect();
-        // Both were found when the pass was added.
-        match extent::extent(kernel, &slots, &given) {
-            Ok(Extent::Known(extent)) => extent,
+        extent::extent(kernel, &slots, &self.all_seen(&slots, call)).ok()
+    }
+
+    /// How many invocations of a compute kernel run along x, y, z, with what is given at first; at most, where a
+    /// buffer says it.
+    pub(crate) fn invocations(&self, call: &Call) -> [u32; 3] {
+        match self.extent(call) {
+            Some(Extent::Known(extent)) => extent,
             _ => call.most.unwrap_or_default(),
         }
     }
@@ -255,26 +261,17 @@ impl Graph {
     /// Where a buffer that a pass writes says how far a compute kernel runs: it, where its numbers begin in bytes,
     /// and how many they are.
     pub(crate) fn said_in(&self, call: &Call) -> Option<(Handle, u32, u32)> {
-        let kernel = &self.kernels[call.kernel].kernel;
-        let slots = slots::slots(kernel);
-        let given: Vec<Given<'_>> = slots
-            .iter()
-            .zip(&call.args)
-            .map(|(slot, argument)| self.seen(slot, argument))
-            .collect();
-        match (extent::extent(kernel, &slots, &given), &call.args) {
-            (
-                Ok(Extent::InBuffer {
-                    slot,
-                    offset,
-                    dimensions,
-                }),
-                args,
-            ) => match args[slot] {
-                Argument::Value(handle) => Some((handle, offset, dimensions)),
-                Argument::Sampler(_) => None,
-            },
-            _ => None,
+        let Some(Extent::InBuffer {
+            slot,
+            offset,
+            dimensions,
+        }) = self.extent(call)
+        else {
+            return None;
+        };
+        match call.args[slot] {
+            Argument::Value(handle) => Some((handle, offset, dimensions)),
+            Argument::Sampler(_) => None,
         }
     }
 
@@ -287,30 +284,15 @@ impl Graph {
         } else {
             slots::drawn_slots(kernel)
         };
-        let given: Vec<Given<'_>> = slots
-            .iter()
-            .zip(&call.args)
-            .map(|(slot, argument)| self.seen(slot, argument))
-            .collect();
+        let given = self.all_seen(&slots, call);
         for (slot, argument) in slots.iter().zip(&call.args) {
             self.check_type(place, slot, argument)?;
         }
         slots::check(kernel, &slots, &given).map_err(|e| place.device(&slots, e))?;
-        if is_compute {
+        if let Stage::Compute { threads, .. } = kernel.stage {
             let extent = extent::extent(kernel, &slots, &given);
             let extent = extent.map_err(|e| place.device(&slots, e))?;
-            match (extent, call.most) {
-                (Extent::InBuffer { slot, .. }, None) => {
-                    return Err(place.argument(
-                        &slots[slot].name,
-                        "a pass writes how far the kernel runs: say how far at most with `at_most`",
-                    ));
-                }
-                (Extent::Known(_), Some(_)) => {
-                    return Err(place.kernel("it is known how far it runs: leave `at_most` out"));
-                }
-                _ => {}
-            }
+            check_most(place, &slots, extent, call.most, threads)?;
         }
         Ok(())
     }
@@ -536,6 +518,41 @@ pub(super) fn allowed(domain: Option<&Domain>, value: u32) -> std::result::Resul
         _ => Ok(()),
     }
 }
+
+/// Whether it is said how far a kernel runs at most where a buffer says how far, and only there; no farther
+/// than every device can.
+fn check_most(
+    place: Place<'_>,
+    slots: &[Slot<'_>],
+    extent: Extent,
+    most: Option<[u32; 3]>,
+    threads: [u32; 3],
+) -> Result<()> {
+    let most = match (extent, most) {
+        (Extent::Known(_), None) => return Ok(()),
+        (Extent::Known(_), Some(_)) => {
+            return Err(place.kernel("it is known how far it runs: leave `at_most` out"));
+        }
+        (Extent::InBuffer { slot, .. }, None) => {
+            return Err(place.argument(
+                &slots[slot].name,
+                "a pass writes how far the kernel runs: say how far at most with `at_most`",
+            ));
+        }
+        (Extent::InBuffer { .. }, Some(most)) => most,
+    };
+    let groups = [0, 1, 2].map(|i| most[i].div_ceil(threads[i].max(1)));
+    if groups.iter().any(|n| *n > WORKGROUPS) {
+        return Err(place.kernel(format!(
+            "`at_most` is {most:?} invocations, which are {groups:?} workgroups: every device runs \
+             {WORKGROUPS} along an axis, and not all run more"
+        )));
+    }
+    Ok(())
+}
+
+/// Workgroups along an axis that every device runs (WebGPU's `maxComputeWorkgroupsPerDimension`).
+const WORKGROUPS: u32 = 65535;
 
 /// Whether a type is made of such numbers alone.
 fn is_all(ty: &Type, wanted: Scalar) -> bool {
