@@ -760,7 +760,7 @@ fn percentage(text: &str) -> Result<f64, String> {
 
 /// An odd number from 1 to 31.
 #[cfg(feature = "frames")]
-fn taps(text: &str) -> Result<u32, String> {
+pub fn taps(text: &str) -> Result<u32, String> {
     match text.parse::<u32>() {
         Ok(taps) if (1..=Scene::MAX_FILTER).contains(&taps) && taps % 2 == 1 => Ok(taps),
         _ => Err(format!(

@@ -177,3 +177,40 @@ fn frames_are_measured_once() {
         &["measured.jsonl was measured with", "another folder"],
     );
 }
+
+const SCENE: &str = "[geometry]\nprocedural = 'box'\n[camera]\neye = [2, 6, 4]\ntarget = [0, 0, 0]\n\
+    [light]\ndirection = [1, -1, 0.4]\n[shadow]\nsize = 64\nfilter = 3\n[output]\nwidth = 32\nheight = 24\n";
+
+#[test]
+fn candidates_are_ranked_on_shadow_maps() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(folder.path().join("box.toml"), SCENE).expect("written");
+    let line = "bench candidates --functions 2 --scene box.toml --regions 10 --out report --quiet";
+    let output = hankel(folder.path(), line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in ["variance shadow maps", "the worst", "z, z^2"] {
+        assert!(text.contains(part), "no `{part}` in\n{text}");
+    }
+    let report = folder.path().join("report");
+    let all = std::fs::read_to_string(report.join("candidates-all.csv")).expect("it is there");
+    // A heading, and 37 times 36 halves.
+    assert_eq!(all.lines().count(), 1 + 666);
+    assert!(all.starts_with("rank,functions,error,box"), "{all}");
+    let page = std::fs::read_to_string(report.join("candidates.html")).expect("there is a page");
+    assert!(page.contains("<svg") && page.contains("mean error"));
+}
+
+#[test]
+fn candidates_need_scenes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let missing = ["no scene files in scenes/", "--scene FILE"];
+    fails(folder.path(), "bench candidates --out report", 2, &missing);
+    std::fs::write(folder.path().join("box.toml"), SCENE).expect("written");
+    let twice = "bench candidates --functions 1 --scene box.toml --scene box.toml --out report";
+    fails(folder.path(), twice, 2, &["two scenes `box`"]);
+    let even = "bench candidates --filter 4 --scene box.toml --out report";
+    fails(folder.path(), even, 2, &["odd number"]);
+    assert!(!folder.path().join("report/candidates-all.csv").exists());
+}

@@ -6,10 +6,12 @@
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
+//! - [`regions`] has what filter kernels see in the map.
 //! - [`scattering`] has the light that a medium scatters, by rays from along each pixel's rays.
 //!
 //! All of it runs on this machine's processor.
 
+pub mod regions;
 pub mod scattering;
 
 use hankel_dsl::glam::{DVec3, Vec3, Vec4};

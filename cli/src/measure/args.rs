@@ -64,6 +64,10 @@ pub enum BenchCommand {
     /// Frames: run time against the error of their shadows, in every configuration.
     #[cfg(feature = "frames")]
     Frames(BenchFrames),
+    /// What a shadow map should hold: all choices of functions of depth, ranked by the error of their bounds on
+    /// shadow maps of scenes.
+    #[cfg(feature = "frames")]
+    Candidates(BenchCandidates),
     /// Measure for another process, which asks on the standard input stream.
     #[command(hide = true)]
     Worker,
@@ -145,6 +149,43 @@ pub struct BenchFrames {
     /// measured; several with commas between.
     #[arg(long, value_name = "ERROR", value_delimiter = ',', value_parser = crate::args::budget)]
     pub error: Vec<f64>,
+    /// Folder for the report.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// How the report is printed.
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+}
+
+#[cfg(feature = "frames")]
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  hankel bench candidates --functions 2 --out report
+  hankel bench candidates --functions 4 --regions 100 --out report
+  hankel bench candidates --functions 3 --scene scenes/fence.toml --scene scenes/room.toml --out report
+
+All choices of so many of 37 functions of depth (`hankel judge --help` lists them): 37, 666, 7770, 66045 and
+435897 for 1 to 5. The error of a choice is how far the best lower bound that its means allow is from
+percentage-closer filtering, on average, as a share of light. Four functions on 14 scenes with 100 regions each take
+an hour of processor time. OUT gets candidates.html, candidates.json, a CSV file for each table, and
+candidates-all.csv with every choice.")]
+pub struct BenchCandidates {
+    /// How many functions a map holds the means of.
+    #[arg(long, value_name = "NUMBER", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=5))]
+    pub functions: u8,
+    /// Scene file (TOML) whose shadow map is taken; may be repeated [default: all in the folder scenes].
+    #[arg(long, value_name = "FILE")]
+    pub scene: Vec<PathBuf>,
+    /// Filter regions of each scene.
+    #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u32).range(10..=100_000))]
+    pub regions: u32,
+    /// Texels of the maps along an edge [default: each scene's].
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(16..=8192))]
+    pub size: Option<u32>,
+    /// Taps of the Gaussian along an axis, an odd number [default: each scene's].
+    #[arg(long, value_name = "TAPS", value_parser = crate::args::taps)]
+    pub filter: Option<u32>,
     /// Folder for the report.
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,

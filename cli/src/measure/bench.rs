@@ -25,6 +25,8 @@ pub fn run(args: &Bench, quiet: bool) -> Result<Outcome> {
         BenchCommand::Bounds(args) => bounds(args, quiet),
         #[cfg(feature = "frames")]
         BenchCommand::Frames(args) => super::frames::run(args, quiet),
+        #[cfg(feature = "frames")]
+        BenchCommand::Candidates(args) => super::candidates::run(args, quiet),
         BenchCommand::Worker => worker(),
     }
 }

@@ -18,7 +18,7 @@ use hankel_numerics::report::{
 use hankel_system::output::{self, Output};
 
 use super::args::BenchFrames;
-use super::{command_line, deliver};
+use super::{command_line, deliver, scene_files};
 use crate::args::Format;
 use crate::commands::plan::{choices, open};
 use crate::failure::{Failure, Outcome, Result};
@@ -26,8 +26,6 @@ use crate::print::note;
 use crate::progress::Progress;
 use crate::session::{Words, this_program};
 
-/// Where scenes are unless the command says.
-const SCENES: &str = "scenes";
 /// What is measured is kept here.
 const KEPT: &str = "measured.jsonl";
 /// How many times the least time a plan may take.
@@ -120,21 +118,7 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
 
 /// The scenes, each in every size of the picture.
 fn subjects(args: &BenchFrames) -> Result<Vec<Subject>> {
-    let mut files = args.scene.clone();
-    if files.is_empty() {
-        let found = std::fs::read_dir(SCENES).into_iter().flatten().flatten();
-        let paths = found.map(|entry| entry.path());
-        files = paths
-            .filter(|path| path.extension().is_some_and(|e| e == "toml"))
-            .collect();
-        files.sort();
-    }
-    if files.is_empty() {
-        return Err(Failure::input(
-            format!("there are no scene files in {SCENES}/"),
-            "Name scene files with --scene FILE.",
-        ));
-    }
+    let files = scene_files(&args.scene)?;
     let mut subjects: Vec<Subject> = Vec::new();
     for file in &files {
         let scene = Scene::read(file)?;

@@ -3,6 +3,8 @@
 
 mod args;
 mod bench;
+#[cfg(feature = "frames")]
+mod candidates;
 mod failure;
 #[cfg(feature = "frames")]
 mod frames;
@@ -10,12 +12,16 @@ mod judge;
 mod stress;
 
 use std::path::Path;
+#[cfg(feature = "frames")]
+use std::path::PathBuf;
 
 use hankel_numerics::report::Report;
 
 pub use args::Command;
 
 use crate::args::Format;
+#[cfg(feature = "frames")]
+use crate::failure::Failure;
 use crate::failure::{Outcome, Result};
 use crate::print::{self, say};
 
@@ -52,6 +58,28 @@ fn deliver(
         }
     }
     Ok(())
+}
+
+/// The scene files that were named, or else all in the folder `scenes`.
+#[cfg(feature = "frames")]
+fn scene_files(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    const FOLDER: &str = "scenes";
+    if !named.is_empty() {
+        return Ok(named.to_vec());
+    }
+    let found = std::fs::read_dir(FOLDER).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = found
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    files.sort();
+    if files.is_empty() {
+        return Err(Failure::input(
+            format!("there are no scene files in {FOLDER}/"),
+            "Name scene files with --scene FILE.",
+        ));
+    }
+    Ok(files)
 }
 
 /// The command line as it was typed, as near as a program can know, for reports.

@@ -30,12 +30,15 @@
 //! # Ok::<(), hankel_numerics::judge::JudgeError>(())
 //! ```
 
+mod candidates;
 mod evaluation;
 mod functions;
 mod programme;
+mod simplex;
 mod system;
 mod table;
 
+pub use candidates::{Group, MOST_FUNCTIONS, Ranking, Score, choices_of, rank};
 pub use evaluation::{Evaluation, Region, evaluate, regions};
 pub use functions::DepthFunction;
 pub use programme::SENSITIVITY_LIMIT;
