@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use hankel_codegen::build::{Modules, Request};
 use hankel_codegen::bundle::Bundle;
-use hankel_codegen::compile::{Compiled, Compiler, compile};
+use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
 use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::inputs::{Inputs, normal};
 use hankel_codegen::placement::Placement;
@@ -120,15 +120,15 @@ impl Session {
         }
     }
 
-    /// Every file and folder that the SPIR-V was made from, as absolute paths; none for the
+    /// Every file and folder that the SPIR-V of a request was made from, as absolute paths; none for the
     /// built-in kernels outside of a checkout.
-    pub fn inputs(&self) -> Result<Vec<PathBuf>> {
+    pub fn inputs(&self, request: &Request) -> Result<Vec<PathBuf>> {
         let Some(manifest) = &self.manifest else {
             return Ok(Vec::new());
         };
         let folder = std::path::absolute(folder_of(manifest))
             .map_err(|e| Failure::machine(format!("{}: {e}", manifest.display()), None))?;
-        let inputs = self.bundle()?.origin.inputs;
+        let inputs = self.bundle(&chosen(request)?)?.origin.inputs;
         let present = |all: &BTreeMap<String, Option<String>>| -> Vec<PathBuf> {
             all.iter()
                 .filter(|(_, hash)| hash.is_some())
@@ -237,14 +237,14 @@ impl Session {
         }
     }
 
-    /// Final SPIR-V of all entry points.
-    pub fn modules(&self) -> std::result::Result<Modules, Failure> {
-        Ok(Modules::Final(self.bundle()?.modules))
+    /// Final SPIR-V of the entry points that a request is for, at least.
+    pub fn modules(&self, request: &Request) -> Result<Modules> {
+        Ok(Modules::Final(self.bundle(&chosen(request)?)?.modules))
     }
 
     /// SPIR-V of one entry point.
     pub fn words(&self, kernel: &str) -> Result<Vec<u32>> {
-        let bundle = self.bundle()?;
+        let bundle = self.bundle(&[kernel])?;
         let bytes = bundle
             .modules
             .get(kernel)
@@ -255,7 +255,7 @@ impl Session {
     /// SPIR-V of every entry point.
     #[cfg(any(feature = "frames", feature = "measure"))]
     pub fn all_words(&self) -> Result<Words> {
-        let bundle = self.bundle()?;
+        let bundle = self.bundle(&self.names())?;
         let all: std::result::Result<_, _> = bundle
             .modules
             .iter()
@@ -264,8 +264,16 @@ impl Session {
         Ok(all.map_err(|failure: hankel_codegen::Failure| Error::from(failure))?)
     }
 
-    fn bundle(&self) -> Result<Bundle> {
+    /// The names of all entry points.
+    fn names(&self) -> Vec<&str> {
+        let entries = self.krate.entries.iter();
+        entries.map(|e| e.kernel.name.as_str()).collect()
+    }
+
+    /// SPIR-V of the entry points called `names`, and of others where it is there anyway.
+    fn bundle(&self, names: &[&str]) -> Result<Bundle> {
         let kernels = self.kernels();
+        let is_all = names.len() == kernels.len();
         // What is wrong with the SPIR-V that was looked at last.
         let reason = RefCell::new(None);
         let fits = |bundle: &Bundle| {
@@ -306,19 +314,35 @@ impl Session {
         }
         let target = target_folder(manifest)?;
         let kept = target.join("hankel/final").join(&self.krate.name);
+        let some = target.join("hankel/some").join(&self.krate.name);
         let toolchain = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
-        if let Ok(bundle) = Bundle::read(&kept)
-            && fits(&bundle)
-            // Another compiler may make something else of the same sources.
-            && toolchain.is_ok_and(|found| {
-                found.is_none_or(|it| it.rustc_version == bundle.origin.made_by.compiler)
-            })
-        {
-            return Ok(bundle);
+        let known = toolchain
+            .as_ref()
+            .map(|found| found.as_ref().map(|it| &it.rustc_version));
+        for folder in [&kept, &some] {
+            if let Ok(bundle) = Bundle::read(folder)
+                && fits(&bundle)
+                && names.iter().all(|name| bundle.modules.contains_key(*name))
+                // Another compiler may make something else of the same sources.
+                && known.as_ref().is_ok_and(|version| {
+                    version.is_none_or(|it| *it == bundle.origin.made_by.compiler)
+                })
+            {
+                return Ok(bundle);
+            }
         }
-        let compiled = self.compile(manifest, &target, reason.take())?;
-        let finished = finished::folder(&target, &self.krate.name);
-        let modules = finish_all(&compiled.modules, &kernels, Some(&finished))?;
+        let compiled = self.compile(manifest, &target, names, reason.take())?;
+        let (modules, kept) = if is_all {
+            let finished = finished::folder(&target, &self.krate.name);
+            (
+                finish_all(&compiled.modules, &kernels, Some(&finished))?,
+                kept,
+            )
+        } else {
+            let is_wanted = |kernel: &&Kernel| names.contains(&kernel.name.as_str());
+            let wanted: Vec<Kernel> = kernels.iter().filter(is_wanted).cloned().collect();
+            (finish_all(&compiled.modules, &wanted, None)?, some)
+        };
         let bundle = Bundle::new(
             &self.krate.name,
             &kernels,
@@ -330,8 +354,14 @@ impl Session {
         Ok(bundle)
     }
 
-    /// Raw SPIR-V from rust-gpu.
-    fn compile(&self, manifest: &Path, target: &Path, reason: Option<String>) -> Result<Compiled> {
+    /// Raw SPIR-V of the entry points called `names` from rust-gpu.
+    fn compile(
+        &self,
+        manifest: &Path,
+        target: &Path,
+        names: &[&str],
+        reason: Option<String>,
+    ) -> Result<Compiled> {
         let mut progress = Progress::new(self.quiet);
         let options = hankel_toolchain::Options::from_env();
         let toolchain = hankel_toolchain::ensure(&options, &mut progress).map_err(|error| {
@@ -353,20 +383,25 @@ impl Session {
             bin: toolchain.bin,
             channel: toolchain.channel,
         };
+        let is_all = names.len() == self.krate.entries.len();
+        let (what, wanted) = if is_all {
+            (self.krate.name.clone(), Wanted::All(names))
+        } else {
+            let what = format!("{} of {}", names.join(", "), self.krate.name);
+            (what, Wanted::Only(names))
+        };
         progress.begin(&format!(
-            "Compiling {} to SPIR-V (half a minute the first time, then about a second)",
-            self.krate.name
+            "Compiling {what} to SPIR-V (half a minute the first time, then seconds)"
         ));
-        let names: Vec<&str> = self
-            .krate
-            .entries
-            .iter()
-            .map(|e| e.kernel.name.as_str())
-            .collect();
         // Called from another thread: only the text is handed over.
         let line = |line: &str| progress.detail(line);
-        Ok(compile(manifest, &compiler, target, &names, &mut { line })?)
+        Ok(compile(manifest, &compiler, target, wanted, &mut { line })?)
     }
+}
+
+/// The names of the entry points that a request is for.
+fn chosen(request: &Request) -> Result<Vec<&str>> {
+    Ok(request.chosen()?.iter().map(|k| k.name.as_str()).collect())
 }
 
 /// Where this program lies.

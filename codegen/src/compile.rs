@@ -141,11 +141,41 @@ const MOST_ATTEMPTS: u32 = 4;
 /// File systems tell the time of a change in steps; the kernel's clock for it lags a little.
 const CLOCK_STEP: Duration = Duration::from_millis(50);
 
+/// What is compiled of a crate.
+#[derive(Clone, Copy, Debug)]
+pub enum Wanted<'a> {
+    /// All of its entry points; these must come out.
+    All(&'a [&'a str]),
+    /// These entry points alone. rust-gpu's linker takes most of the time of a build, in proportion to
+    /// what it links.
+    Only(&'a [&'a str]),
+}
+
+impl<'a> Wanted<'a> {
+    /// The entry points that must come out.
+    fn names(self) -> &'a [&'a str] {
+        let (Self::All(names) | Self::Only(names)) = self;
+        names
+    }
+
+    /// rustc's flags for the crate itself: `#[kernel]` knows them.
+    fn flags(self) -> Vec<String> {
+        let Self::Only(names) = self else {
+            return Vec::new();
+        };
+        let mut flags = vec!["--cfg".to_owned(), "hankel_select".into()];
+        for name in names {
+            flags.extend(["--cfg".into(), format!("hankel_kernel={name:?}")]);
+        }
+        flags
+    }
+}
+
 /// Compiles the kernel crate whose Cargo.toml is `manifest`.
 ///
 /// `target_dir` is cargo's target folder (the artefacts go into [`TARGET_SUBFOLDER`] of it);
-/// `kernels` are the entry points that must come out; `progress` gets every line that cargo
-/// prints. The first build takes half a minute, later ones about a second.
+/// `progress` gets every line that cargo prints. The first build takes half a minute, later ones about a
+/// second.
 ///
 /// # Errors
 ///
@@ -154,7 +184,7 @@ pub fn compile(
     manifest: &Path,
     compiler: &Compiler,
     target_dir: &Path,
-    kernels: &[&str],
+    wanted: Wanted<'_>,
     progress: &mut (dyn FnMut(&str) + Send),
 ) -> Result<Compiled> {
     let manifest = std::path::absolute(manifest).during("resolve", manifest)?;
@@ -190,7 +220,7 @@ pub fn compile(
             &manifest,
             folder,
             &target_dir,
-            kernels,
+            wanted,
             progress,
         )?;
         let artefact = last_artefact(&messages).ok_or_else(|| Error::Manifest {
@@ -200,7 +230,7 @@ pub fn compile(
         if !artefact.belongs_to(&manifest)? {
             continue;
         }
-        let modules = read_modules(&manifest, &artefact.file, kernels)?;
+        let modules = read_modules(&manifest, &artefact.file, wanted.names())?;
         let names = gather(&Build {
             folder,
             own: &own,
@@ -232,10 +262,11 @@ fn run(
     manifest: &Path,
     folder: &Path,
     target_dir: &Path,
-    kernels: &[&str],
+    wanted: Wanted<'_>,
     progress: &mut (dyn FnMut(&str) + Send),
 ) -> Result<String> {
     let mut cargo = cargo(compiler, version, manifest, folder, target_dir)?;
+    cargo.arg("--").args(wanted.flags());
     let program = PathBuf::from(cargo.get_program());
     cargo.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut running = Program::start(&mut cargo).map_err(|source| Error::Run {
@@ -272,7 +303,7 @@ fn run(
         .wait()
         .map_err(|source| Error::Run { program, source })?;
     if !status.success() {
-        return Err(failure(manifest, kernels, &said, &messages));
+        return Err(failure(manifest, wanted.names(), &said, &messages));
     }
     Ok(messages)
 }

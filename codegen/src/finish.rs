@@ -12,7 +12,7 @@ use spirv_tools::val::Validator;
 use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::Memory;
-use crate::spirv::{self, exact, libm, names, order, refused, split, trim, uniform};
+use crate::spirv::{self, canonical, exact, libm, names, order, refused, split, trim, uniform};
 use crate::translate::reading;
 
 /// What the modules are for.
@@ -49,6 +49,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         construct: failure.construct.clone().or_else(|| place.clone()),
         ..failure
     })?;
+    canonical::order(&mut module);
     libm::mend(&mut module);
     let words = optimise(module, name)?;
     let mut module = spirv::load(&words, name)?;

@@ -60,7 +60,7 @@ impl Native<'_> {
         };
         flags.extend(["--cfg".into(), "hankel_select".into()]);
         for name in names {
-            flags.extend(["--cfg".into(), format!("hankel_native={name:?}").into()]);
+            flags.extend(["--cfg".into(), format!("hankel_kernel={name:?}").into()]);
         }
         flags
     }

@@ -7,8 +7,9 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use hankel_codegen::compile::{Compiler, compile};
+use hankel_codegen::compile::{Compiler, Wanted, compile};
 use hankel_codegen::finished::finish_all;
+use hankel_dsl::native::describe::Kernel;
 use hankel_tests::{Crate, root};
 use hankel_toolchain::{Options, Silent};
 
@@ -40,8 +41,22 @@ fn committed_spirv_follows_from_its_sources() {
         let kernels: Vec<_> = one.entries.iter().map(|e| e.kernel.clone()).collect();
         let names: Vec<&str> = kernels.iter().map(|k| k.name.as_str()).collect();
         let target = root().join("target");
-        let compiled = compile(&one.manifest, &compiler, &target, &names, &mut |_| {})
-            .unwrap_or_else(|e| panic!("{e}"));
+        let mut compile = |wanted| {
+            compile(&one.manifest, &compiler, &target, wanted, &mut |_| {})
+                .unwrap_or_else(|e| panic!("{e}"))
+        };
+        // A build of some kernels gives what a build of all gives.
+        let some: Vec<&str> = names.iter().step_by(30).copied().collect();
+        let alone = compile(Wanted::Only(&some)).modules;
+        assert_eq!(alone.keys().collect::<Vec<_>>(), {
+            let mut some = some.iter().collect::<Vec<_>>();
+            some.sort();
+            some
+        });
+        let compiled = compile(Wanted::All(&names));
+        let is_alone = |kernel: &&Kernel| some.contains(&kernel.name.as_str());
+        let alone_kernels: Vec<Kernel> = kernels.iter().filter(is_alone).cloned().collect();
+        let alone = finish_all(&alone, &alone_kernels, None).unwrap_or_else(|e| panic!("{e}"));
         let fresh = finish_all(&compiled.modules, &kernels, None).unwrap_or_else(|e| panic!("{e}"));
         for (name, bytes) in &fresh {
             assert_eq!(
@@ -51,6 +66,9 @@ fn committed_spirv_follows_from_its_sources() {
             );
         }
         assert_eq!(fresh.len(), one.bundle.modules.len());
+        for (name, bytes) in &alone {
+            assert!(fresh.get(name) == Some(bytes), "{name}: alone it is other");
+        }
         // What was recorded is what a build reads, no less and no more.
         assert_eq!(
             compiled.inputs, one.bundle.origin.inputs,

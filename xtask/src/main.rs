@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use hankel_codegen::bundle::Bundle;
-use hankel_codegen::compile::{Compiler, compile};
+use hankel_codegen::compile::{Compiler, Wanted, compile};
 use hankel_codegen::finished::finish_all;
 use hankel_dsl::native::Entry;
 use hankel_dsl::native::describe::Kernel;
@@ -89,7 +89,7 @@ impl Committed {
             &manifest,
             &compiler,
             &root().join("target"),
-            &names,
+            Wanted::All(&names),
             &mut |_| {},
         )?;
         Ok(Bundle::new(

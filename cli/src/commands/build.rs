@@ -134,9 +134,9 @@ fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     let request = session.request(&args.generate)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
-    let report = build(&request, &session.modules()?, &args.out, args.force)?;
+    let report = build(&request, &session.modules(&request)?, &args.out, args.force)?;
     let inputs = match args.watch || args.depfile.is_some() {
-        true => [session.inputs()?, places(args)?].concat(),
+        true => [session.inputs(&request)?, places(args)?].concat(),
         false => Vec::new(),
     };
     tell(args, &report, quiet);

@@ -58,5 +58,5 @@ fn expected(args: &Check, quiet: bool) -> Result<Generated> {
     let request = session.request(&args.generate)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
-    Ok(generate(&request, &session.modules()?)?)
+    Ok(generate(&request, &session.modules(&request)?)?)
 }

@@ -145,7 +145,11 @@ fn draft(scene: &Scene, file: &Path) -> Result<Draft> {
 fn generate(args: &Generate, draft: &Draft, quiet: bool) -> Result<Generated> {
     let session = Session::linked(quiet);
     let request = session.request(args)?;
-    Ok(frame::generate(&request, draft, &session.modules()?)?)
+    Ok(frame::generate(
+        &request,
+        draft,
+        &session.modules(&request)?,
+    )?)
 }
 
 /// The files that a frame follows from beside this program, as absolute paths.

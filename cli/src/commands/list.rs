@@ -18,7 +18,7 @@ pub fn run(args: &List, quiet: bool) -> Result<Outcome> {
         vec![Language::Spirv],
         Options::default(),
     );
-    let generated = generate(&request, &session.modules()?)?;
+    let generated = generate(&request, &session.modules(&request)?)?;
     if args.format == Format::Json {
         print::json(&generated.manifest.kernels);
         return Ok(Outcome::Fine);

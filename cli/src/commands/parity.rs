@@ -82,7 +82,7 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let targets: BTreeSet<Language> = columns.iter().filter_map(|c| c.language()).collect();
     let targets = targets.into_iter().collect();
     let request = session.request_for(args.kernels.clone(), targets, options);
-    let modules = session.modules()?;
+    let modules = session.modules(&request)?;
     let generated = generate(&request, &modules)?;
     let krate = session.native(generated.manifest.kernels.keys(), limit)?;
     let subjects = Subject::with_constants(&generated, &request, &modules, &krate.entries)?;

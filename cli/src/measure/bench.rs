@@ -94,7 +94,7 @@ fn instructions(quiet: bool) -> Result<Table> {
         vec![Language::Spirv, Language::Wgsl, Language::Glsl],
         Options::default(),
     );
-    let generated = generate(&request, &session.modules()?)?;
+    let generated = generate(&request, &session.modules(&request)?)?;
     let mut table = Table::new(
         "instructions",
         "Instructions of the shaders, counted in their SPIR-V (`hankel list`): what computes, \

@@ -17,7 +17,7 @@ impl Kernel {
             let run = self.run(v);
             let entry = &v.entry;
             // `hankel` sets these two: what is only described, or does not run, is not compiled.
-            let wanted = quote!(any(not(hankel_select), hankel_native = #entry));
+            let wanted = quote!(any(not(hankel_select), hankel_kernel = #entry));
             let inputs = match (&self.inputs, &v.scalar) {
                 (None, _) => quote!(None),
                 (Some(path), None) => quote!(Some(#path as native::inputs::Make)),
@@ -45,7 +45,7 @@ impl Kernel {
             // As the native code that calls it.
             let entries = self.variants.iter().map(|v| &v.entry);
             quote! {
-                #[cfg(any(not(hankel_select), #(hankel_native = #entries),*))]
+                #[cfg(any(not(hankel_select), #(hankel_kernel = #entries),*))]
                 #twin
             }
         });

@@ -11,7 +11,15 @@ impl Kernel {
         let entries = self.variants.iter().map(|v| self.entry_point(v));
         quote! {
             ::hankel_dsl::on_spirv! {
-                #[allow(missing_docs, unused_braces, unused_imports, clippy::all, reason = "generated")]
+                #[allow(
+                    clippy::all,
+                    dead_code,
+                    missing_docs,
+                    unexpected_cfgs,
+                    unused_braces,
+                    unused_imports,
+                    reason = "generated"
+                )]
                 pub mod shader {
                     use super::*;
                     use ::hankel_dsl::spirv_std::arch::IndexUnchecked;
@@ -52,6 +60,7 @@ impl Kernel {
         let params = self.shader_params(variant);
         let outputs = self.shader_outputs(variant);
         quote! {
+            #[cfg(any(not(hankel_select), hankel_kernel = #entry))]
             #[::hankel_dsl::spirv_std::spirv(#stage)]
             pub fn #function(#builtins #params #outputs) {
                 #body
