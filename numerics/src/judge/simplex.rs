@@ -8,13 +8,16 @@
 const PRICE: f64 = 1e6;
 
 /// A column enters if it makes a unit of weight cheaper by this.
-const GAIN: f64 = 1e-9;
+const GAIN: f64 = 1e-8;
 
 /// A pivot is not less.
 const PIVOT: f64 = 1e-11;
 
 /// Pivots after which the solution is taken as it is.
 const MOST_PIVOTS: usize = 400;
+
+/// Pivots after which the basis is inverted anew, so that rounding errors do not add up.
+const FRESH: usize = 40;
 
 /// Pivots in one run after which the first column that gains enters, instead of that which gains most: such runs do not
 /// go in circles (R. Bland, 1977).
@@ -30,6 +33,7 @@ enum Member {
 /// A programme and its best solution so far.
 #[derive(Clone, Debug)]
 pub struct Programme<const K: usize> {
+    targets: [f64; K],
     columns: Vec<[f64; K]>,
     costs: Vec<f64>,
     members: [Member; K],
@@ -47,6 +51,7 @@ impl<const K: usize> Programme<K> {
             row[i] = if targets[i] < 0.0 { -1.0 } else { 1.0 };
         }
         Self {
+            targets,
             columns: Vec::new(),
             costs: Vec::new(),
             members: [Member::Missed; K],
@@ -73,6 +78,9 @@ impl<const K: usize> Programme<K> {
     /// Finds the best weights of the columns that there are. False if that took too many pivots.
     pub fn solve(&mut self) -> bool {
         for pivots in 0..MOST_PIVOTS {
+            if pivots % FRESH == FRESH - 1 {
+                self.renew();
+            }
             let mut prices = [0.0; K];
             for (member, row) in self.members.iter().zip(&self.inverse) {
                 let cost = self.cost(*member);
@@ -150,6 +158,50 @@ impl<const K: usize> Programme<K> {
         true
     }
 
+    /// Inverts the basis by elimination, and takes the weights from there. One that cannot be inverted stays.
+    fn renew(&mut self) {
+        let mut basis = [[0.0; K]; K];
+        let mut inverse = [[0.0; K]; K];
+        for (i, member) in self.members.iter().enumerate() {
+            match member {
+                Member::Column(c) => {
+                    for (row, x) in basis.iter_mut().zip(self.columns[*c]) {
+                        row[i] = x;
+                    }
+                }
+                Member::Missed => basis[i][i] = if self.targets[i] < 0.0 { -1.0 } else { 1.0 },
+            }
+            inverse[i][i] = 1.0;
+        }
+        for k in 0..K {
+            let largest = (k..K).max_by(|a, b| basis[*a][k].abs().total_cmp(&basis[*b][k].abs()));
+            let largest = largest.unwrap_or(k);
+            if basis[largest][k].abs() < PIVOT {
+                return;
+            }
+            basis.swap(k, largest);
+            inverse.swap(k, largest);
+            let per_pivot = 1.0 / basis[k][k];
+            basis[k] = basis[k].map(|x| x * per_pivot);
+            inverse[k] = inverse[k].map(|x| x * per_pivot);
+            let (row, its_inverse) = (basis[k], inverse[k]);
+            for i in (0..K).filter(|i| *i != k) {
+                let by = basis[i][k];
+                for (x, r) in basis[i].iter_mut().zip(row) {
+                    *x -= by * r;
+                }
+                for (x, r) in inverse[i].iter_mut().zip(its_inverse) {
+                    *x -= by * r;
+                }
+            }
+        }
+        self.inverse = inverse;
+        for (weight, row) in self.weights.iter_mut().zip(&inverse) {
+            let sum: f64 = row.iter().zip(self.targets).map(|(a, b)| a * b).sum();
+            *weight = sum.max(0.0);
+        }
+    }
+
     /// The cost of the columns' weights.
     pub fn value(&self) -> f64 {
         self.support()
@@ -193,6 +245,25 @@ mod tests {
         assert!(programme.solve());
         assert!((programme.value() - 0.1).abs() < 1e-12);
         assert_eq!(programme.support().count(), 1);
+    }
+
+    #[test]
+    fn a_renewed_basis_is_the_same() {
+        let mut programme = Programme::new([1.0, 0.6, -0.3]);
+        let columns = (0..40).map(|i| {
+            let z = f64::from(i) / 39.0;
+            ([1.0, z, z * z - 0.8], (5.0 * z).sin() + 1.0)
+        });
+        programme.extend(columns);
+        assert!(programme.solve());
+        let before = programme.clone();
+        programme.renew();
+        assert!((programme.value() - before.value()).abs() < 1e-12);
+        for (new, old) in programme.inverse.iter().flatten().zip(before.inverse.iter().flatten()) {
+            assert!((new - old).abs() < 1e-8 * (1.0 + old.abs()), "{new} {old}");
+        }
+        let weights: f64 = programme.support().map(|(_, weight)| weight).sum();
+        assert!((weights - 1.0).abs() < 1e-12 && programme.missed() < 1e-12);
     }
 
     #[test]
