@@ -69,6 +69,7 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
             why: "no rounding differs".into(),
         },
         rounding: Rounding::Free,
+        subgroups: Subgroups::Unused,
     }
 }
 

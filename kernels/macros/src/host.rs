@@ -134,6 +134,8 @@ impl Kernel {
         let (ulp, absolute, why) = (tolerance.ulp, tolerance.absolute, &tolerance.why);
         let non_finite = tolerance.non_finite;
         let rounding = format_ident!("{}", self.rounding.variant());
+        let subgroups = self.uses_subgroups();
+        let sized = self.sized_by_subgroups;
         quote! {
             describe::Kernel {
                 name: #entry.into(),
@@ -152,6 +154,7 @@ impl Kernel {
                     why: #why.into(),
                 },
                 rounding: describe::Rounding::#rounding,
+                subgroups: describe::Subgroups::of(#subgroups, #sized),
             }
         }
     }
@@ -403,6 +406,12 @@ impl Kernel {
                 Role::BuiltIn(BuiltIn::LocalId) => self.host_place(&quote!(__it.local)),
                 Role::BuiltIn(BuiltIn::GroupId) => self.host_place(&quote!(__it.group)),
                 Role::BuiltIn(BuiltIn::GroupCount) => self.host_place(&quote!(__it.groups)),
+                Role::BuiltIn(BuiltIn::SubgroupSize) => quote!(__it.subgroup_size),
+                Role::BuiltIn(BuiltIn::SubgroupInvocationId) => {
+                    quote!(__it.subgroup_invocation_id())
+                }
+                Role::BuiltIn(BuiltIn::SubgroupId) => quote!(__it.subgroup_id()),
+                Role::BuiltIn(BuiltIn::SubgroupCount) => quote!(__it.subgroup_count),
                 Role::BuiltIn(built_in) => built_in.on_host(),
                 Role::Shared { .. } => quote!(#name),
             }

@@ -38,6 +38,8 @@ pub struct Kernel {
     pub inputs: Option<TokenStream>,
     /// Cooperative functions that it calls.
     pub helpers: Vec<Ident>,
+    /// Its result depends on the size of subgroups.
+    pub sized_by_subgroups: bool,
 }
 
 /// A variant of `describe::Rounding`.
@@ -202,6 +204,10 @@ pub enum BuiltIn {
     LocalIndex,
     GroupId,
     GroupCount,
+    SubgroupSize,
+    SubgroupInvocationId,
+    SubgroupId,
+    SubgroupCount,
     VertexIndex,
     InstanceIndex,
     FragCoord,
@@ -210,11 +216,15 @@ pub enum BuiltIn {
 }
 
 /// Each by the word of its attribute.
-const BUILT_INS: [(&str, BuiltIn); 9] = [
+const BUILT_INS: [(&str, BuiltIn); 13] = [
     ("local_id", BuiltIn::LocalId),
     ("local_index", BuiltIn::LocalIndex),
     ("group_id", BuiltIn::GroupId),
     ("group_count", BuiltIn::GroupCount),
+    ("subgroup_size", BuiltIn::SubgroupSize),
+    ("subgroup_invocation_id", BuiltIn::SubgroupInvocationId),
+    ("subgroup_id", BuiltIn::SubgroupId),
+    ("subgroup_count", BuiltIn::SubgroupCount),
     ("vertex_index", BuiltIn::VertexIndex),
     ("instance_index", BuiltIn::InstanceIndex),
     ("frag_coord", BuiltIn::FragCoord),
@@ -223,6 +233,17 @@ const BUILT_INS: [(&str, BuiltIn); 9] = [
 ];
 
 impl BuiltIn {
+    /// Whether only an invocation in a subgroup has it.
+    pub const fn is_of_subgroup(self) -> bool {
+        matches!(
+            self,
+            Self::SubgroupSize
+                | Self::SubgroupInvocationId
+                | Self::SubgroupId
+                | Self::SubgroupCount
+        )
+    }
+
     /// The variant of `describe::BuiltIn`.
     pub fn variant(self) -> Ident {
         format_ident!(
@@ -232,6 +253,10 @@ impl BuiltIn {
                 Self::LocalIndex => "LocalIndex",
                 Self::GroupId => "GroupId",
                 Self::GroupCount => "GroupCount",
+                Self::SubgroupSize => "SubgroupSize",
+                Self::SubgroupInvocationId => "SubgroupInvocationId",
+                Self::SubgroupId => "SubgroupId",
+                Self::SubgroupCount => "SubgroupCount",
                 Self::VertexIndex => "VertexIndex",
                 Self::InstanceIndex => "InstanceIndex",
                 Self::FragCoord => "FragCoord",
@@ -359,7 +384,7 @@ impl Role {
 /// Variables of the generated code.
 const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
 
-const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
+const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
 
 impl Kernel {
     pub fn parse(args: TokenStream, mut item: ItemFn) -> syn::Result<Self> {
@@ -393,10 +418,15 @@ impl Kernel {
         let rounding = args.rounding.unwrap_or(Rounding::Free);
         let inputs = args.inputs.as_ref().map(from_inside);
         let helpers = args.cooperative.clone();
+        let depends = args.depends.clone();
         let mut stage = args.into_stage(&params, &outputs, &name)?;
         if let Stage::Compute(c) = &mut stage.0 {
             c.cooperative = twin::has_barrier(&item, &helpers)
-                || params.iter().any(|p| matches!(p.role, Role::Shared { .. }));
+                || params.iter().any(|p| match p.role {
+                    Role::Shared { .. } => true,
+                    Role::BuiltIn(built_in) => built_in.is_of_subgroup(),
+                    _ => false,
+                });
             options(&elements, c.cooperative)?;
         }
         let tolerance = stage.1;
@@ -414,7 +444,14 @@ impl Kernel {
             rounding,
             inputs,
             helpers,
+            sized_by_subgroups: depends.is_some(),
         };
+        if let Some(word) = depends.filter(|_| kernel.form() != Form::Cooperative) {
+            return Err(syn::Error::new(
+                word.span(),
+                "the kernel has no operation of subgroups and does not ask for their size: leave `depends` out",
+            ));
+        }
         kernel.check()?;
         Ok(kernel)
     }
@@ -930,6 +967,8 @@ struct Args {
     precision: Vec<Ident>,
     formats: Vec<Format>,
     cooperative: Vec<Ident>,
+    /// What the result depends on: the size of subgroups.
+    depends: Option<Ident>,
     range: Option<(Span, Punctuated<Expr, Token![,]>)>,
     outputs: Option<(Span, Vec<Option<Format>>)>,
     tolerance: Option<Tolerance>,
@@ -971,6 +1010,18 @@ impl Parse for Args {
                     args.threads = Some(threads);
                 }
                 "cooperative" => args.cooperative = idents(input)?,
+                "depends" => {
+                    let on = idents(input)?;
+                    match &on[..] {
+                        [size] if size == "subgroup_size" => args.depends = Some(size.clone()),
+                        _ => {
+                            return Err(syn::Error::new(
+                                word.span(),
+                                "a result may depend on one thing that differs from device to device: write `depends(subgroup_size)`",
+                            ));
+                        }
+                    }
+                }
                 "precision" => {
                     args.precision = idents(input)?;
                     for p in &args.precision {
@@ -1010,7 +1061,7 @@ impl Parse for Args {
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, exact, pinned, inputs or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, inputs or parity",
                     ));
                 }
             }
@@ -1228,13 +1279,14 @@ impl Args {
             word => {
                 if self.threads.is_some()
                     || !self.cooperative.is_empty()
+                    || self.depends.is_some()
                     || self.range.is_some()
                     || self.outputs.is_some()
                     || !self.formats.is_empty()
                 {
                     return Err(syn::Error::new(
                         name.span(),
-                        "threads, range, outputs, cooperative and texture belong to compute kernels",
+                        "threads, range, outputs, cooperative, depends and texture belong to compute kernels",
                     ));
                 }
                 if outputs.is_empty() {

@@ -17,6 +17,7 @@ pub mod math;
 pub mod sampling;
 pub mod shadow;
 pub mod stage;
+pub mod subgroup;
 pub mod texels;
 pub mod texture;
 pub mod workgroup;
@@ -33,6 +34,13 @@ hankel_dsl::kernels![
     workgroup::group_histogram,
     workgroup::places,
     workgroup::neighbours,
+    subgroup::quick_sum,
+    subgroup::places_of_odd,
+    subgroup::votes,
+    subgroup::exchanged,
+    subgroup::reduced,
+    subgroup::reduced_floats,
+    subgroup::quads,
     checker,
     gradient,
     downsample,

@@ -340,6 +340,7 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
             why: "the driver is wrong or it is not".into(),
         },
         rounding: describe::Rounding::Free,
+        subgroups: describe::Subgroups::Unused,
     }
 }
 

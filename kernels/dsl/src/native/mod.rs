@@ -15,14 +15,16 @@ pub mod layout;
 pub mod plugin;
 pub(crate) mod sampling;
 pub mod sanitize;
+#[doc(hidden)]
+pub mod subgroup;
 pub mod texel;
 mod transpose;
 #[doc(hidden)]
 pub mod workgroup;
 
 pub use call::{
-    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Run, Sampler, TextureMut,
-    TextureRef, level_size, texture_bytes,
+    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Run, SUBGROUP_SIZE,
+    SUBGROUP_SIZES, Sampler, TextureMut, TextureRef, level_size, texture_bytes,
 };
 
 /// An entry point: what it is, and its native code.
