@@ -198,6 +198,9 @@ pub struct KernelEntry {
     /// What compilers and drivers may do with its floating-point arithmetic.
     #[serde(default)]
     pub rounding: Rounding,
+    /// What it does with subgroups; absent if nothing.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub subgroups: Option<Subgroups>,
     /// The text in each language.
     pub languages: BTreeMap<Language, LanguageEntry>,
     /// Languages that cannot express it, and why.
@@ -217,6 +220,17 @@ pub enum Rounding {
     /// Neither, which all files ask for: otherwise the result is wrong. Hand SPIR-V to the driver
     /// as it is; naga, and so wgpu, would drop what forbids it.
     Exact,
+}
+
+/// What a kernel does with subgroups. The device must have them (WebGPU's feature `subgroups`; SPIR-V's
+/// capabilities; HLSL's waves; Metal's SIMD-groups).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Subgroups {
+    /// It uses them, and its result is the same for every size.
+    AnySize,
+    /// Its result depends on their size, which differs from device to device.
+    Sized,
 }
 
 /// A pipeline stage.
@@ -563,6 +577,11 @@ pub(crate) fn entry(
             describe::Rounding::Free => Rounding::Free,
             describe::Rounding::Pinned => Rounding::Pinned,
             describe::Rounding::Exact => Rounding::Exact,
+        },
+        subgroups: match kernel.subgroups {
+            describe::Subgroups::Unused => None,
+            describe::Subgroups::AnySize => Some(Subgroups::AnySize),
+            describe::Subgroups::Sized => Some(Subgroups::Sized),
         },
         languages: BTreeMap::new(),
         unsupported: BTreeMap::new(),

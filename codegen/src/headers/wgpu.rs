@@ -6,6 +6,7 @@ use std::fmt::Write;
 use super::rust::identifier;
 use super::{Groups, InWgsl};
 use crate::manifest::{Binding, BindingKind, KernelEntry, StageName};
+use crate::translate::ENABLE_SUBGROUPS;
 use crate::{Language, VERSION};
 
 /// The module; it is included in the module that includes `hankel.rs`.
@@ -69,13 +70,23 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry, groups: &Group
                  }})\n        }}\n"
         );
     }
+    // naga 30 refuses the line that WGSL asks for.
+    let enabled = kernel.subgroups.is_some();
+    let (wgsl, note) = if enabled {
+        (
+            format!("kernel::WGSL.replace({ENABLE_SUBGROUPS:?}, \"\")"),
+            " wgpu 30 has the operations of subgroups, and refuses the line that enables them.",
+        )
+    } else {
+        ("kernel::WGSL".into(), "")
+    };
     let _ = write!(
         text,
-        "\n        /// The shader.\n        \
+        "\n        /// The shader.{note}\n        \
          pub fn shader(device: &wgpu::Device) -> wgpu::ShaderModule {{\n            \
              device.create_shader_module(wgpu::ShaderModuleDescriptor {{\n                \
                  label: Some(kernel::WGSL_ENTRY_POINT),\n                \
-                 source: wgpu::ShaderSource::Wgsl(kernel::WGSL.into()),\n            \
+                 source: wgpu::ShaderSource::Wgsl({wgsl}.into()),\n            \
              }})\n        }}\n"
     );
     if kernel.stage == StageName::Compute {

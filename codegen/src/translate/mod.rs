@@ -29,6 +29,7 @@ pub(crate) mod text;
 mod wgsl;
 
 pub(crate) use cleanup::{each_statement, each_within};
+pub(crate) use wgsl::ENABLE_SUBGROUPS;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -506,6 +507,11 @@ impl Ir {
                     .into(),
             );
         }
+        if !kernel.subgroups.is_unused()
+            && let Some(reason) = without_subgroups(language, options)
+        {
+            return Some(reason);
+        }
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
         let wide = [ScalarKind::Float, ScalarKind::Uint, ScalarKind::Sint];
         let wide = wide.iter().any(|kind| self.has_wide(*kind));
@@ -812,6 +818,29 @@ fn inexact(language: Language, options: &Options) -> Option<String> {
         "{lacks}; the kernel is right only if it is computed as it is written"
     ))
 }
+
+/// Why a language has no operations of subgroups.
+fn without_subgroups(language: Language, options: &Options) -> Option<String> {
+    match language {
+        Language::Essl310 | Language::Essl300 => Some(format!(
+            "{language} has no operations of subgroups: exchange values through workgroup memory"
+        )),
+        Language::Hlsl if options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_0 => {
+            Some(format!(
+                "HLSL has operations of waves from shader model 6.0 on, not in {}",
+                options.shader_model
+            ))
+        }
+        Language::Msl if options.msl_version < SUBGROUPS_MSL => Some(format!(
+            "MSL {} has no sums over SIMD-groups on every device: they came with {SUBGROUPS_MSL}",
+            options.msl_version
+        )),
+        _ => None,
+    }
+}
+
+/// The first version of MSL with all operations of SIMD-groups on every device that has it.
+const SUBGROUPS_MSL: MslVersion = MslVersion { major: 2, minor: 3 };
 
 /// The role of a parameter that is the sample's number.
 const SAMPLE_INDEX: Role = Role::BuiltIn {

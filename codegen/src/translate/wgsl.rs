@@ -18,6 +18,13 @@ const MORE_FORMATS: &str = "texture-formats-tier1";
 /// WGSL's language feature for storage textures that are read.
 const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
 
+/// WebGPU's feature for operations of subgroups, and WGSL's extension.
+const SUBGROUPS: &str = "subgroups";
+
+/// What begins a text with operations of subgroups, as WGSL demands. naga 30 has the operations, and
+/// refuses this line: whoever hands the text to wgpu 30 takes it out.
+pub(crate) const ENABLE_SUBGROUPS: &str = "enable subgroups;\n";
+
 /// The largest f32, as naga writes it.
 const LARGEST_AS_WRITTEN: &str = "340282350000000000000000000000000000000";
 
@@ -70,6 +77,12 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     }
     let entry_point = text::name_before(&source_after_stage(&source), "(")
         .unwrap_or_else(|| job.kernel.name.clone());
+    let source = if job.kernel.subgroups.is_unused() {
+        source
+    } else {
+        requires.push(SUBGROUPS.to_owned());
+        format!("{ENABLE_SUBGROUPS}\n{source}")
+    };
     Ok(Written::Text(Text {
         source,
         entry_point,

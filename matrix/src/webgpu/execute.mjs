@@ -26,7 +26,10 @@ const ALIGNMENT = 256;
 /** The feature that adds formats of 16-bit normalised numbers, and storage of small ones. */
 const TIER = "texture-formats-tier1";
 
-const FEATURES = ["float32-filterable", TIER];
+/** The feature of operations of subgroups. */
+const SUBGROUPS = "subgroups";
+
+const FEATURES = ["float32-filterable", TIER, SUBGROUPS];
 
 const FILTERS = ["validation", "out-of-memory", "internal"];
 
@@ -76,6 +79,9 @@ export async function execute(device, job, code, inputs) {
 }
 
 async function run(device, job, code, inputs, held) {
+    if (code.includes("\nenable subgroups;") && !device.features.has(SUBGROUPS)) {
+        throw new Error(`the device lacks ${SUBGROUPS}`);
+    }
     const maker = new Maker(device, job, code, inputs, held);
     const cases = [];
     for (const one of job.cases) cases.push(await maker.prepare(one));

@@ -24,6 +24,7 @@ fn wanted_features() -> wgpu::Features {
     wgpu::Features::PASSTHROUGH_SHADERS
         | wgpu::Features::SHADER_F64
         | wgpu::Features::SHADER_INT64
+        | wgpu::Features::SUBGROUP
         | wgpu::Features::FLOAT32_FILTERABLE
         | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM
         | wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES

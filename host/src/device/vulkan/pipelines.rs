@@ -9,6 +9,7 @@ use hankel_dsl::native::describe::{
 };
 
 use super::super::error::{DeviceError, Result};
+use super::super::route;
 use super::super::slots::{self, Given, Slot, Use};
 use super::super::{
     Bind, Blend, BufferId, Colour, Cull, Depth, DepthTest, Draw, Format, Pass, Program, Shader,
@@ -125,6 +126,11 @@ impl VulkanDevice {
                     .into(),
             ));
         }
+        if !kernel.subgroups.is_unused()
+            && !self.device.features().contains(wgpu::Features::SUBGROUP)
+        {
+            return Err(self.missing("subgroups", kernel));
+        }
         let constants = slots::constants(kernel, program.constants)?;
         let numbered: Vec<(u32, u32)> = kernel
             .params
@@ -195,6 +201,7 @@ impl VulkanDevice {
                 } else {
                     text.replace("@group(0)", &format!("@group({set})"))
                 };
+                let text = route::for_naga(&text).into_owned();
                 (ModuleKey::Wgsl(text), entry_point.to_string())
             }
         };
