@@ -288,6 +288,9 @@ pub struct Binding {
 pub enum BindingKind {
     /// A uniform buffer.
     Uniform,
+    /// Push constants in SPIR-V, `var<immediate>` in WGSL, neither of which is bound; a uniform buffer,
+    /// root constants or `setBytes` in HLSL, MSL and GLSL, where [`Binding::places`] says.
+    PushConstants,
     /// A storage buffer.
     Storage,
     /// A storage buffer of integers on which only atomic operations work.
@@ -682,8 +685,17 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
     let params = kernel.params.iter().filter_map(|param| {
         let name = param.name.as_str();
         Some(match &param.role {
-            Role::Uniform { binding, layout } => {
-                buffer(*binding, name, BindingKind::Uniform, layout)
+            Role::Uniform {
+                binding,
+                layout,
+                push,
+            } => {
+                let kind = if *push {
+                    BindingKind::PushConstants
+                } else {
+                    BindingKind::Uniform
+                };
+                buffer(*binding, name, kind, layout)
             }
             Role::Element { binding, layout } => Binding {
                 element_for_each: Some("invocation".into()),

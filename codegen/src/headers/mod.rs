@@ -123,7 +123,10 @@ impl<'a> Groups<'a> {
     /// is one group that is empty.
     fn all<'b>(&self, bindings: &'b [Binding]) -> BTreeMap<u32, Vec<(u32, &'b Binding)>> {
         let mut groups: BTreeMap<u32, Vec<(u32, &Binding)>> = BTreeMap::new();
-        for binding in bindings {
+        let bound = bindings
+            .iter()
+            .filter(|it| it.kind != BindingKind::PushConstants);
+        for binding in bound {
             let (group, number) = self.place(binding);
             groups.entry(group).or_default().push((number, binding));
         }

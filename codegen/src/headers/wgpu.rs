@@ -91,13 +91,23 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry, groups: &Group
     );
     if kernel.stage == StageName::Compute {
         let (made, used) = pipeline_groups(&groups);
+        let pushed = kernel
+            .bindings
+            .iter()
+            .find(|b| b.kind == BindingKind::PushConstants);
+        let immediates = pushed.map_or_else(String::new, |b| {
+            format!(
+                "immediate_size: {},\n                ",
+                b.stride.unwrap_or(0)
+            )
+        });
         let _ = write!(
             text,
             "\n        /// The pipeline, with every constant at its default.\n        \
              pub fn pipeline(device: &wgpu::Device) -> wgpu::ComputePipeline {{\n{made}            \
                  let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {{\n                \
                      label: Some(kernel::WGSL_ENTRY_POINT),\n                \
-                     bind_group_layouts: &[{used}],\n                ..Default::default()\n            \
+                     bind_group_layouts: &[{used}],\n                {immediates}..Default::default()\n            \
                  }});\n            \
                  device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {{\n                \
                      label: Some(kernel::WGSL_ENTRY_POINT),\n                layout: Some(&layout),\n                \
@@ -168,7 +178,7 @@ fn ty(binding: &Binding, filters: bool) -> String {
         _ => "D2",
     };
     match binding.kind {
-        BindingKind::Uniform => buffer("Uniform"),
+        BindingKind::Uniform | BindingKind::PushConstants => buffer("Uniform"),
         BindingKind::Storage => buffer(match binding.written {
             true => "Storage { read_only: false }",
             false => "Storage { read_only: true }",

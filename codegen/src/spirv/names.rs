@@ -24,8 +24,17 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
     };
     for param in &kernel.params {
         match &param.role {
-            Role::Uniform { binding, layout } => {
-                names.buffer(module, *binding, &param.name, layout, "Uniform", "value")?;
+            Role::Uniform {
+                binding,
+                layout,
+                push,
+            } => {
+                let variable = if *push {
+                    in_class(module, StorageClass::PushConstant).next()
+                } else {
+                    bound(module, *binding)
+                };
+                names.block(module, variable, &param.name, layout, "Uniform", "value")?;
             }
             Role::Element { binding, layout }
             | Role::ElementMut { binding, layout }
@@ -308,7 +317,21 @@ impl Names<'_> {
         suffix: &str,
         member: &str,
     ) -> Result<(), Failure> {
-        let Some(variable) = bound(module, binding) else {
+        let variable = bound(module, binding);
+        self.block(module, variable, name, layout, suffix, member)
+    }
+
+    /// The same of a variable; none if the kernel does not use it.
+    fn block(
+        &mut self,
+        module: &Module,
+        variable: Option<Word>,
+        name: &str,
+        layout: &Layout,
+        suffix: &str,
+        member: &str,
+    ) -> Result<(), Failure> {
+        let Some(variable) = variable else {
             return Ok(());
         };
         self.set(variable, name);

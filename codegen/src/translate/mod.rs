@@ -349,6 +349,14 @@ impl Ir {
         } else {
             Cow::Borrowed(self)
         };
+        if language != Language::Wgsl
+            && let Some(binding) = pushed(kernel)
+        {
+            let ir = ir.to_mut();
+            if push_constants_to_uniform(&mut ir.module, binding) {
+                ir.info = validate(&ir.module, &ir.kernel)?;
+            }
+        }
         if matches!(language, Language::Essl310 | Language::Essl300)
             && cleanup::has_bit_counts(&ir.module)
         {
@@ -817,6 +825,32 @@ fn inexact(language: Language, options: &Options) -> Option<String> {
     Some(format!(
         "{lacks}; the kernel is right only if it is computed as it is written"
     ))
+}
+
+/// The binding that push constants have where a language has none.
+fn pushed(kernel: &Kernel) -> Option<u32> {
+    kernel.params.iter().find_map(|param| match param.role {
+        Role::Uniform {
+            binding,
+            push: true,
+            ..
+        } => Some(binding),
+        _ => None,
+    })
+}
+
+/// Makes push constants a uniform buffer: HLSL, MSL and GLSL for OpenGL have one form for both. Tells
+/// whether there are any.
+fn push_constants_to_uniform(module: &mut Module, binding: u32) -> bool {
+    let mut found = false;
+    for (_, global) in module.global_variables.iter_mut() {
+        if global.space == AddressSpace::Immediate {
+            global.space = AddressSpace::Uniform;
+            global.binding = Some(naga::ResourceBinding { group: 0, binding });
+            found = true;
+        }
+    }
+    found
 }
 
 /// Why a language has no operations of subgroups.

@@ -8,7 +8,7 @@ use naga::back::{PipelineConstants, wgsl};
 use naga::valid::ModuleInfo;
 use naga::{ImageClass, Module, StorageAccess, StorageFormat, TypeInner};
 
-use super::{Job, Place, Text, Written, text, validate};
+use super::{Job, Place, Text, Written, pushed, text, validate};
 use crate::Language;
 use crate::error::{Failure, Step};
 
@@ -20,6 +20,12 @@ const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
 
 /// WebGPU's feature for operations of subgroups, and WGSL's extension.
 const SUBGROUPS: &str = "subgroups";
+
+/// WGSL's language feature for push constants.
+const IMMEDIATES: &str = "immediate_address_space";
+
+/// How they are declared.
+const IMMEDIATE: &str = "var<immediate> ";
 
 /// What begins a text with operations of subgroups, as WGSL demands. naga 30 has the operations, and
 /// refuses this line: whoever hands the text to wgpu 30 takes it out.
@@ -52,7 +58,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     if !can_be_set(&read) {
         return Ok(Written::Unsettable);
     }
-    let places = job
+    let mut places = job
         .bound()
         .iter()
         .map(|bound| {
@@ -69,6 +75,18 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         })
         .collect::<BTreeMap<_, _>>();
     let mut requires = Vec::new();
+    if let (Some(binding), Some((_, after))) = (pushed(job.kernel), source.split_once(IMMEDIATE)) {
+        let place = Place {
+            name: text::name_before(after, ":"),
+            class: "immediate".into(),
+            index: None,
+            space: None,
+            block: None,
+            combined_with: Vec::new(),
+        };
+        places.insert(binding, place);
+        requires.push(IMMEDIATES.to_owned());
+    }
     if ir.globals().any(|(_, inner)| needs_more_formats(inner)) {
         requires.push(MORE_FORMATS.to_owned());
     }

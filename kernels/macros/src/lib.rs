@@ -39,6 +39,7 @@ use syn::parse_macro_input;
 /// | parameter | what |
 /// | --- | --- |
 /// | `#[uniform] x: &T` | a uniform buffer |
+/// | `#[push] x: &T` | push constants: a value of at most 128 bytes that is part of the commands; one in a kernel. A uniform buffer in languages that have none |
 /// | `#[element] x: T` | the invocation's element of a read-only buffer (`Option<T>` where invocations work together: the last workgroup may have fewer) |
 /// | `#[element] x: &mut T` | the same, changed in place |
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |

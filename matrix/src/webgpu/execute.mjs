@@ -264,6 +264,18 @@ class Maker {
         });
     }
 
+    /** The bytes of push constants; none without. */
+    immediates(one) {
+        const i = this.job.slots.findIndex((slot) => slot.place?.class === "immediate");
+        if (i < 0) return null;
+        const bytes = this.bytes(one.args[i]);
+        // WebGPU's name of the limit, and of how much a pipeline takes of it.
+        if (!(this.device.limits.maxImmediateSize >= bytes.length)) {
+            throw new Error("the device lacks immediates");
+        }
+        return bytes;
+    }
+
     /** Slots of some role, each with its argument. */
     having(kind, one) {
         return this.job.slots.flatMap(({ role }, i) =>
@@ -328,10 +340,11 @@ class Maker {
                     throw new Error(`slot \`${name}\` is bound, and a ${role.kind}`);
             }
         });
+        const immediateSize = this.immediates(one)?.length ?? 0;
         const key = JSON.stringify(entries);
         return this.once(key, () => scoped(this.device, () => {
             const group = this.device.createBindGroupLayout({ entries });
-            const pipeline = this.device.createPipelineLayout({ bindGroupLayouts: [group] });
+            const pipeline = this.device.createPipelineLayout({ bindGroupLayouts: [group], immediateSize });
             return { key, group, pipeline };
         }));
     }
@@ -480,6 +493,8 @@ class Maker {
             const pass = encoder.beginComputePass();
             pass.setPipeline(pipeline);
             pass.setBindGroup(0, group);
+            const immediates = this.immediates(one);
+            if (immediates) pass.setImmediates(0, immediates);
             pass.dispatchWorkgroups(...one.groups);
             pass.end();
             return this.inOrder(reads, one);
@@ -570,6 +585,8 @@ class Maker {
                 });
                 pass.setPipeline(pipelines[g]);
                 pass.setBindGroup(0, binds);
+                const immediates = this.immediates(one);
+                if (immediates) pass.setImmediates(0, immediates);
                 if (values) pass.setVertexBuffer(0, values);
                 pass.draw(one.invocations);
                 pass.end();

@@ -80,6 +80,8 @@ hankel_dsl::kernels![
     data::wide,
     data::signed_wide,
     data::packed,
+    data::pushed,
+    data::pushed_colour,
     texels::whole,
     texels::counted_texels,
     texels::signed_texels,

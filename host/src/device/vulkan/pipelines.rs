@@ -50,12 +50,25 @@ struct RenderKey {
     samples: u32,
     topology: Topology,
     cull: Cull,
+    immediate_size: u32,
 }
 
 /// A kernel's arguments, bound.
 pub struct Bound {
     pub layout: wgpu::BindGroupLayout,
     pub group: wgpu::BindGroup,
+    /// Push constants.
+    pub pushed: Vec<u8>,
+}
+
+/// Whether code has push constants, not a uniform buffer in their place.
+fn has_push_constants(shader: Shader<'_>) -> bool {
+    match shader {
+        Shader::SpirvPassthrough(code) | Shader::SpirvThroughNaga(code) => {
+            words::has_push_constants(code)
+        }
+        Shader::Wgsl { text, .. } => text.contains("var<immediate>"),
+    }
 }
 
 /// A stage of a pipeline.
@@ -330,10 +343,27 @@ impl VulkanDevice {
         let kernel = program.kernel;
         let mut entries = Vec::new();
         let mut resources: Vec<(u32, Resource)> = Vec::new();
+        let mut pushed = Vec::new();
         for (slot, bind) in slots.iter().zip(args) {
             let Some(binding) = slot.binding else {
                 continue;
             };
+            // A text of another language has them in a uniform buffer.
+            if slot.push && program.shader.is_some_and(has_push_constants) {
+                let Bind::Bytes(bytes) = bind else {
+                    return Err(slots::refuse(kernel, slot, "it must be bytes".into()));
+                };
+                if !self.device.features().contains(wgpu::Features::IMMEDIATES) {
+                    return Err(self.missing("push constants", kernel));
+                }
+                self.limit(
+                    format!("kernel `{}`, {slot}: its size in bytes", kernel.name),
+                    bytes.len() as u64,
+                    self.limits.max_immediate_size.into(),
+                )?;
+                pushed = bytes.to_vec();
+                continue;
+            }
             let (ty, resource) = self.resource(kernel, slot, bind)?;
             entries.push(wgpu::BindGroupLayoutEntry {
                 binding,
@@ -371,7 +401,11 @@ impl VulkanDevice {
                 entries: &entries,
             })
         })?;
-        Ok(Bound { layout, group })
+        Ok(Bound {
+            layout,
+            group,
+            pushed,
+        })
     }
 
     /// One argument: its type in the layout, and what is bound.
@@ -533,8 +567,10 @@ impl VulkanDevice {
         &mut self,
         program: &Program<'_>,
         slots: &[Slot<'_>],
-        layout: &wgpu::BindGroupLayout,
+        bound: &Bound,
     ) -> Result<wgpu::ComputePipeline> {
+        let layout = &bound.layout;
+        let immediate_size = bound.pushed.len() as u32;
         let kernel = program.kernel;
         if let Stage::Compute {
             threads,
@@ -572,7 +608,7 @@ impl VulkanDevice {
                     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                         label: Some(&kernel.name),
                         bind_group_layouts: &layouts,
-                        immediate_size: 0,
+                        immediate_size,
                     });
                     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                         label: Some(&kernel.name),
@@ -618,6 +654,7 @@ impl Resource {
 struct Ready {
     pipeline: wgpu::RenderPipeline,
     groups: Vec<wgpu::BindGroup>,
+    pushed: Vec<u8>,
     attributes: Vec<wgpu::Buffer>,
     indices: Option<wgpu::Buffer>,
     count: u32,
@@ -687,6 +724,9 @@ impl VulkanDevice {
                     encoded.set_pipeline(&draw.pipeline);
                     for (i, group) in (0..).zip(&draw.groups) {
                         encoded.set_bind_group(i, group, &[]);
+                    }
+                    if !draw.pushed.is_empty() {
+                        encoded.set_immediates(0, &draw.pushed);
                     }
                     for (i, buffer) in (0..).zip(&draw.attributes) {
                         encoded.set_vertex_buffer(i, buffer.slice(..));
@@ -834,6 +874,7 @@ impl VulkanDevice {
         let linked = self.link(&draw.vertex, &slots, VERTEX_SET)?;
         let vertex_stage = (linked.module, linked.entry_point, bound.layout.clone());
         let mut groups = vec![bound.group];
+        let mut pushed = bound.pushed;
         let mut fragment_stage = None;
         if let Some(fragment) = &draw.fragment {
             let slots = slots::drawn_slots(fragment.kernel);
@@ -843,6 +884,16 @@ impl VulkanDevice {
             let linked = self.link(fragment, &slots, FRAGMENT_SET)?;
             fragment_stage = Some((linked.module, linked.entry_point, bound.layout));
             groups.push(bound.group);
+            // The stages have one block of them.
+            if !pushed.is_empty() && !bound.pushed.is_empty() && pushed != bound.pushed {
+                return Err(bad(
+                    "both stages have push constants, and other ones: give them the same bytes, or make one of them a uniform"
+                        .into(),
+                ));
+            }
+            if pushed.is_empty() {
+                pushed = bound.pushed;
+            }
         } else if !draw.fragment_args.is_empty() {
             return Err(bad(
                 "fragment arguments were given without a fragment kernel".into(),
@@ -865,11 +916,13 @@ impl VulkanDevice {
             samples,
             topology: draw.topology,
             cull: draw.cull,
+            immediate_size: pushed.len() as u32,
         };
         let pipeline = self.render_pipeline(pass, draw, key)?;
         Ok(Ready {
             pipeline,
             groups,
+            pushed,
             attributes,
             indices,
             count: draw.count,
@@ -1038,7 +1091,7 @@ impl VulkanDevice {
                     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                         label: Some(pass.label),
                         bind_group_layouts: &layouts,
-                        immediate_size: 0,
+                        immediate_size: key.immediate_size,
                     });
                     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                         label: Some(pass.label),
