@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use hankel_dsl::native::describe::{Kernel, Layout, Output, Role, Scalar, Type};
 
-use crate::manifest::{Binding, KernelEntry};
+use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::spirv::names::camel_case;
 
 /// The structures that kernels use, each under a name of its own.

@@ -8,7 +8,7 @@ use hankel_dsl::native::describe::{Layout, Type};
 use super::{
     Groups, InWgsl, Layouts, Part, one_line, padded, parts, scalar_name, scalar_size, size,
 };
-use crate::manifest::{Binding, KernelEntry};
+use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::{Language, VERSION};
 
 /// The module.

@@ -127,11 +127,15 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
 }
 
 /// Input variables that every stage names alike: SPIR-V's number, name.
-const INPUTS: [(u32, &str); 9] = [
+const INPUTS: [(u32, &str); 13] = [
     (28, "id"),
     (27, "local_id"),
     (26, "group_id"),
     (29, "local_index"),
+    (36, "subgroup_size"),
+    (38, "subgroup_count"),
+    (40, "subgroup_id"),
+    (41, "subgroup_invocation_id"),
     (42, "vertex_index"),
     (43, "instance_index"),
     (15, "frag_coord"),

@@ -286,3 +286,26 @@ fn replace(source: &mut String, given: String, wanted: String) -> String {
     *source = text::rename(source, &given, &wanted);
     wanted
 }
+
+#[cfg(test)]
+mod tests {
+    use super::subgroup_extensions;
+
+    #[test]
+    fn a_text_asks_for_the_extensions_that_it_needs() {
+        let of = |text: &str| subgroup_extensions(text).join(" ");
+        assert_eq!(
+            of("uint a = gl_SubgroupSize;"),
+            "GL_KHR_shader_subgroup_basic"
+        );
+        assert_eq!(
+            of("uint a = subgroupAdd(b); uint c = subgroupShuffleUp(a, 1u);"),
+            "GL_KHR_shader_subgroup_basic GL_KHR_shader_subgroup_arithmetic \
+             GL_KHR_shader_subgroup_shuffle_relative"
+        );
+        assert_eq!(
+            of("uint a = subgroupBroadcastFirst(b);"),
+            "GL_KHR_shader_subgroup_basic GL_KHR_shader_subgroup_ballot"
+        );
+    }
+}

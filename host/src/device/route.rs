@@ -49,3 +49,15 @@ pub fn for_naga(wgsl: &str) -> Cow<'_, str> {
         None => Cow::Borrowed(wgsl),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::for_naga;
+
+    #[test]
+    fn one_line_is_taken_out() {
+        let text = "// Generated.\nenable subgroups;\n\nfn main() {}\n";
+        assert_eq!(for_naga(text), "// Generated.\n\n\nfn main() {}\n");
+        assert_eq!(for_naga("fn main() {}"), "fn main() {}");
+    }
+}
