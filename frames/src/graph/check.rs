@@ -304,7 +304,7 @@ impl Graph {
         };
         if slot.push {
             let problem = "a frame's values are in buffers: take a `#[uniform]`, not a `#[push]`";
-            return Err(place.argument(&slot.name, problem.into()));
+            return Err(place.argument(&slot.name, problem));
         }
         let value = &self.values[handle.at()];
         let Shape::Buffer { layout, .. } = &value.shape else {
