@@ -104,7 +104,7 @@ impl<'a> Shared<'a> {
                 });
             }
         };
-        if let Some(what) = rules::lacking(it.kernel(), column) {
+        if let Some(what) = rules::lacking(it.kernel(), column, &code.bytes) {
             return unrun(Outcome::Lacking { what });
         }
         let key = self.key(column, it, code);

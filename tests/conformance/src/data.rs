@@ -74,26 +74,23 @@ pub struct Tint {
     /// What it is multiplied by before.
     #[range(0.0..=1.0)]
     pub strength: f32,
-    /// Which bits are turned over.
+    /// Which bits of numbers are turned over.
     pub mask: u32,
-    /// Fills the structure up.
-    pub padding: UVec2,
+    /// What is added to numbers.
+    pub offset: UVec2,
 }
 
-/// Colours that are changed by what is part of the commands.
-#[kernel(
-    compute,
-    threads(64),
-    parity(non_finite, why = "sums and products of absurd numbers overflow")
-)]
-pub fn pushed(#[push] tint: &Tint, #[element] colour: Vec4) -> Vec4 {
-    let bits = (colour.w.to_bits() ^ tint.mask) & 0x007f_ffff;
-    let tinted = colour * tint.strength + tint.add;
-    // From 1 to 2.
-    tinted.truncate().extend(f32::from_bits(bits | 0x3f80_0000))
+/// Numbers that are changed by what is part of the commands.
+#[kernel(compute, threads(64))]
+pub fn pushed(#[push] tint: &Tint, #[element] numbers: UVec2) -> UVec2 {
+    let turned = numbers ^ UVec2::splat(tint.mask);
+    UVec2::new(
+        turned.x.wrapping_add(tint.offset.x),
+        turned.y.wrapping_sub(tint.offset.y),
+    )
 }
 
-/// The same in a fragment, beside a uniform.
+/// Colours of fragments, beside a uniform.
 #[kernel(
     fragment,
     parity(non_finite, why = "sums and products of absurd numbers overflow")

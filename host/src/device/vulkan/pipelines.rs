@@ -362,7 +362,8 @@ impl VulkanDevice {
                     self.limits.max_immediate_size.into(),
                 )?;
                 pushed = bytes.to_vec();
-                continue;
+                // Bound all the same: wgpu closes gaps in the numbers of bindings, and SPIR-V that goes
+                // to the driver as it is keeps its own.
             }
             let (ty, resource) = self.resource(kernel, slot, bind)?;
             entries.push(wgpu::BindGroupLayoutEntry {
