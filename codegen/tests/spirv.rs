@@ -4,7 +4,7 @@ mod support;
 
 use hankel_codegen::finish::{cost_after_optimisation, finish};
 use hankel_codegen::{Step, cost};
-use hankel_dsl::native::describe::{Kernel, Rounding};
+use hankel_dsl::native::describe::{Kernel, Rounding, Subgroups};
 use rspirv::binary::Disassemble;
 
 fn disassembled(name: &str) -> String {
@@ -121,6 +121,7 @@ fn an_exact_kernel_forbids_contraction_for_good() {
     // Without the attribute, nothing is.
     let free = Kernel {
         rounding: Rounding::Free,
+        subgroups: Subgroups::Unused,
         ..kernel
     };
     let finished = finish(&support::spirv("rounding"), &free).unwrap();

@@ -88,7 +88,12 @@ fn bindings(kernel: &Kernel) {
     }
     for p in &kernel.params {
         let what = match &p.role {
-            Role::Uniform { binding, layout } => {
+            Role::Uniform {
+                layout, push: true, ..
+            } => format!("push constants: {}", shape(&layout.name, layout)),
+            Role::Uniform {
+                binding, layout, ..
+            } => {
                 format!("binding {binding}: uniform {}", shape(&layout.name, layout))
             }
             Role::Element { binding, layout } => {
@@ -156,6 +161,10 @@ fn bindings(kernel: &Kernel) {
                 BuiltIn::LocalIndex => "the invocation's number in its workgroup",
                 BuiltIn::GroupId => "the workgroup",
                 BuiltIn::GroupCount => "how many workgroups there are",
+                BuiltIn::SubgroupSize => "how many invocations its subgroup has",
+                BuiltIn::SubgroupInvocationId => "the invocation's number in its subgroup",
+                BuiltIn::SubgroupId => "the subgroup's number in its workgroup",
+                BuiltIn::SubgroupCount => "how many subgroups its workgroup has",
                 BuiltIn::VertexIndex => "the vertex's number",
                 BuiltIn::InstanceIndex => "the instance's number",
                 BuiltIn::FragCoord => "where the fragment is, and its depth",

@@ -66,6 +66,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
             why: "only + - * / and sqrt".into(),
         },
         rounding: Rounding::Free,
+        subgroups: Subgroups::Unused,
     }
 }
 
@@ -148,6 +149,7 @@ pub fn bound() -> Kernel {
                 Role::Uniform {
                     binding: 0,
                     layout: settings,
+                    push: false,
                 },
             ),
             param(

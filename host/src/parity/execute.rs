@@ -1,7 +1,8 @@
 //! Runs a case of any stage on a device, and gives back what was written.
 
 use hankel_dsl::native::describe::{
-    Inputs, Kernel, Output, Param, Role, Rounding, Scalar, Stage, TexelFormat, Tolerance, Type,
+    Inputs, Kernel, Output, Param, Role, Rounding, Scalar, Stage, Subgroups, TexelFormat,
+    Tolerance, Type,
 };
 
 use super::capture;
@@ -213,6 +214,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
             why: String::new(),
         },
         rounding: Rounding::Free,
+        subgroups: Subgroups::Unused,
     }
 }
 

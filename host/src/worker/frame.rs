@@ -31,6 +31,7 @@ pub(super) struct Request {
     lanes: bool,
     parallel: bool,
     sanitize: Option<Order>,
+    subgroup_size: u32,
     constants: Vec<u32>,
     shapes: Vec<Shape>,
 }
@@ -130,6 +131,7 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         lanes: call.mode.lanes,
         parallel: call.mode.parallel,
         sanitize: call.mode.sanitize,
+        subgroup_size: call.mode.subgroup_size,
         constants: call.constants.clone(),
         shapes: shapes.collect(),
     };
@@ -217,6 +219,7 @@ impl Arrived {
                 lanes: self.request.lanes,
                 parallel: self.request.parallel,
                 sanitize: self.request.sanitize,
+                subgroup_size: self.request.subgroup_size,
             },
         }
     }

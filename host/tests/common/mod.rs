@@ -69,6 +69,7 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
             why: "no rounding differs".into(),
         },
         rounding: Rounding::Free,
+        subgroups: Subgroups::Unused,
     }
 }
 
@@ -193,6 +194,7 @@ pub fn affine() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: settings,
+                    push: false,
                 },
             ),
             param(
@@ -525,6 +527,7 @@ pub fn place() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: plain("f32", f),
+                    push: false,
                 },
             ),
             param(
@@ -606,6 +609,7 @@ pub fn tint() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: plain("f32", f),
+                    push: false,
                 },
             ),
             param(
@@ -676,6 +680,7 @@ pub fn mixed() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: settings,
+                    push: false,
                 },
             ),
             param(

@@ -127,6 +127,7 @@ mod real;
 mod stage;
 mod storage;
 mod storage_texture;
+mod subgroup;
 mod texture;
 mod unroll;
 mod workgroup;
@@ -147,6 +148,14 @@ pub use stage::{
 pub use storage::{StorageMut, Stored};
 pub use storage_texture::{
     Access, Format, Readable, StorageTexture2d, StorageTexture3d, Writable, access, format,
+};
+pub use subgroup::{
+    SubgroupInteger, SubgroupNumber, SubgroupValue, quad_broadcast, quad_swap_diagonal,
+    quad_swap_x, quad_swap_y, subgroup_add, subgroup_all, subgroup_and, subgroup_any,
+    subgroup_ballot, subgroup_broadcast, subgroup_broadcast_first, subgroup_exclusive_add,
+    subgroup_exclusive_mul, subgroup_inclusive_add, subgroup_inclusive_mul, subgroup_max,
+    subgroup_min, subgroup_mul, subgroup_or, subgroup_shuffle, subgroup_shuffle_down,
+    subgroup_shuffle_up, subgroup_shuffle_xor, subgroup_xor,
 };
 pub use texture::{
     Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,

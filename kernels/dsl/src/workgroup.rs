@@ -117,8 +117,9 @@ mod host {
         alone("storage_barrier")
     }
 
+    /// Ends a call that is not the twin's.
     #[cold]
-    fn alone(name: &str) {
+    pub(crate) fn alone(name: &str) -> ! {
         panic!(
             "{name}() was called outside of a workgroup: mark the function that calls it with #[cooperative], and name it in the kernel's `cooperative(…)`"
         )
@@ -241,6 +242,8 @@ mod host {
     }
 }
 
+#[cfg(not(target_arch = "spirv"))]
+pub(crate) use host::alone;
 #[cfg(not(target_arch = "spirv"))]
 pub use host::{barrier, storage_barrier};
 #[cfg(target_arch = "spirv")]

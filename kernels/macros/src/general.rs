@@ -7,6 +7,7 @@ use quote::{format_ident, quote};
 
 use crate::kernel::{Compute, Kernel, Param, Role, Stage, Variant};
 use crate::range::Range;
+use crate::twin;
 
 /// What the code around a kernel's body looks like.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -47,6 +48,19 @@ impl Kernel {
             Form::General
         } else {
             Form::Plain
+        }
+    }
+
+    /// Whether it has anything to do with subgroups: an expression.
+    pub fn uses_subgroups(&self) -> TokenStream {
+        let asks = self
+            .params
+            .iter()
+            .any(|p| matches!(p.role, Role::BuiltIn(b) if b.is_of_subgroup()));
+        if asks {
+            quote!(true)
+        } else {
+            twin::uses_subgroups(&self.item, &self.helpers)
         }
     }
 
@@ -201,9 +215,10 @@ impl Kernel {
             .unzip();
         let take = self.take_values(call);
         let stores = self.host_stores(variant);
+        let subgroups = self.uses_subgroups();
         quote! {
             #prelude
-            workgroup::for_each_group(mode, __extent, [#(#threads),*], |__group| {
+            workgroup::for_each_group(mode, __extent, [#(#threads),*], #subgroups, |__group| {
                 #(#memories)*
                 __group.run(|__it| {
                     #(#handles)*

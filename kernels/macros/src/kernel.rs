@@ -38,6 +38,8 @@ pub struct Kernel {
     pub inputs: Option<TokenStream>,
     /// Cooperative functions that it calls.
     pub helpers: Vec<Ident>,
+    /// Its result depends on the size of subgroups.
+    pub sized_by_subgroups: bool,
 }
 
 /// A variant of `describe::Rounding`.
@@ -153,6 +155,8 @@ pub struct Param {
     pub name: Ident,
     pub role: Role,
     pub inputs: Inputs,
+    /// A uniform that is push constants.
+    pub push: bool,
 }
 
 /// What a parameter is bound to; types are the values', without `&`, `Option` or `Buffer`.
@@ -202,6 +206,10 @@ pub enum BuiltIn {
     LocalIndex,
     GroupId,
     GroupCount,
+    SubgroupSize,
+    SubgroupInvocationId,
+    SubgroupId,
+    SubgroupCount,
     VertexIndex,
     InstanceIndex,
     FragCoord,
@@ -210,11 +218,15 @@ pub enum BuiltIn {
 }
 
 /// Each by the word of its attribute.
-const BUILT_INS: [(&str, BuiltIn); 9] = [
+const BUILT_INS: [(&str, BuiltIn); 13] = [
     ("local_id", BuiltIn::LocalId),
     ("local_index", BuiltIn::LocalIndex),
     ("group_id", BuiltIn::GroupId),
     ("group_count", BuiltIn::GroupCount),
+    ("subgroup_size", BuiltIn::SubgroupSize),
+    ("subgroup_invocation_id", BuiltIn::SubgroupInvocationId),
+    ("subgroup_id", BuiltIn::SubgroupId),
+    ("subgroup_count", BuiltIn::SubgroupCount),
     ("vertex_index", BuiltIn::VertexIndex),
     ("instance_index", BuiltIn::InstanceIndex),
     ("frag_coord", BuiltIn::FragCoord),
@@ -223,6 +235,17 @@ const BUILT_INS: [(&str, BuiltIn); 9] = [
 ];
 
 impl BuiltIn {
+    /// Whether only an invocation in a subgroup has it.
+    pub const fn is_of_subgroup(self) -> bool {
+        matches!(
+            self,
+            Self::SubgroupSize
+                | Self::SubgroupInvocationId
+                | Self::SubgroupId
+                | Self::SubgroupCount
+        )
+    }
+
     /// The variant of `describe::BuiltIn`.
     pub fn variant(self) -> Ident {
         format_ident!(
@@ -232,6 +255,10 @@ impl BuiltIn {
                 Self::LocalIndex => "LocalIndex",
                 Self::GroupId => "GroupId",
                 Self::GroupCount => "GroupCount",
+                Self::SubgroupSize => "SubgroupSize",
+                Self::SubgroupInvocationId => "SubgroupInvocationId",
+                Self::SubgroupId => "SubgroupId",
+                Self::SubgroupCount => "SubgroupCount",
                 Self::VertexIndex => "VertexIndex",
                 Self::InstanceIndex => "InstanceIndex",
                 Self::FragCoord => "FragCoord",
@@ -359,7 +386,7 @@ impl Role {
 /// Variables of the generated code.
 const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
 
-const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
+const ROLES: &str = "uniform, push, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
 
 impl Kernel {
     pub fn parse(args: TokenStream, mut item: ItemFn) -> syn::Result<Self> {
@@ -393,10 +420,15 @@ impl Kernel {
         let rounding = args.rounding.unwrap_or(Rounding::Free);
         let inputs = args.inputs.as_ref().map(from_inside);
         let helpers = args.cooperative.clone();
+        let depends = args.depends.clone();
         let mut stage = args.into_stage(&params, &outputs, &name)?;
         if let Stage::Compute(c) = &mut stage.0 {
             c.cooperative = twin::has_barrier(&item, &helpers)
-                || params.iter().any(|p| matches!(p.role, Role::Shared { .. }));
+                || params.iter().any(|p| match p.role {
+                    Role::Shared { .. } => true,
+                    Role::BuiltIn(built_in) => built_in.is_of_subgroup(),
+                    _ => false,
+                });
             options(&elements, c.cooperative)?;
         }
         let tolerance = stage.1;
@@ -414,7 +446,14 @@ impl Kernel {
             rounding,
             inputs,
             helpers,
+            sized_by_subgroups: depends.is_some(),
         };
+        if let Some(word) = depends.filter(|_| kernel.form() != Form::Cooperative) {
+            return Err(syn::Error::new(
+                word.span(),
+                "the kernel has no operation of subgroups and does not ask for their size: leave `depends` out",
+            ));
+        }
         kernel.check()?;
         Ok(kernel)
     }
@@ -521,6 +560,12 @@ impl Kernel {
                 }
                 _ => {}
             }
+        }
+        if let Some(second) = self.params.iter().filter(|p| p.push).nth(1) {
+            return error(
+                second.name.span(),
+                "a kernel has one block of push constants: put all of them into one structure",
+            );
         }
         let span = self.name.span();
         if compute.is_some_and(|c| c.cooperative) {
@@ -714,8 +759,11 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
     let word = role.path().require_ident()?.to_string();
     let ty = &*arg.ty;
     let role = match word.as_str() {
-        "uniform" => match ty {
+        "uniform" | "push" => match ty {
             Type::Reference(r) if r.mutability.is_none() => Role::Uniform((*r.elem).clone()),
+            _ if word == "push" => {
+                return Err(syn::Error::new(ty.span(), "push constants are `&T`"));
+            }
             _ => return Err(syn::Error::new(ty.span(), "a uniform is `&T`")),
         },
         "element" => match ty {
@@ -831,7 +879,13 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
             None => return Err(syn::Error::new(role.span(), "this role is not known")),
         },
     };
-    Ok(Param { name, role, inputs })
+    let push = word == "push";
+    Ok(Param {
+        name,
+        role,
+        inputs,
+        push,
+    })
 }
 
 /// Whether a role's attribute says `unordered`.
@@ -930,6 +984,8 @@ struct Args {
     precision: Vec<Ident>,
     formats: Vec<Format>,
     cooperative: Vec<Ident>,
+    /// What the result depends on: the size of subgroups.
+    depends: Option<Ident>,
     range: Option<(Span, Punctuated<Expr, Token![,]>)>,
     outputs: Option<(Span, Vec<Option<Format>>)>,
     tolerance: Option<Tolerance>,
@@ -971,6 +1027,18 @@ impl Parse for Args {
                     args.threads = Some(threads);
                 }
                 "cooperative" => args.cooperative = idents(input)?,
+                "depends" => {
+                    let on = idents(input)?;
+                    match &on[..] {
+                        [size] if size == "subgroup_size" => args.depends = Some(size.clone()),
+                        _ => {
+                            return Err(syn::Error::new(
+                                word.span(),
+                                "a result may depend on one thing that differs from device to device: write `depends(subgroup_size)`",
+                            ));
+                        }
+                    }
+                }
                 "precision" => {
                     args.precision = idents(input)?;
                     for p in &args.precision {
@@ -1010,7 +1078,7 @@ impl Parse for Args {
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, exact, pinned, inputs or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, inputs or parity",
                     ));
                 }
             }
@@ -1228,13 +1296,14 @@ impl Args {
             word => {
                 if self.threads.is_some()
                     || !self.cooperative.is_empty()
+                    || self.depends.is_some()
                     || self.range.is_some()
                     || self.outputs.is_some()
                     || !self.formats.is_empty()
                 {
                     return Err(syn::Error::new(
                         name.span(),
-                        "threads, range, outputs, cooperative and texture belong to compute kernels",
+                        "threads, range, outputs, cooperative, depends and texture belong to compute kernels",
                     ));
                 }
                 if outputs.is_empty() {

@@ -82,6 +82,22 @@ impl Kernel {
                 BuiltIn::GroupId,
                 quote!(#[spirv(workgroup_id)] __group_id: UVec3,),
             ),
+            (
+                BuiltIn::SubgroupSize,
+                quote!(#[spirv(subgroup_size)] __subgroup_size: u32,),
+            ),
+            (
+                BuiltIn::SubgroupInvocationId,
+                quote!(#[spirv(subgroup_local_invocation_id)] __subgroup_invocation_id: u32,),
+            ),
+            (
+                BuiltIn::SubgroupId,
+                quote!(#[spirv(subgroup_id)] __subgroup_id: u32,),
+            ),
+            (
+                BuiltIn::SubgroupCount,
+                quote!(#[spirv(num_subgroups)] __subgroup_count: u32,),
+            ),
         ];
         let asked = asked
             .into_iter()
@@ -122,6 +138,9 @@ impl Kernel {
             match &p.role {
                 Role::Uniform(ty) => {
                     let ty = self.concrete(ty, variant);
+                    if p.push {
+                        return quote!(#[spirv(push_constant)] #name: &#ty,);
+                    }
                     quote!(#[spirv(uniform, descriptor_set = 0, binding = #here)] #name: &#ty,)
                 }
                 Role::Element(ty) | Role::Storage(ty) => {
@@ -249,6 +268,10 @@ impl Kernel {
                 Role::BuiltIn(BuiltIn::LocalId) => self.of_dimensions(&quote!(__local_id)),
                 Role::BuiltIn(BuiltIn::GroupId) => self.of_dimensions(&quote!(__group_id)),
                 Role::BuiltIn(BuiltIn::GroupCount) => quote!(__groups),
+                Role::BuiltIn(BuiltIn::SubgroupSize) => quote!(__subgroup_size),
+                Role::BuiltIn(BuiltIn::SubgroupInvocationId) => quote!(__subgroup_invocation_id),
+                Role::BuiltIn(BuiltIn::SubgroupId) => quote!(__subgroup_id),
+                Role::BuiltIn(BuiltIn::SubgroupCount) => quote!(__subgroup_count),
                 // What lies in w differs from device to device.
                 Role::BuiltIn(BuiltIn::FragCoord) => {
                     quote!(::hankel_dsl::glam::Vec4::truncate(#name))

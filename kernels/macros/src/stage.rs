@@ -187,9 +187,17 @@ impl BuiltIn {
             (Self::VertexIndex | Self::InstanceIndex, Stage::Vertex)
             | (Self::FragCoord | Self::FrontFacing | Self::SampleIndex, Stage::Fragment)
             | (
-                Self::LocalId | Self::LocalIndex | Self::GroupId | Self::GroupCount,
+                Self::LocalId
+                | Self::LocalIndex
+                | Self::GroupId
+                | Self::GroupCount
+                | Self::SubgroupSize
+                | Self::SubgroupInvocationId
+                | Self::SubgroupId
+                | Self::SubgroupCount,
                 Stage::Compute(_),
             ) => None,
+            (it, _) if it.is_of_subgroup() => Some("subgroups belong to compute kernels"),
             (Self::VertexIndex | Self::InstanceIndex, _) => {
                 Some("only a vertex kernel knows its vertex and instance")
             }
@@ -208,7 +216,7 @@ impl BuiltIn {
             Self::FragCoord => quote!(#[spirv(frag_coord)] #name: Vec4,),
             Self::FrontFacing => quote!(#[spirv(front_facing)] #name: bool,),
             Self::SampleIndex => quote!(#[spirv(sample_id, flat)] #name: u32,),
-            Self::LocalId | Self::LocalIndex | Self::GroupId | Self::GroupCount => return None,
+            _ => return None,
         })
     }
 
@@ -221,9 +229,7 @@ impl BuiltIn {
             Self::FragCoord => quote!(__fragment.coord),
             Self::FrontFacing => quote!(__fragment.front_facing),
             Self::SampleIndex => quote!(__fragment.sample_index),
-            Self::LocalId | Self::LocalIndex | Self::GroupId | Self::GroupCount => {
-                TokenStream::new()
-            }
+            _ => TokenStream::new(),
         }
     }
 }

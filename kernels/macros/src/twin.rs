@@ -1,6 +1,6 @@
-//! The `async` twin of a function with barriers, made from the same body: each `barrier()` and each
-//! call of a function that is named as cooperative is awaited. The host runs it; the body itself
-//! stays as it is for the shader.
+//! The `async` twin of a function with barriers, made from the same body: each `barrier()`, each
+//! operation of the subgroup and each call of a function that is named as cooperative is awaited. The
+//! host runs it; the body itself stays as it is for the shader.
 
 use proc_macro2::{Delimiter, Group, Ident, Spacing, TokenStream, TokenTree};
 use quote::{ToTokens, format_ident, quote, quote_spanned};
@@ -11,6 +11,34 @@ use syn::spanned::Spanned;
 
 /// Functions at which invocations wait.
 const BARRIERS: [&str; 2] = ["barrier", "storage_barrier"];
+
+/// Operations of the subgroup, at which its invocations wait for one another.
+const OF_SUBGROUP: [&str; 24] = [
+    "subgroup_any",
+    "subgroup_all",
+    "subgroup_ballot",
+    "subgroup_broadcast",
+    "subgroup_broadcast_first",
+    "subgroup_shuffle",
+    "subgroup_shuffle_xor",
+    "subgroup_shuffle_up",
+    "subgroup_shuffle_down",
+    "subgroup_add",
+    "subgroup_mul",
+    "subgroup_min",
+    "subgroup_max",
+    "subgroup_and",
+    "subgroup_or",
+    "subgroup_xor",
+    "subgroup_inclusive_add",
+    "subgroup_exclusive_add",
+    "subgroup_inclusive_mul",
+    "subgroup_exclusive_mul",
+    "quad_broadcast",
+    "quad_swap_x",
+    "quad_swap_y",
+    "quad_swap_diagonal",
+];
 
 /// `#[cooperative]`: names of the cooperative functions that this one calls.
 #[derive(Default)]
@@ -35,11 +63,12 @@ impl Cooperative {
         if !has_barrier(item, &self.0) {
             return Err(syn::Error::new(
                 item.sig.ident.span(),
-                "it waits at no barrier: leave `#[cooperative]` out, or name the cooperative functions that it calls, `#[cooperative(other)]`",
+                "it waits at no barrier and for no subgroup: leave `#[cooperative]` out, or name the cooperative functions that it calls, `#[cooperative(other)]`",
             ));
         }
         let (vis, name) = (&item.vis, &item.sig.ident);
         let twin = twin(item, &format_ident!("twin"), &self.0);
+        let subgroups = uses_subgroups(item, &self.0);
         // The host runs the twin in its place.
         Ok(quote! {
             #[inline(always)]
@@ -53,16 +82,32 @@ impl Cooperative {
 
                 ::hankel_dsl::on_host! {
                     #twin
+                    pub const SUBGROUPS: bool = #subgroups;
                 }
             }
         })
     }
 }
 
-/// Whether the function itself waits at a barrier.
+/// Whether the function itself waits at a barrier, or for its subgroup.
 pub fn has_barrier(item: &ItemFn, helpers: &[Ident]) -> bool {
-    let waits = |name: &str| helpers.iter().any(|n| n == name) || BARRIERS.contains(&name);
+    let waits = |name: &str| {
+        helpers.iter().any(|n| n == name) || BARRIERS.contains(&name) || OF_SUBGROUP.contains(&name)
+    };
     mentions(item.block.to_token_stream(), &waits)
+}
+
+/// Whether the function, or one of the helpers that it calls, has operations of the subgroup: an
+/// expression, since a helper's own macro knows.
+pub fn uses_subgroups(item: &ItemFn, helpers: &[Ident]) -> TokenStream {
+    let own = mentions(item.block.to_token_stream(), &|name: &str| {
+        OF_SUBGROUP.contains(&name)
+    });
+    if own || helpers.is_empty() {
+        quote!(#own)
+    } else {
+        quote!(#(#helpers::SUBGROUPS)||*)
+    }
 }
 
 fn mentions(tokens: TokenStream, waits: &impl Fn(&str) -> bool) -> bool {
@@ -100,9 +145,10 @@ fn awaited(tokens: TokenStream, helpers: &[Ident]) -> TokenStream {
             }
             TokenTree::Ident(name) if !is_declared_or_method(&out) => {
                 let is_barrier = BARRIERS.iter().any(|b| name == b);
+                let is_of_subgroup = OF_SUBGROUP.iter().any(|b| name == b);
                 let is_helper = helpers.contains(name);
                 // A call of a generic function has its types between.
-                let types = if is_helper {
+                let types = if is_helper || is_of_subgroup {
                     turbofish(&tokens[i + 1..])
                 } else {
                     0
@@ -124,9 +170,18 @@ fn awaited(tokens: TokenStream, helpers: &[Ident]) -> TokenStream {
                     i += 2;
                     continue;
                 }
-                out.push(tokens[i].clone());
+                if is_of_subgroup {
+                    drop_path(&mut out);
+                    out.extend(quote_spanned!(name.span()=>
+                        ::hankel_dsl::native::subgroup::#name
+                    ));
+                } else {
+                    out.push(tokens[i].clone());
+                }
                 if is_helper {
                     out.extend(quote_spanned!(name.span()=> ::twin));
+                }
+                if is_helper || is_of_subgroup {
                     out.extend_from_slice(&tokens[i + 1..i + 1 + types]);
                     let mut inner = Group::new(args.delimiter(), awaited(args.stream(), helpers));
                     inner.set_span(args.span());

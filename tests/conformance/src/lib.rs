@@ -13,10 +13,12 @@ use hankel_dsl::{
 pub mod data;
 pub mod general;
 pub mod layers;
+mod masked;
 pub mod math;
 pub mod sampling;
 pub mod shadow;
 pub mod stage;
+pub mod subgroup;
 pub mod texels;
 pub mod texture;
 pub mod workgroup;
@@ -33,6 +35,14 @@ hankel_dsl::kernels![
     workgroup::group_histogram,
     workgroup::places,
     workgroup::neighbours,
+    subgroup::quick_sum,
+    subgroup::places_of_odd,
+    subgroup::votes,
+    subgroup::exchanged,
+    subgroup::reduced,
+    subgroup::reduced_floats,
+    subgroup::quads,
+    masked::looked_up,
     checker,
     gradient,
     downsample,
@@ -70,6 +80,8 @@ hankel_dsl::kernels![
     data::wide,
     data::signed_wide,
     data::packed,
+    data::pushed,
+    data::pushed_colour,
     texels::whole,
     texels::counted_texels,
     texels::signed_texels,

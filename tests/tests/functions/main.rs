@@ -22,7 +22,7 @@ use hankel_codegen::translate::Place;
 use hankel_dsl::native::call::{Arg, CallError};
 use hankel_dsl::native::describe::{
     Domain, Field, Inputs, Kernel, Layout, Output, Param, Range, Role, Rounding, Scalar, Stage,
-    Tolerance, Type,
+    Subgroups, Tolerance, Type,
 };
 use hankel_dsl::native::function::Function;
 use hankel_dsl::native::inputs::{self, Given, Source};
@@ -205,6 +205,7 @@ fn entry(function: &Function) -> KernelEntry {
             why: String::new(),
         },
         rounding: Rounding::Pinned,
+        subgroups: Subgroups::Unused,
     };
     let (run, words, described) = (function.run, arguments(function).len(), function.clone());
     KernelEntry::new(kernel, move |call| {

@@ -247,7 +247,16 @@ pub struct Mode {
     /// Look at every access to memory that is written, with the invocations in this order
     /// ([`sanitize`](super::sanitize)): one thread, no lanes, whatever else is said.
     pub sanitize: Option<Order>,
+    /// Invocations of a subgroup, one of [`SUBGROUP_SIZES`]; for kernels that have
+    /// [`subgroups`](super::describe::Subgroups).
+    pub subgroup_size: u32,
 }
+
+/// The sizes that subgroups can have natively.
+pub const SUBGROUP_SIZES: [u32; 5] = [4, 8, 16, 32, 64];
+
+/// The size that they have unless something else is said: that of most GPUs.
+pub const SUBGROUP_SIZE: u32 = 32;
 
 impl Default for Mode {
     fn default() -> Self {
@@ -255,6 +264,7 @@ impl Default for Mode {
             lanes: true,
             parallel: true,
             sanitize: None,
+            subgroup_size: SUBGROUP_SIZE,
         }
     }
 }
@@ -265,6 +275,7 @@ impl Mode {
         lanes: false,
         parallel: false,
         sanitize: None,
+        subgroup_size: SUBGROUP_SIZE,
     };
 
     /// One thread, with every access looked at.
@@ -273,6 +284,15 @@ impl Mode {
         Self {
             sanitize: Some(order),
             ..Self::REFERENCE
+        }
+    }
+
+    /// The same with subgroups of another size.
+    #[must_use]
+    pub const fn in_subgroups_of(self, subgroup_size: u32) -> Self {
+        Self {
+            subgroup_size,
+            ..self
         }
     }
 }
@@ -331,6 +351,12 @@ pub enum CallError {
         expected: usize,
         /// Elements.
         got: usize,
+    },
+    /// Subgroups of a size that there is not.
+    #[error("subgroups have 4, 8, 16, 32 or 64 invocations, not {size}")]
+    Subgroups {
+        /// The size.
+        size: u32,
     },
     /// More invocations than 32 bits can count.
     #[error("{} x {} x {} invocations are more than 32 bits can count", extent[0], extent[1], extent[2])]

@@ -38,6 +38,42 @@ pub struct Kernel {
     /// What compilers and drivers may do with its floating-point arithmetic.
     #[serde(default)]
     pub rounding: Rounding,
+    /// What it does with subgroups.
+    #[serde(default, skip_serializing_if = "Subgroups::is_unused")]
+    pub subgroups: Subgroups,
+}
+
+/// What a kernel does with subgroups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Subgroups {
+    /// Nothing.
+    #[default]
+    Unused,
+    /// It uses them, and its result is the same for every size.
+    AnySize,
+    /// Its result depends on their size.
+    Sized,
+}
+
+impl Subgroups {
+    /// Of a kernel that does or does not use them, and whose result does or does not depend on their
+    /// size.
+    #[doc(hidden)]
+    #[must_use]
+    pub const fn of(used: bool, sized: bool) -> Self {
+        match (used, sized) {
+            (false, _) => Self::Unused,
+            (true, false) => Self::AnySize,
+            (true, true) => Self::Sized,
+        }
+    }
+
+    /// Whether the kernel has nothing to do with them.
+    #[must_use]
+    pub const fn is_unused(&self) -> bool {
+        matches!(self, Self::Unused)
+    }
 }
 
 /// What compilers and drivers may do with a kernel's floating-point arithmetic.
@@ -255,10 +291,13 @@ pub enum Length {
 pub enum Role {
     /// A uniform buffer with one value.
     Uniform {
-        /// Number in set 0.
+        /// Number in set 0; of push constants only where a language has none.
         binding: u32,
         /// Layout of the value.
         layout: Layout,
+        /// Push constants: a value that is part of the commands, not in a buffer.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        push: bool,
     },
     /// A read-only storage buffer of which the invocation gets its own element.
     Element {
@@ -413,7 +452,8 @@ impl TexelAccess {
     }
 }
 
-/// What the device knows of an invocation. Ids and counts have as many dimensions as the kernel.
+/// What the device knows of an invocation. Ids and counts have as many dimensions as the kernel, those
+/// of subgroups one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BuiltIn {
@@ -425,6 +465,14 @@ pub enum BuiltIn {
     GroupId,
     /// How many workgroups the range needs.
     GroupCount,
+    /// Invocations of its subgroup.
+    SubgroupSize,
+    /// Its number in its subgroup.
+    SubgroupInvocationId,
+    /// Its subgroup in its workgroup.
+    SubgroupId,
+    /// How many subgroups its workgroup has.
+    SubgroupCount,
     /// The vertex's number (vertex stage).
     VertexIndex,
     /// The instance's number (vertex stage).

@@ -15,14 +15,16 @@ pub mod layout;
 pub mod plugin;
 pub(crate) mod sampling;
 pub mod sanitize;
+#[doc(hidden)]
+pub mod subgroup;
 pub mod texel;
 mod transpose;
 #[doc(hidden)]
 pub mod workgroup;
 
 pub use call::{
-    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Run, Sampler, TextureMut,
-    TextureRef, level_size, texture_bytes,
+    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Run, SUBGROUP_SIZE,
+    SUBGROUP_SIZES, Sampler, TextureMut, TextureRef, level_size, texture_bytes,
 };
 
 /// An entry point: what it is, and its native code.
@@ -35,6 +37,9 @@ pub struct Entry {
     /// The author's own inputs for parity.
     pub inputs: Option<inputs::Make>,
 }
+
+/// Bytes of push constants that every device with Vulkan has.
+pub const PUSH_CONSTANT_BYTES: usize = 128;
 
 #[doc(hidden)]
 pub use std::vec::Vec;

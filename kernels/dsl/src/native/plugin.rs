@@ -25,7 +25,7 @@ use super::sanitize::Order;
 use super::texel::FORMATS;
 
 /// Version of what crosses the border.
-pub const ABI: u32 = 4;
+pub const ABI: u32 = 5;
 
 /// The exported function's name.
 pub const SYMBOL: &str = "hankel_plugin";
@@ -61,6 +61,7 @@ pub struct RawCall {
     parallel: u32,
     /// [`Order::code`] of a sanitized run, else 0.
     sanitize: u32,
+    subgroup_size: u32,
     args: *const RawArg,
     arg_count: usize,
     constants: *const u32,
@@ -251,6 +252,7 @@ pub unsafe fn run(
                 lanes: call.lanes != 0,
                 parallel: call.parallel != 0,
                 sanitize: Order::of_code(call.sanitize),
+                subgroup_size: call.subgroup_size,
             },
         })
         .map_err(|e| e.to_string()),
@@ -420,6 +422,7 @@ impl Plugin {
             lanes: call.mode.lanes.into(),
             parallel: call.mode.parallel.into(),
             sanitize: call.mode.sanitize.map_or(0, Order::code),
+            subgroup_size: call.mode.subgroup_size,
             args: args.as_ptr(),
             arg_count: args.len(),
             constants: call.constants.as_ptr(),

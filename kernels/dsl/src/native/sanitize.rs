@@ -3,8 +3,8 @@
 //! says what happened, where in the kernel's source, and which invocations took part.
 //!
 //! What it finds: data races in buffers, textures and workgroup memory; workgroup memory that is
-//! read before it is written; accesses out of range. The executor itself finds barriers and
-//! derivatives in control flow that is not uniform.
+//! read before it is written; accesses out of range. The executor itself finds barriers, operations of
+//! subgroups and derivatives in control flow that is not uniform.
 //!
 //! Two accesses to the same word race if different invocations make them, at least one writes, not
 //! both are atomic, and nothing orders them. A [`barrier`](crate::barrier) orders accesses to
@@ -241,7 +241,8 @@ pub fn begin(mode: Mode) -> (Mode, Option<Open>) {
         barriers: [0; 3],
     }));
     SESSIONS.fetch_add(1, Relaxed);
-    (Mode::sanitized(order), Some(Open(())))
+    let mode = Mode::sanitized(order).in_subgroups_of(mode.subgroup_size);
+    (mode, Some(Open(())))
 }
 
 /// Has the place of a panic kept in sessions, instead of printed.

@@ -1,5 +1,6 @@
-//! Workgroups on the host: each invocation is a future that yields at every barrier. One thread
-//! runs a workgroup, its invocations in turn from barrier to barrier.
+//! Workgroups on the host: each invocation is a future that yields at every barrier, and at every
+//! operation of its subgroup. One thread runs a workgroup, its subgroups in turn from barrier to
+//! barrier, and of each the invocations in turn from operation to operation.
 
 use core::cell::Cell;
 use core::future::Future;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 use super::call::{CallError, Mode};
 use super::exec::guard;
 use super::sanitize::{self, Space};
+use super::subgroup;
 use crate::Stored;
 
 /// Workgroup memory, filled with what nobody expects: it is to be written before it is read.
@@ -47,6 +49,10 @@ pub struct Invocation {
     pub groups: UVec3,
     /// Its number among all in range; none beyond.
     pub number: Option<u32>,
+    /// Invocations of its subgroup.
+    pub subgroup_size: u32,
+    /// How many subgroups the workgroup has.
+    pub subgroup_count: u32,
 }
 
 impl Invocation {
@@ -55,11 +61,25 @@ impl Invocation {
     #[must_use]
     pub fn new(at: UVec3, extent: [u32; 3], threads: [u32; 3]) -> Self {
         let [extent, threads] = [extent, threads].map(UVec3::from_array);
-        Self::of(at / threads, at % threads, extent, threads)
+        Self::of(at / threads, at % threads, extent, threads, 1)
+    }
+
+    /// Its subgroup: as many invocations in a row, as [`Self::local_index`] counts them.
+    #[inline]
+    #[must_use]
+    pub const fn subgroup_id(&self) -> u32 {
+        self.local_index / self.subgroup_size
+    }
+
+    /// Its number in its subgroup.
+    #[inline]
+    #[must_use]
+    pub const fn subgroup_invocation_id(&self) -> u32 {
+        self.local_index % self.subgroup_size
     }
 
     #[inline]
-    fn of(group: UVec3, local: UVec3, extent: UVec3, threads: UVec3) -> Self {
+    fn of(group: UVec3, local: UVec3, extent: UVec3, threads: UVec3, subgroup_size: u32) -> Self {
         let at = group * threads + local;
         let inside = at.cmplt(extent).all();
         Self {
@@ -69,6 +89,8 @@ impl Invocation {
             group,
             groups: groups(extent, threads),
             number: inside.then(|| (at.z * extent.y + at.y) * extent.x + at.x),
+            subgroup_size,
+            subgroup_count: threads.element_product().div_ceil(subgroup_size),
         }
     }
 }
@@ -88,16 +110,29 @@ pub struct Workgroup {
     id: UVec3,
     extent: UVec3,
     threads: UVec3,
+    /// Whether anybody asks for subgroups.
+    subgroups: bool,
+    /// Invocations of a subgroup: all, if nobody asks.
+    subgroup_size: u32,
 }
 
-/// Calls `f` for each workgroup that `extent` needs.
+/// An invocation, by its number in the workgroup, and where it waits; none if it has ended.
+type Met = (usize, Option<Wait>);
+
+/// Calls `f` for each workgroup that `extent` needs; `subgroups`: its invocations are in subgroups.
 pub fn for_each_group(
     mode: Mode,
     extent: [u32; 3],
     threads: [u32; 3],
+    subgroups: bool,
     f: impl Fn(Workgroup) + Sync,
 ) -> Result<(), CallError> {
     let [extent, threads] = [extent, threads].map(UVec3::from_array);
+    let subgroup_size = if subgroups {
+        subgroup::size(mode)?
+    } else {
+        threads.element_product()
+    };
     let count = groups(extent, threads);
     let all = count.x as usize * count.y as usize * count.z as usize;
     let one = |i: usize| {
@@ -111,6 +146,8 @@ pub fn for_each_group(
             id,
             extent,
             threads,
+            subgroups,
+            subgroup_size,
         });
     };
     guard(|| {
@@ -133,13 +170,16 @@ impl Workgroup {
         let [width, height, depth] = self.threads.to_array();
         let count = (width * height * depth) as usize;
         let mut futures = Vec::with_capacity(count);
-        let order = sanitize::order(count);
+        let size = self.subgroup_size as usize;
+        let subgroups = sanitize::order(count.div_ceil(size));
+        let order = sanitize::order(size);
         let mut places = Vec::new();
         for z in 0..depth {
             for y in 0..height {
                 for x in 0..width {
                     let local = UVec3::new(x, y, z);
-                    let it = Invocation::of(self.id, local, self.extent, self.threads);
+                    let (extent, threads) = (self.extent, self.threads);
+                    let it = Invocation::of(self.id, local, extent, threads, self.subgroup_size);
                     if order.is_some() {
                         places.push(it.at);
                     }
@@ -147,44 +187,95 @@ impl Workgroup {
                 }
             }
         }
-        let mut context = Context::from_waker(Waker::noop());
         loop {
-            let mut first = (0, None);
-            for turn in 0..count {
-                let i = order.as_ref().map_or(turn, |order| order[turn] as usize);
-                if let Some(at) = places.get(i) {
-                    sanitize::enter(*at);
-                }
-                WAITS.set(None);
+            let mut first = None;
+            for turn in 0..count.div_ceil(size) {
+                let subgroup = subgroups.as_ref().map_or(turn, |all| all[turn] as usize);
+                let start = subgroup * size;
+                let mine = start..count.min(start + size);
+                let places = places.get(mine.clone()).unwrap_or_default();
+                let order = order.as_deref();
                 // SAFETY: the futures stay where they are until all of them are dropped: the vector
                 // is neither grown nor moved from here on.
-                let future = unsafe { Pin::new_unchecked(&mut futures[i]) };
+                let waits = unsafe { self.advance(&mut futures[mine], start, places, order) };
+                match first {
+                    None => first = Some(waits),
+                    Some(first) if same(first.1, waits.1) => {}
+                    Some(first) => self.diverged(first, waits),
+                }
+            }
+            match first.and_then(|(_, waits)| waits).map(|wait| wait.at) {
+                Some(Meeting::Barrier(orders)) => sanitize::passed(orders),
+                _ => return,
+            }
+        }
+    }
+
+    /// Runs a subgroup, whose first invocation is `start`, to the next barrier or its end. Gives the
+    /// invocation that was first, and where it waits.
+    ///
+    /// # Safety
+    /// The futures are not moved any more.
+    unsafe fn advance<F: Future<Output = ()>>(
+        &self,
+        futures: &mut [F],
+        start: usize,
+        places: &[UVec3],
+        order: Option<&[u32]>,
+    ) -> Met {
+        let mut context = Context::from_waker(Waker::noop());
+        let count = futures.len();
+        loop {
+            let mut first: Option<Met> = None;
+            for turn in 0..order.map_or(count, <[u32]>::len) {
+                let lane = order.map_or(turn, |order| order[turn] as usize);
+                // The last subgroup of a workgroup may have fewer.
+                let Some(future) = futures.get_mut(lane) else {
+                    continue;
+                };
+                if let Some(at) = places.get(lane) {
+                    sanitize::enter(*at);
+                }
+                if self.subgroups {
+                    subgroup::enter(lane, count);
+                }
+                WAITS.set(None);
+                // SAFETY: the caller's.
+                let future = unsafe { Pin::new_unchecked(future) };
                 let waits = match future.poll(&mut context) {
                     Poll::Ready(()) => None,
                     Poll::Pending => WAITS.get(),
                 };
-                if turn == 0 {
-                    first = (i, waits);
-                } else if !same(first.1, waits) {
-                    self.diverged(first, (i, waits));
+                let met = (start + lane, waits);
+                match first {
+                    None => first = Some(met),
+                    Some(first) if same(first.1, waits) => {}
+                    Some(first) => self.diverged(first, met),
                 }
             }
-            match first.1 {
-                None => return,
-                Some(wait) => sanitize::passed(wait.orders),
+            match first {
+                Some((_, Some(wait))) if wait.at == Meeting::Subgroup => subgroup::exchange(),
+                Some(met) => return met,
+                None => return (start, None),
             }
         }
     }
 
     #[cold]
-    fn diverged(&self, first: (usize, Option<Wait>), other: (usize, Option<Wait>)) -> ! {
+    fn diverged(&self, first: Met, other: Met) -> ! {
         let (x, y) = (self.threads.x, self.threads.y);
         let local = |i: usize| {
             let i = i as u32;
             triple(UVec3::new(i % x, i / x % y, i / (x * y)))
         };
+        let of_subgroup = |met: Met| met.1.is_some_and(|wait| wait.at == Meeting::Subgroup);
+        let what = if of_subgroup(first) || of_subgroup(other) {
+            "an operation of the subgroup in control flow that is not the same for the subgroup"
+        } else {
+            "a barrier in control flow that is not uniform"
+        };
         sanitize::refuse(format!(
-            "a barrier in control flow that is not uniform: in workgroup {}, invocation {} {}, but invocation {} {}",
+            "{what}: in workgroup {}, invocation {} {}, but invocation {} {}",
             triple(self.id),
             local(first.0),
             state(first.1),
@@ -207,9 +298,24 @@ fn state(wait: Option<Wait>) -> String {
 
 /// Where an invocation waits.
 #[derive(Clone, Copy, Debug)]
-struct Wait {
-    place: &'static Location<'static>,
-    orders: Space,
+pub(super) struct Wait {
+    pub(super) place: &'static Location<'static>,
+    pub(super) at: Meeting,
+}
+
+/// At what it waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Meeting {
+    /// A barrier, which orders accesses to memory.
+    Barrier(Space),
+    /// An operation of the subgroup.
+    Subgroup,
+}
+
+/// The invocation that runs is about to yield.
+#[inline]
+pub(super) fn waits(wait: Wait) {
+    WAITS.set(Some(wait));
 }
 
 fn same(a: Option<Wait>, b: Option<Wait>) -> bool {
@@ -241,7 +347,7 @@ impl Future for Barrier {
             return Poll::Ready(());
         }
         self.passed = true;
-        WAITS.set(Some(self.wait));
+        waits(self.wait);
         Poll::Pending
     }
 }
@@ -264,7 +370,10 @@ pub fn storage_barrier() -> Barrier {
 
 const fn waiting(orders: Space, place: &'static Location<'static>) -> Barrier {
     Barrier {
-        wait: Wait { place, orders },
+        wait: Wait {
+            place,
+            at: Meeting::Barrier(orders),
+        },
         passed: false,
     }
 }
