@@ -389,8 +389,8 @@ impl Kernel {
                     quote!(__it.number.and_then(|n| #name.get(n as usize)).copied())
                 }
                 Role::Element(_) if form == Form::General => quote!(#name[__number as usize]),
-                Role::Element(_) | Role::Attribute(_) => quote!(#name[i]),
-                Role::Varying(passed) => passed.wrap(&quote!(#name[i])),
+                Role::Element(_) | Role::Attribute(_) => quote!(#name[__i]),
+                Role::Varying(passed) => passed.wrap(&quote!(#name[__i])),
                 Role::Uniform(_) | Role::Constant { .. } => quote!(#name),
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),
                 Role::ElementMut(_) => {
@@ -412,7 +412,7 @@ impl Kernel {
                     Form::Cooperative => self.host_place(&quote!(__it.at)),
                     Form::General => self.host_place(&quote!(__at)),
                     Form::Plain if self.dimensions() == 1 => quote!(i as u32),
-                    Form::Plain => quote!(i),
+                    Form::Plain => quote!(__i),
                 },
                 Role::BuiltIn(BuiltIn::LocalIndex) => quote!(__it.local_index),
                 Role::BuiltIn(BuiltIn::LocalId) => self.host_place(&quote!(__it.local)),
@@ -456,7 +456,7 @@ impl Kernel {
         self.elements()
             .map(|p| {
                 let (name, text) = (&p.name, p.name.to_string());
-                quote!(exec::enough(#text, #name.len(), count)?;)
+                quote!(exec::enough(#text, #name.len(), __count)?;)
             })
             .collect()
     }
@@ -480,17 +480,17 @@ impl Kernel {
             let index = self.index_type();
             return quote! {
                 let output = args.texture_mut("output", describe::TexelFormat::#format)?;
-                exec::#map(mode, output, |i: #index| #call)
+                exec::#map(mode, output, |__i: #index| #call)
             };
         }
         let map = if self.real.is_some() {
             self.lane_map(variant, &call, &out)
         } else {
-            quote!(exec::map1(mode, output, |i| #call))
+            quote!(exec::map1(mode, output, |__i| #call))
         };
         quote! {
             let output = args.slice_mut::<#out>("output")?;
-            let count = output.len();
+            let __count = output.len();
             #checks
             #map
         }
@@ -508,7 +508,7 @@ impl Kernel {
             )
         });
         if !spreads {
-            return quote!(exec::map1(mode, output, |i| #call));
+            return quote!(exec::map1(mode, output, |__i| #call));
         }
         let fields = self.params.iter().map(|p| {
             let name = &p.name;
@@ -527,7 +527,7 @@ impl Kernel {
         let names: Vec<_> = self.params.iter().map(|p| &p.name).collect();
         let windows = self.elements().map(|p| {
             let name = &p.name;
-            quote!(let #name = &#name[start..start + L::LANES];)
+            quote!(let #name = &#name[__start..__start + L::LANES];)
         });
         let (uniforms, uniform_types): (Vec<_>, Vec<_>) = self
             .params
@@ -550,7 +550,7 @@ impl Kernel {
         quote! {
             struct Body<'a> {
                 #(#fields)*
-                marker: core::marker::PhantomData<&'a ()>,
+                __marker: core::marker::PhantomData<&'a ()>,
             }
             impl exec::LaneBody for Body<'_> {
                 type Scalar = #scalar;
@@ -562,25 +562,25 @@ impl Kernel {
                     (#(<#uniform_types as layout::Splat<#scalar>>::splat::<L>(*self.#uniforms),)*)
                 }
                 #[inline(always)]
-                fn one(&self, i: usize) -> #out {
+                fn one(&self, __i: usize) -> #out {
                     let Self { #(#names,)* .. } = *self;
                     #call
                 }
                 #[inline(always)]
                 fn many<L: layout::Lane<Scalar = #scalar> + ::hankel_dsl::math::Elementary>(
                     &self,
-                    uniforms: &Self::Uniforms<L>,
-                    start: usize,
-                    out: &mut [#out],
+                    __uniforms: &Self::Uniforms<L>,
+                    __start: usize,
+                    __out: &mut [#out],
                 ) {
                     let Self { #(#names,)* .. } = *self;
-                    let (#(#uniforms,)*) = uniforms;
+                    let (#(#uniforms,)*) = __uniforms;
                     #(#windows)*
-                    let value = super::#name::<L>(#(#args),*);
-                    <#out as layout::Lanewise<#scalar>>::store::<L>(&value, out);
+                    let __value = super::#name::<L>(#(#args),*);
+                    <#out as layout::Lanewise<#scalar>>::store::<L>(&__value, __out);
                 }
             }
-            exec::map1_lanes(mode, output, &Body { #(#names,)* marker: core::marker::PhantomData })
+            exec::map1_lanes(mode, output, &Body { #(#names,)* __marker: core::marker::PhantomData })
         }
     }
 
@@ -598,7 +598,7 @@ impl Kernel {
         let first = &names[0];
         let same = names.iter().skip(1).map(|name| {
             let text = name.to_string();
-            quote!(exec::enough(#text, #name.len(), count)?;)
+            quote!(exec::enough(#text, #name.len(), __count)?;)
         });
         let values: Vec<_> = (0..names.len())
             .map(|i| format_ident!("__value{i}"))
@@ -615,13 +615,13 @@ impl Kernel {
         });
         let map = match self.stage {
             Stage::Fragment => {
-                quote!(fragment::map_fragments(mode, (#(#names,)*), |i, __fragment| #value))
+                quote!(fragment::map_fragments(mode, (#(#names,)*), |__i, __fragment| #value))
             }
-            _ => quote!(exec::map_tuple(mode, (#(#names,)*), |i| #value)),
+            _ => quote!(exec::map_tuple(mode, (#(#names,)*), |__i| #value)),
         };
         quote! {
             #(#takes)*
-            let count = #first.len();
+            let __count = #first.len();
             #(#same)*
             #checks
             #map

@@ -292,23 +292,23 @@ impl Kernel {
         match (variant.format.is_some(), self.dimensions()) {
             (false, _) => quote! {
                 if (invocation.x as usize) < output.len() {
-                    let value = #call;
-                    unsafe { *output.index_unchecked_mut(invocation.x as usize) = value };
+                    let __value = #call;
+                    unsafe { *output.index_unchecked_mut(invocation.x as usize) = __value };
                 }
             },
             // `&`, not `&&`: one branch.
             (true, 2) => quote! {
-                let size: UVec2 = output.query_size();
-                if (invocation.x < size.x) & (invocation.y < size.y) {
-                    let value = ::hankel_dsl::Texel::channels(#call);
-                    unsafe { ::hankel_dsl::image::write(output, UVec2::new(invocation.x, invocation.y), value) };
+                let __size: UVec2 = output.query_size();
+                if (invocation.x < __size.x) & (invocation.y < __size.y) {
+                    let __value = ::hankel_dsl::Texel::channels(#call);
+                    unsafe { ::hankel_dsl::image::write(output, UVec2::new(invocation.x, invocation.y), __value) };
                 }
             },
             (true, _) => quote! {
-                let size: UVec3 = output.query_size();
-                if (invocation.x < size.x) & (invocation.y < size.y) & (invocation.z < size.z) {
-                    let value = ::hankel_dsl::Texel::channels(#call);
-                    unsafe { ::hankel_dsl::image::write(output, invocation, value) };
+                let __size: UVec3 = output.query_size();
+                if (invocation.x < __size.x) & (invocation.y < __size.y) & (invocation.z < __size.z) {
+                    let __value = ::hankel_dsl::Texel::channels(#call);
+                    unsafe { ::hankel_dsl::image::write(output, invocation, __value) };
                 }
             },
         }
@@ -320,7 +320,7 @@ impl Kernel {
             .map(|i| output_name(&self.stage, i))
             .collect();
         let values: Vec<Ident> = (0..names.len())
-            .map(|i| format_ident!("value{i}"))
+            .map(|i| format_ident!("__value{i}"))
             .collect();
         let stored = self.returned();
         let stored = stored

@@ -10,6 +10,7 @@ use hankel_dsl::{
     lit,
 };
 
+pub mod called;
 pub mod data;
 pub mod general;
 pub mod layers;
@@ -76,6 +77,8 @@ hankel_dsl::kernels![
     texture::spread,
     texture::corners,
     texture::gathered,
+    called::called_map,
+    called::called_texel,
     data::switched,
     data::wide,
     data::signed_wide,
