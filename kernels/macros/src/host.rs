@@ -411,7 +411,7 @@ impl Kernel {
                 Role::Index => match form {
                     Form::Cooperative => self.host_place(&quote!(__it.at)),
                     Form::General => self.host_place(&quote!(__at)),
-                    Form::Plain if self.dimensions() == 1 => quote!(i as u32),
+                    Form::Plain if self.dimensions() == 1 => quote!(__i as u32),
                     Form::Plain => quote!(__i),
                 },
                 Role::BuiltIn(BuiltIn::LocalIndex) => quote!(__it.local_index),

@@ -259,7 +259,12 @@ mod tests {
         let before = programme.clone();
         programme.renew();
         assert!((programme.value() - before.value()).abs() < 1e-12);
-        for (new, old) in programme.inverse.iter().flatten().zip(before.inverse.iter().flatten()) {
+        for (new, old) in programme
+            .inverse
+            .iter()
+            .flatten()
+            .zip(before.inverse.iter().flatten())
+        {
             assert!((new - old).abs() < 1e-8 * (1.0 + old.abs()), "{new} {old}");
         }
         let weights: f64 = programme.support().map(|(_, weight)| weight).sum();

@@ -43,5 +43,10 @@ pub fn called_texel(
     #[storage] count: Buffer<'_, u32>,
 ) -> Vec4 {
     let i = (at.x ^ size.y) % count.len();
-    Vec4::new((size.x & 0xff) as f32, (count.get(i) & 0xff) as f32, at.y as f32, 1.0)
+    Vec4::new(
+        (size.x & 0xff) as f32,
+        (count.get(i) & 0xff) as f32,
+        at.y as f32,
+        1.0,
+    )
 }
