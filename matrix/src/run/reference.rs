@@ -8,6 +8,7 @@ use hankel_codegen::files::sha256;
 use hankel_dsl::native::Mode;
 use hankel_dsl::native::describe::Kernel;
 use hankel_host::device::{DeviceError, NativeDevice};
+use hankel_host::flush::flushed;
 use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
 use hankel_host::parity::intervals::Intervals;
@@ -16,7 +17,6 @@ use rayon::prelude::*;
 
 use super::Request;
 use crate::column::Column;
-use crate::flush::flushed;
 use crate::prepare::Prepared;
 use crate::subject::Subject;
 
