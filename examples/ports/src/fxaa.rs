@@ -82,7 +82,11 @@ pub fn fxaa(
         + Real::abs(north_west + north_east - 2.0 * north)
         + Real::abs(south_west + south_east - 2.0 * south);
     let is_flat = across_rows >= across_columns;
-    let (before, after) = if is_flat { (north, south) } else { (west, east) };
+    let (before, after) = if is_flat {
+        (north, south)
+    } else {
+        (west, east)
+    };
 
     // The side of the pixel on which the edge lies, and the brightness in the middle of it.
     let (rise_before, rise_after) = (Real::abs(before - middle), Real::abs(after - middle));
@@ -120,7 +124,11 @@ pub fn fxaa(
     // At the nearer end the edge steps to this pixel's side or away from it. Only what it steps
     // over is covered.
     let is_back = back < forth;
-    let (nearer, end) = if is_back { (back, end_back) } else { (forth, end_forth) };
+    let (nearer, end) = if is_back {
+        (back, end_back)
+    } else {
+        (forth, end_forth)
+    };
     let mut shift = 0.0;
     if (end < 0.0) != (middle < on_edge) {
         shift = 0.5 - nearer / (back + forth);

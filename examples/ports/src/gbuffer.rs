@@ -26,7 +26,7 @@ pub struct Object {
 /// A matrix of four columns times a vector.
 #[inline(always)]
 fn transform(m: &[Vec4; 4], v: Vec4) -> Vec4 {
-    (m[0] * v.x + m[1] * v.y) + (m[2] * v.z + m[3] * v.w)
+    m[0] * v.x + m[1] * v.y + m[2] * v.z + m[3] * v.w
 }
 
 /// A vertex: its place, now and in the frame before, and its frame of tangent, bitangent, normal. Objects
@@ -114,10 +114,11 @@ pub fn gbuffer_fragment(
 ) -> (Vec4, Vec4, f32, u32) {
     let colour = colours.sample(sampler, uv).truncate();
     let bump = bumps.sample(sampler, uv).truncate() * 2.0 - 1.0;
-    let across = tangent.truncate();
+    // Interpolated unit vectors are shorter than 1.
+    let unit = |v: Vec3| v / Real::sqrt(v.dot(v) + 1e-20);
+    let (normal, across) = (unit(normal), unit(tangent.truncate()));
     let sum = across * bump.x + normal.cross(across) * (bump.y * tangent.w) + normal * bump.z;
-    let turned = sum / Real::sqrt(sum.dot(sum) + 1e-20);
-    let flat = octahedral(turned);
+    let flat = octahedral(unit(sum));
     // From clip space to texture coordinates, y down.
     let on_screen = |clip: Vec4| Vec2::new(clip.x, -clip.y) / clip.w * 0.5;
     let motion = on_screen(now) - on_screen(before);

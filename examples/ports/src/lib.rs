@@ -15,7 +15,6 @@ pub mod matrix;
 pub mod particles;
 pub mod path;
 pub mod reflection;
-pub mod screen;
 pub mod shadow;
 pub mod sky;
 pub mod sort;
@@ -41,9 +40,10 @@ hankel_dsl::kernels![
     bloom::bloom_down,
     bloom::bloom_up,
     bloom::bloom_composite,
-    screen::screen,
     gbuffer::gbuffer_vertex,
     gbuffer::gbuffer_fragment,
+    reflection::reflection_vertex,
     reflection::reflection,
+    shadow::shadow_vertex,
     shadow::shadow_lit,
 ];

@@ -55,9 +55,7 @@ pub fn marching_cubes(
     let slice = row * (grid.cells.y + 1);
     let origin = cell.x + row * cell.y + slice * cell.z;
     // Corner `c` lies at the bits of `c`: x, y, z.
-    let value = |c: u32| {
-        field.get(origin + (c & 1) + row * ((c >> 1) & 1) + slice * (c >> 2))
-    };
+    let value = |c: u32| field.get(origin + (c & 1) + row * ((c >> 1) & 1) + slice * (c >> 2));
     let mut case = 0;
     let mut corner = 0;
     while corner < 8 {
@@ -76,7 +74,11 @@ pub fn marching_cubes(
     let from = Vec3::new(cell.x as f32, cell.y as f32, cell.z as f32);
     // Where the surface meets the edge of the `i`-th corner of a triangle.
     let point = |i: u32| {
-        let word = if i < 8 { low >> (4 * i) } else { high >> (4 * (i - 8)) };
+        let word = if i < 8 {
+            low >> (4 * i)
+        } else {
+            high >> (4 * (i - 8))
+        };
         let (a, b) = ends(word & 15);
         let (at_a, at_b) = (value(a), value(b));
         let t = (grid.level - at_a) / (at_b - at_a);
@@ -144,7 +146,7 @@ mod derived {
     /// each.
     ///
     /// On each face, each run of corners below the level is cut off by a line from the edge before it
-    /// to the edge after it; where two such corners lie opposite each other, they stay apart. The face
+    /// to the edge after it, counter-clockwise from outside; where two such corners lie opposite each other, they stay apart. The face
     /// of the neighbour has the same corners and so the same lines: there are no holes. Every edge with
     /// the surface on it has one line to it and one from it, so that lines make loops, which are filled
     /// by fans.
@@ -163,7 +165,7 @@ mod derived {
                 }
                 let enters = edge_between(face[i], face[(i + 1) % 4]);
                 let leaves = edge_between(face[end % 4], face[(end + 1) % 4]);
-                next[leaves as usize] = Some(enters);
+                next[enters as usize] = Some(leaves);
             }
         }
         let mut edges = Vec::new();
@@ -188,7 +190,10 @@ mod derived {
         let mut words = vec![0_u32; 512];
         for case in 0..256 {
             let edges = triangles(case);
-            assert!(edges.len() <= 15, "case {case} has more than five triangles");
+            assert!(
+                edges.len() <= 15,
+                "case {case} has more than five triangles"
+            );
             for (i, edge) in edges.iter().enumerate() {
                 words[case as usize * 2 + i / 8] |= edge << (4 * (i % 8));
             }

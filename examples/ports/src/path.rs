@@ -2,7 +2,7 @@
 //! Equation, 1986; cosine-weighted directions, so that a bounce multiplies by the albedo alone).
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Buffer, Element, Real, kernel, math};
+use hankel_dsl::{Buffer, Element, Real, kernel};
 
 use crate::particles::{hash, unit};
 
@@ -76,6 +76,7 @@ pub fn path_trace(
         let mut towards = Vec3::new(on_screen.x, -on_screen.y, -1.0);
         towards /= Real::sqrt(towards.dot(towards));
         let mut share = Vec3::ONE;
+        let mut found = Vec3::ZERO;
         let mut bounce = 0;
         while bounce < camera.bounces {
             let mut nearest = 1e30;
@@ -102,11 +103,11 @@ pub fn path_trace(
                 i += 1;
             }
             if hit == spheres.len() {
-                light += share * camera.sky.truncate();
+                found += share * camera.sky.truncate();
                 break;
             }
             let sphere = spheres.get(hit);
-            light += share * sphere.light.truncate();
+            found += share * sphere.light.truncate();
             share *= sphere.albedo.truncate();
             origin += towards * nearest;
             let mut normal = (origin - sphere.place.truncate()) / sphere.place.w;
@@ -116,15 +117,26 @@ pub fn path_trace(
             if sphere.albedo.w > 0.0 {
                 towards -= normal * (2.0 * normal.dot(towards));
             } else {
-                // A point of the unit sphere around the normal's end (Archimedes).
-                let z = 1.0 - 2.0 * random();
-                let (sine, cosine) = math::sin_cos(core::f32::consts::TAU * random());
-                let radius = Real::sqrt(Real::max(1.0 - z * z, 0.0));
-                towards = normal + Vec3::new(radius * cosine, radius * sine, z) * 0.999;
+                // A point of the unit sphere around the normal's end, from one in the unit ball that is
+                // not in its middle. Of 16 tries one succeeds but for a chance of 7e-6.
+                let mut point = Vec3::X;
+                let mut tries = 0;
+                while tries < 16 {
+                    let (x, y, z) = (random(), random(), random());
+                    let tried = Vec3::new(x, y, z) * 2.0 - 1.0;
+                    let square = tried.dot(tried);
+                    if square <= 1.0 && square > 1e-6 {
+                        point = tried / Real::sqrt(square);
+                        break;
+                    }
+                    tries += 1;
+                }
+                towards = normal + point * 0.999;
             }
             towards /= Real::sqrt(towards.dot(towards));
             bounce += 1;
         }
+        light += found;
         path += 1;
     }
     (light / camera.paths as f32).extend(1.0)

@@ -15,6 +15,35 @@ pub struct Material {
     pub diffuse: Vec4,
 }
 
+/// From the world to the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Eye {
+    /// Columns of the matrix from the world to clip space.
+    pub to_clip: [Vec4; 4],
+    /// Where the eye is.
+    pub place: Vec4,
+}
+
+/// A vertex of a surface: its normal, and the way to the eye.
+#[kernel(
+    vertex,
+    pinned,
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
+pub fn reflection_vertex(
+    #[attribute] position: Vec3,
+    #[attribute] normal: Vec3,
+    #[uniform] eye: &Eye,
+) -> (Vec4, Vec3, Vec3) {
+    let m = &eye.to_clip;
+    (
+        m[0] * position.x + m[1] * position.y + m[2] * position.z + m[3],
+        normal,
+        eye.place.truncate() - position,
+    )
+}
+
 /// The light that a surface reflects: sharp or blurred in the mirrored direction, by Schlick's
 /// reflectance (An Inexpensive BRDF Model for Physically-based Rendering, 1994, equation 15), and from
 /// everywhere by the last level. `view` points from the surface to the eye.

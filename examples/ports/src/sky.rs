@@ -22,7 +22,7 @@ pub struct Conditions {
 #[repr(C)]
 pub struct Model {
     /// Perez' coefficients A to E.
-    #[range(-0.5..=0.5)]
+    #[range(-0.5..=0.0)]
     pub perez: [Vec4; 5],
     /// What Perez' function is multiplied by: colour of the zenith over the function's value there.
     #[range(0.1..=0.4)]
@@ -51,10 +51,16 @@ fn perez(coefficients: &[Vec4; 5], cosine: f32, angle: f32, cos_angle: f32) -> V
     compute,
     threads(64),
     pinned,
-    parity(non_finite, why = "exponentials and products of absurd numbers overflow")
+    parity(
+        ulp = 256,
+        absolute = 1e-5,
+        why = "languages that cannot pin arithmetic add up in another order, 2 ulp in each exponential; sums of unlike signs enlarge that"
+    )
 )]
 pub fn sky_model(#[element] sky: Conditions) -> Model {
-    let (t, s) = (sky.turbidity, sky.sun);
+    // Beyond these the model has no meaning.
+    let t = Real::clamp(sky.turbidity, 1.7, 10.0);
+    let s = Real::clamp(sky.sun, 0.0, 1.5);
     let line = |x: Vec2, y: Vec2, luminance: Vec2| {
         Vec4::new(
             x.x * t + x.y,
@@ -64,11 +70,31 @@ pub fn sky_model(#[element] sky: Conditions) -> Model {
         )
     };
     let coefficients = [
-        line(Vec2::new(-0.0193, -0.2592), Vec2::new(-0.0167, -0.2608), Vec2::new(0.1787, -1.4630)),
-        line(Vec2::new(-0.0665, 0.0008), Vec2::new(-0.0950, 0.0092), Vec2::new(-0.3554, 0.4275)),
-        line(Vec2::new(-0.0004, 0.2125), Vec2::new(-0.0079, 0.2102), Vec2::new(-0.0227, 5.3251)),
-        line(Vec2::new(-0.0641, -0.8989), Vec2::new(-0.0441, -1.6537), Vec2::new(0.1206, -2.5771)),
-        line(Vec2::new(-0.0033, 0.0452), Vec2::new(-0.0109, 0.0529), Vec2::new(-0.0670, 0.3703)),
+        line(
+            Vec2::new(-0.0193, -0.2592),
+            Vec2::new(-0.0167, -0.2608),
+            Vec2::new(0.1787, -1.4630),
+        ),
+        line(
+            Vec2::new(-0.0665, 0.0008),
+            Vec2::new(-0.0950, 0.0092),
+            Vec2::new(-0.3554, 0.4275),
+        ),
+        line(
+            Vec2::new(-0.0004, 0.2125),
+            Vec2::new(-0.0079, 0.2102),
+            Vec2::new(-0.0227, 5.3251),
+        ),
+        line(
+            Vec2::new(-0.0641, -0.8989),
+            Vec2::new(-0.0441, -1.6537),
+            Vec2::new(0.1206, -2.5771),
+        ),
+        line(
+            Vec2::new(-0.0033, 0.0452),
+            Vec2::new(-0.0109, 0.0529),
+            Vec2::new(-0.0670, 0.3703),
+        ),
     ];
     let cubic = |c: Vec4| ((c.x * s + c.y) * s + c.z) * s + c.w;
     let zenith_x = (cubic(Vec4::new(0.00166, -0.00375, 0.00209, 0.0)) * t
@@ -126,16 +152,24 @@ pub fn sky(
     let direction = Vec3::new(flat.x, flat.y, cosine);
     let cos_angle = Real::clamp(direction.dot(model.sun.truncate()), -1.0, 1.0);
     let value = perez(&model.perez, cosine, acos(cos_angle), cos_angle) * model.scale.truncate();
-    // From chromaticities and luminance to CIE XYZ.
-    let (x, y, luminance) = (value.x, value.y, value.z);
+    // From chromaticities and luminance to CIE XYZ. No colour has a y below 0.03.
+    let (x, y, luminance) = (value.x, Real::max(value.y, 0.03), value.z);
     let per_y = luminance / y;
     let xyz = Vec3::new(x * per_y, luminance, (1.0 - x - y) * per_y);
     let row = |r: f32, g: f32, b: f32| xyz.dot(Vec3::new(r, g, b));
-    // IEC 61966-2-1: XYZ to linear sRGB. Colours out of gamut are cut off.
+    // IEC 61966-2-1: XYZ to linear sRGB. Colours out of gamut, and light beyond what the format holds, are
+    // cut off.
+    let shown = |x: f32| {
+        if x > 0.0 {
+            if x < 60_000.0 { x } else { 60_000.0 }
+        } else {
+            0.0
+        }
+    };
     Vec4::new(
-        Real::max(row(3.2406, -1.5372, -0.4986), 0.0),
-        Real::max(row(-0.9689, 1.8758, 0.0415), 0.0),
-        Real::max(row(0.0557, -0.2040, 1.0570), 0.0),
+        shown(row(3.2406, -1.5372, -0.4986)),
+        shown(row(-0.9689, 1.8758, 0.0415)),
+        shown(row(0.0557, -0.2040, 1.0570)),
         1.0,
     )
 }

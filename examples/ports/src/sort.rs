@@ -9,7 +9,9 @@
 //! 3. `sort_scatter`: each block is sorted in workgroup memory, and its runs of equal digits go to their
 //!    places.
 
-use hankel_dsl::{Buffer, Element, Shared, SharedAtomics, StorageMut, barrier, cooperative, kernel};
+use hankel_dsl::{
+    Buffer, Element, Shared, SharedAtomics, StorageMut, barrier, cooperative, kernel,
+};
 
 /// Invocations of a workgroup, and keys of a block.
 const BLOCK: u32 = 256;

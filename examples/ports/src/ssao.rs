@@ -112,7 +112,10 @@ pub fn ssao(
         }
         i += 1;
     }
-    Real::max(1.0 - 2.0 * view.strength * view.radius / SAMPLES as f32 * sum, 0.0)
+    Real::max(
+        1.0 - sum * (view.strength * view.radius) * (2.0 / SAMPLES as f32),
+        0.0,
+    )
 }
 
 /// The mean of 5 by 5 pixels, those alone whose depths are near.
