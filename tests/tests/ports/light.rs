@@ -479,8 +479,10 @@ pub const SHADOW: Port = Port {
                     }
                 }
                 assert!(between > 200, "{between} pixels between light and shadow");
-                let pixels: Vec<[f32; 4]> = lit.iter().map(|x| [*x; 4]).collect();
-                picture("shadow", runner.way, size, &pixels);
+                if !native {
+                    let pixels: Vec<[f32; 4]> = lit.iter().map(|x| [*x; 4]).collect();
+                    picture("shadow", runner.way, size, &pixels);
+                }
             }),
         }
     },
