@@ -4,6 +4,7 @@ pub mod crates;
 pub mod device;
 pub mod eval;
 pub mod flat;
+pub mod flush;
 pub mod inputs;
 pub mod parity;
 pub mod worker;

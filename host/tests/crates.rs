@@ -4,8 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use hankel_dsl::native::Mode;
 use hankel_host::crates::{CrateError, KernelCrate, Native};
 use hankel_host::device::{Bind, Device, NativeDevice};
+use hankel_host::flush;
 use hankel_host::worker::Worker;
 
 /// A folder for a crate, emptied but for its build.
@@ -112,6 +114,26 @@ fn a_kernel_crate_is_built_loaded_and_run() {
         .unwrap();
     let result: Vec<f32> = bytemuck::pod_collect_to_vec(&device.read_buffer(out).unwrap());
     assert_eq!((result[3], result[99]), (4.5, 4900.5));
+
+    // Its process flushes subnormal numbers where the caller's thread does.
+    let slightest: Vec<u8> = 1.5e-19_f32.to_le_bytes().repeat(100);
+    for flushes in [false, true] {
+        let run = || {
+            let mut device = NativeDevice::with_mode(Mode::REFERENCE);
+            let out = device.buffer("out", slightest.len()).unwrap();
+            let args = [Bind::Bytes(&slightest), Bind::Buffer(out)];
+            device.dispatch(&entry.program(None, &[]), &args).unwrap();
+            let result: Vec<f32> = bytemuck::pod_collect_to_vec(&device.read_buffer(out).unwrap());
+            result[5]
+        };
+        if flushes {
+            if let Some(result) = flush::flushed(run) {
+                assert_eq!(result, 0.0);
+            }
+        } else {
+            assert!(run() > 0.0);
+        }
+    }
 
     // The same description whatever was built; only what was asked for runs.
     let kernels = |of: &KernelCrate| {

@@ -14,7 +14,6 @@ pub mod adopt;
 mod cache;
 pub mod column;
 pub mod compile;
-mod flush;
 pub mod gl;
 pub mod html;
 pub mod job;

@@ -64,6 +64,16 @@ impl Crate {
         )
     }
 
+    /// Shaders that engines have.
+    #[must_use]
+    pub fn ports() -> Self {
+        Self::new(
+            hankel_example_ports::entries(),
+            "examples/ports",
+            "snapshots/ports",
+        )
+    }
+
     /// Reads the committed SPIR-V, which must belong to the sources.
     fn new(entries: Vec<Entry>, folder: &str, snapshots: &str) -> Self {
         let manifest = root().join(folder).join("Cargo.toml");

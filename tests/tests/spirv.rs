@@ -18,7 +18,12 @@ const REPORT: &str = "target/spirv-rebuilt.txt";
 
 #[test]
 fn committed_spirv_follows_from_its_sources() {
-    let crates = [Crate::shadows(), Crate::conformance(), Crate::listing()];
+    let crates = [
+        Crate::shadows(),
+        Crate::conformance(),
+        Crate::listing(),
+        Crate::ports(),
+    ];
     let toolchain = match hankel_toolchain::ensure(&Options::from_env(), &mut Silent) {
         Ok(toolchain) => toolchain,
         Err(hankel_toolchain::Error::NotInstalled { .. }) => {

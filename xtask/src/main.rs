@@ -49,7 +49,7 @@ struct Committed {
     kernels: Vec<Kernel>,
 }
 
-fn committed() -> [Committed; 3] {
+fn committed() -> [Committed; 4] {
     let kernels = |entries: Vec<Entry>| entries.into_iter().map(|e| e.kernel).collect();
     [
         Committed {
@@ -69,6 +69,12 @@ fn committed() -> [Committed; 3] {
             manifest: "tests/listing/Cargo.toml",
             folder: "snapshots/listing",
             kernels: kernels(hankel_listing::entries()),
+        },
+        Committed {
+            crate_name: "hankel-example-ports",
+            manifest: "examples/ports/Cargo.toml",
+            folder: "snapshots/ports",
+            kernels: kernels(hankel_example_ports::entries()),
         },
     ]
 }

@@ -9,6 +9,8 @@ use hankel_dsl::native::{Arg, Call, Mode, Sampler, TextureMut, TextureRef};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::flush;
+
 /// Bytes at an address that fits every layout.
 type Words = Vec<u128>;
 
@@ -32,6 +34,8 @@ pub(super) struct Request {
     parallel: bool,
     sanitize: Option<Order>,
     subgroup_size: u32,
+    /// The caller's thread flushes subnormal numbers ([`crate::flush`]); the kernel's is to do so, too.
+    pub flushes: bool,
     constants: Vec<u32>,
     shapes: Vec<Shape>,
 }
@@ -132,6 +136,7 @@ pub(super) fn write_call(to: &mut impl Write, kernel: usize, call: &Call<'_>) ->
         parallel: call.mode.parallel,
         sanitize: call.mode.sanitize,
         subgroup_size: call.mode.subgroup_size,
+        flushes: flush::is_on(),
         constants: call.constants.clone(),
         shapes: shapes.collect(),
     };

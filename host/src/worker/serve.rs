@@ -4,8 +4,11 @@ use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 use std::sync::mpsc::channel;
 
+use hankel_dsl::native::CallError;
 use hankel_dsl::native::inputs::Request;
 use hankel_dsl::native::plugin::Plugin;
+
+use crate::flush;
 
 use super::frame::{Answer, Arrived, Asked, read_header, write_header};
 
@@ -56,7 +59,17 @@ pub fn serve(library: &Path) -> io::Result<()> {
             match work {
                 Work::Call(mut arrived) => {
                     let index = arrived.request.kernel;
-                    let result = plugin.run(index, &mut arrived.call());
+                    let flushes = arrived.request.flushes;
+                    let mut call = arrived.call();
+                    let result = if flushes {
+                        flush::flushed(|| plugin.run(index, &mut call)).unwrap_or_else(|| {
+                            let message = "its thread cannot flush subnormal numbers".into();
+                            Err(CallError::Plugin { message })
+                        })
+                    } else {
+                        plugin.run(index, &mut call)
+                    };
+                    drop(call);
                     match result {
                         Ok(()) => {
                             write_header(&mut answers, &Answer::Done)?;

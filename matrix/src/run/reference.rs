@@ -9,6 +9,7 @@ use hankel_codegen::files::sha256;
 use hankel_dsl::native::describe::{Kernel, Subgroups};
 use hankel_dsl::native::{Mode, SUBGROUP_SIZES};
 use hankel_host::device::{DeviceError, NativeDevice};
+use hankel_host::flush::flushed as flushed_run;
 use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
 use hankel_host::parity::intervals::Intervals;
@@ -17,7 +18,6 @@ use rayon::prelude::*;
 
 use super::Request;
 use crate::column::Column;
-use crate::flush::flushed as flushed_run;
 use crate::prepare::Prepared;
 use crate::subject::Subject;
 

@@ -1,7 +1,8 @@
 //! Running native code as a device that flushes subnormal numbers: such operands count as zero,
 //! and such results become zero. Vulkan and WebGPU let every device do so, and it is no matter of
 //! a tolerance: a subnormal number may decide a comparison. So devices that do are compared with a
-//! reference that does, and to the bit.
+//! reference that does, and to the bit. Kernels that run in a process of their own flush there, too
+//! ([`crate::worker`]).
 
 use std::thread;
 
@@ -9,6 +10,13 @@ use std::thread;
 /// it panics.
 pub fn flushed<T: Send>(work: impl FnOnce() -> T + Send) -> Option<T> {
     thread::scope(|s| s.spawn(|| switch().then(work)).join().ok().flatten())
+}
+
+/// Whether this thread flushes.
+#[must_use]
+pub fn is_on() -> bool {
+    let least = std::hint::black_box(f32::MIN_POSITIVE);
+    std::hint::black_box(least * 0.5) == 0.0
 }
 
 /// Makes this thread flush; whether it does.
@@ -55,18 +63,18 @@ fn switch() -> bool {
 mod tests {
     use std::hint::black_box;
 
-    use super::flushed;
+    use super::{flushed, is_on};
 
     #[test]
     fn only_its_own_thread_flushes() {
         let least = black_box(f32::MIN_POSITIVE);
         let half = || black_box(least) * black_box(0.5);
-        assert!(half() > 0.0);
-        if let Some((result, operand)) = flushed(|| {
+        assert!(half() > 0.0 && !is_on());
+        if let Some((result, operand, is_on)) = flushed(|| {
             let subnormal = black_box(f32::from_bits(1));
-            (half(), black_box(subnormal) * black_box(1e20))
+            (half(), black_box(subnormal) * black_box(1e20), is_on())
         }) {
-            assert_eq!((result, operand), (0.0, 0.0));
+            assert_eq!((result, operand, is_on), (0.0, 0.0, true));
         }
         assert!(half() > 0.0);
         assert_eq!(flushed(|| panic!("on purpose")), None::<()>);
