@@ -276,7 +276,7 @@ struct View<'a> {
 impl View<'_> {
     /// Lambert's law with what `shadow` gives for a pixel's footprint, its coordinates in the map and its depth.
     #[inline(always)]
-    fn shade(
+    fn light_up(
         self,
         world: Vec3,
         normal: Vec3,
@@ -285,7 +285,12 @@ impl View<'_> {
         shadow: impl FnOnce(Footprint, Vec2, f32) -> f32,
     ) -> Vec4 {
         shade_with(self.light, world, normal, colour, |uv, z| {
-            let View { light, camera, raster, size } = self;
+            let View {
+                light,
+                camera,
+                raster,
+                size,
+            } = self;
             let footprint = Footprint::of(light, camera, raster, world, plane, size);
             shadow(footprint, uv, z)
         })
@@ -328,7 +333,7 @@ pub fn shade_hamburger_mips(
         raster,
         size: map.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
         hamburger_shadow(light, texel, z, encoding)
     })
@@ -370,7 +375,7 @@ pub fn shade_hausdorff_mips(
         raster,
         size: map.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
         hausdorff_shadow(light, texel, z, encoding)
     })
@@ -412,7 +417,7 @@ pub fn shade_variance_mips(
         raster,
         size: map.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
         variance_shadow(light, texel, z, encoding)
     })
@@ -457,7 +462,7 @@ pub fn shade_hamburger_6_mips(
         raster,
         size: first.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let odd = footprint.mean(uv, |uv, level| first.sample_level(sampler, uv, level));
         let even = footprint.mean(uv, |uv, level| second.sample_level(sampler, uv, level));
         hamburger_6_shadow(light, target, odd, even, z, encoding)
@@ -500,7 +505,7 @@ pub fn shade_trigonometric_mips(
         raster,
         size: map.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
         trigonometric_shadow(light, texel, z, encoding)
     })
@@ -538,7 +543,7 @@ pub fn shade_esm_mips(
         raster,
         size: map.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
         exponential_shadow(*exponent, texel, z)
     })
@@ -581,7 +586,7 @@ pub fn shade_evsm_mips(
         raster,
         size: map.size(),
     };
-    view.shade(world, normal, colour, plane, |footprint, uv, z| {
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
         let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
         warped_shadow(light, exponents, texel, z, warps)
     })

@@ -114,10 +114,10 @@ pub fn blur_packed_10(
     #[length(1..=7)]
     #[range(0.0..=0.15)]
     weights: Buffer<'_, f32>,
-    #[texture] source: Texture2d<'_, u32>,
+    #[texture] map: Texture2d<'_, u32>,
 ) -> UVec2 {
-    let size = source.size();
-    let tap = |offset: IVec2| source.load(texel(at, offset, size));
+    let size = map.size();
+    let tap = |offset: IVec2| map.load(texel(at, offset, size));
     let weight = weights.get(0);
     let centre = tap(IVec2::ZERO);
     let mut first = first_10(centre) * weight;

@@ -113,7 +113,11 @@ pub(super) fn filtered<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[f64
 
 /// A depth's four channels in a map that is stored as `how` says, before they are rounded.
 pub(super) fn channels(how: u32, z: f64) -> [f64; 4] {
-    let z = if how == encoding::UNIT { z } else { 2.0 * z - 1.0 };
+    let z = if how == encoding::UNIT {
+        z
+    } else {
+        2.0 * z - 1.0
+    };
     let m = Moments4::of_depth(z);
     let q = match how {
         encoding::UNIT => quantize_unit_4(m),
@@ -401,14 +405,17 @@ pub fn shaded_16(request: &Request) -> Vec<Given> {
 /// Six moments in 10 bits each, and the weights of a filter.
 #[must_use]
 pub fn blurred_10(_: &Request) -> Vec<Given> {
-    let source = [("source", TexelFormat::Rg32Uint)];
-    filters("a map of words", |given| with_words(given, &source, &words_10()))
+    filters("a map of words", |given| {
+        with_words(given, &IN_10, &words_10())
+    })
 }
 
 /// Six moments in 16 bits each, and the weights of a filter.
 #[must_use]
 pub fn blurred_16(_: &Request) -> Vec<Given> {
-    filters("maps of words", |given| with_words(given, &IN_16, &words_16()))
+    filters("maps of words", |given| {
+        with_words(given, &IN_16, &words_16())
+    })
 }
 
 /// Exponents for maps of 32 and of 16 bits, and the relative variances that go with them.

@@ -22,19 +22,22 @@ use crate::trigonometric;
 #[must_use]
 pub fn halved(_: &Request) -> Vec<Given> {
     let [width, height] = SIZE.map(|n| 2 * n);
-    [("even sizes", width, height), ("odd sizes", width + 1, height + 1)]
-        .into_iter()
-        .map(|(what, width, height)| {
-            let texels = (0..width * height).map(|i| {
-                let middle = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(n);
-                let z = maps::depth(middle(i % width, width), middle(i / width, height));
-                let powers = [z, z * z, z * z * z, z * z * z * z];
-                Vec4::from_array(powers.map(|x| x as f32))
-            });
-            let format = TexelFormat::Rgba32Float;
-            Given::new(what).texture("source", [width, height], 1, format, texels)
-        })
-        .collect()
+    [
+        ("even sizes", width, height),
+        ("odd sizes", width + 1, height + 1),
+    ]
+    .into_iter()
+    .map(|(what, width, height)| {
+        let texels = (0..width * height).map(|i| {
+            let middle = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(n);
+            let z = maps::depth(middle(i % width, width), middle(i / width, height));
+            let powers = [z, z * z, z * z * z, z * z * z * z];
+            Vec4::from_array(powers.map(|x| x as f32))
+        });
+        let format = TexelFormat::Rgba32Float;
+        Given::new(what).texture("source", [width, height], 1, format, texels)
+    })
+    .collect()
 }
 
 /// Weights of what a texel of the next level covers.
@@ -105,7 +108,10 @@ fn look(what: &'static str, x: Vec4, y: Vec4, [width, height]: [f32; 2], anisotr
 }
 
 fn looks() -> [Look; 5] {
-    let (x, z) = (Vec4::new(1.0, 0.0, 0.0, -0.4), Vec4::new(0.0, 0.0, 1.0, -0.5));
+    let (x, z) = (
+        Vec4::new(1.0, 0.0, 0.0, -0.4),
+        Vec4::new(0.0, 0.0, 1.0, -0.5),
+    );
     // Turned, and from a side.
     let (turned, flat) = (
         Vec4::new(0.8, 0.1, -0.6, 0.1),
@@ -120,21 +126,18 @@ fn looks() -> [Look; 5] {
     ]
 }
 
-/// Maps with all of their levels, of which `store` makes texels.
-struct Texture<'a, const N: usize> {
-    name: &'a str,
-    format: TexelFormat,
-    store: &'a dyn Fn([f64; N]) -> Vec4,
-}
+/// A map of four channels.
+const MAP: [(&str, TexelFormat); 1] = [("map", TexelFormat::Rgba32Float)];
 
 /// What shading with maps of what `of` gives for a depth from 0 to 1 reads, with the bias as published and ten
-/// times as strong.
+/// times as strong. `store` makes texels of that, for each texture by its number.
 fn with_levels<const N: usize>(
     request: &Request,
     bias: &Bias,
     strength: f32,
     of: impl Fn(f64) -> [f64; N],
-    textures: &[Texture<'_, N>],
+    textures: &[(&str, TexelFormat)],
+    store: impl Fn(usize, [f64; N]) -> Vec4,
 ) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     let (count, map) = levels(maps::filtered(of));
@@ -150,11 +153,11 @@ fn with_levels<const N: usize>(
                 .buffer("plane", &vec![look.plane; maps::FRAGMENTS])
                 .uniform("camera", &look.camera)
                 .uniform("raster", &look.raster);
-            textures.iter().fold(given, |given, texture| {
-                let texels = map.iter().map(|m| (texture.store)(*m));
+            let textures = textures.iter().enumerate();
+            textures.fold(given, |given, (i, (name, format))| {
+                let texels = map.iter().map(|m| store(i, *m));
                 let [width, height] = SIZE;
-                let size = [width, height, 1];
-                given.levels(texture.name, size, count, 1, texture.format, texels)
+                given.levels(name, [width, height, 1], count, 1, *format, texels)
             })
         })
         .collect()
@@ -165,13 +168,9 @@ fn plain(m: [f64; 4]) -> Vec4 {
     Vec4::from_array(m.map(|x| x as f32))
 }
 
-/// One map of four channels.
-fn one(store: &dyn Fn([f64; 4]) -> Vec4) -> [Texture<'_, 4>; 1] {
-    [Texture {
-        name: "map",
-        format: TexelFormat::Rgba32Float,
-        store,
-    }]
+/// As a map holds them: floats, or 16 bits from 0 to 1.
+fn stored(is_plain: bool, m: [f64; 4]) -> Vec4 {
+    if is_plain { plain(m) } else { maps::unorm(m) }
 }
 
 /// What shading with a map of moments reads, for the map's `encoding`.
@@ -179,9 +178,10 @@ fn one(store: &dyn Fn([f64; 4]) -> Vec4) -> [Texture<'_, 4>; 1] {
 pub fn shaded(request: &Request) -> Vec<Given> {
     let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
     let bias = maps::published(how);
-    let store = if how == encoding::PLAIN { plain } else { maps::unorm };
     let strength = bias.strength as f32;
-    with_levels(request, &bias, strength, |z| maps::channels(how, z), &one(&store))
+    let of = |z| maps::channels(how, z);
+    let store = |_, m| stored(how == encoding::PLAIN, m);
+    with_levels(request, &bias, strength, of, &MAP, store)
 }
 
 /// What shading with maps of six moments reads, for their `encoding`.
@@ -202,20 +202,11 @@ pub fn shaded_6(request: &Request) -> Vec<Given> {
             [q.r0, q.g0, q.b0, q.r1, q.g1, q.b1]
         }
     };
-    let store = if is_plain { plain } else { maps::unorm };
-    let textures = [
-        Texture {
-            name: "first",
-            format: TexelFormat::Rgba32Float,
-            store: &|m: [f64; 6]| store([m[0], m[1], m[2], 0.0]),
-        },
-        Texture {
-            name: "second",
-            format: TexelFormat::Rgba32Float,
-            store: &|m: [f64; 6]| store([m[3], m[4], m[5], 0.0]),
-        },
-    ];
-    let given = with_levels(request, &bias, bias.strength as f32, of, &textures).into_iter();
+    let textures = ["first", "second"].map(|name| (name, TexelFormat::Rgba32Float));
+    let store =
+        |i: usize, m: [f64; 6]| stored(is_plain, [m[3 * i], m[3 * i + 1], m[3 * i + 2], 0.0]);
+    let strength = bias.strength as f32;
+    let given = with_levels(request, &bias, strength, of, &textures, store).into_iter();
     given.map(|g| g.uniform("target", &bias.six())).collect()
 }
 
@@ -223,29 +214,32 @@ pub fn shaded_6(request: &Request) -> Vec<Given> {
 #[must_use]
 pub fn shaded_trigonometric(request: &Request) -> Vec<Given> {
     let is_plain = request.constant("encoding") == Some(trigonometric::encoding::PLAIN);
-    let (bias, store): (_, fn([f64; 4]) -> Vec4) = if is_plain {
-        (TRIGONOMETRIC_2_32, plain)
+    let bias = if is_plain {
+        TRIGONOMETRIC_2_32
     } else {
-        (TRIGONOMETRIC_2_16, |m| maps::unorm(m.map(|x| 0.5 * x + 0.5)))
+        TRIGONOMETRIC_2_16
     };
     let of = |z| {
         let m = TrigonometricMoments::of_depth(z);
-        [m.c1, m.s1, m.c2, m.s2]
+        let m = [m.c1, m.s1, m.c2, m.s2];
+        if is_plain {
+            m
+        } else {
+            m.map(|x| 0.5 * x + 0.5)
+        }
     };
-    with_levels(request, &bias, bias.strength as f32, of, &one(&store))
+    let store = |_, m| stored(is_plain, m);
+    with_levels(request, &bias, bias.strength as f32, of, &MAP, store)
 }
 
 /// What shading with an exponential shadow map reads.
 #[must_use]
 pub fn shaded_exponential(request: &Request) -> Vec<Given> {
     let runs = [10.0_f32, 80.0].into_iter().flat_map(|exponent| {
-        let texture = Texture {
-            name: "map",
-            format: TexelFormat::R32Float,
-            store: &|[x]: [f64; 1]| Vec4::new(x as f32, 0.0, 0.0, 0.0),
-        };
+        let map = [("map", TexelFormat::R32Float)];
         let of = |z| [f64::exp(f64::from(exponent) * z)];
-        let given = with_levels(request, &SYMMETRIC_4_32, 0.0, of, &[texture]);
+        let store = |_, [x]: [f64; 1]| Vec4::new(x as f32, 0.0, 0.0, 0.0);
+        let given = with_levels(request, &SYMMETRIC_4_32, 0.0, of, &map, store);
         given
             .into_iter()
             .map(move |given| given.uniform("exponent", &exponent))
@@ -258,7 +252,8 @@ pub fn shaded_exponential(request: &Request) -> Vec<Given> {
 pub fn shaded_warps(request: &Request) -> Vec<Given> {
     let runs = EXPONENTS.into_iter().flat_map(|(_, exponents, variance)| {
         let of = |z| maps::warps(&exponents, z);
-        let given = with_levels(request, &SYMMETRIC_4_32, variance, of, &one(&plain));
+        let store = |_, m| plain(m);
+        let given = with_levels(request, &SYMMETRIC_4_32, variance, of, &MAP, store);
         given
             .into_iter()
             .map(move |given| given.uniform("exponents", &exponents))
