@@ -60,26 +60,27 @@ fn each_level_has_the_mean_of_the_map() {
     }
 }
 
-/// Of most techniques with mip levels: nearer to the rays than without, and nearer still with longer footprints.
+/// A lower bound of more is looser, so what is wrongly lit grows with the part of the map that a pixel looks at, and
+/// what is wrongly dark, because the one place that it looked at without levels is not typical, falls. With a long
+/// footprint both are less than with a round one.
 #[test]
-fn pixels_that_see_much_of_a_map_are_nearer_to_the_rays() {
+fn pixels_that_see_much_of_a_map_take_its_mean() {
     let (one, mesh) = scene("");
     let rays = by_rays(&one, &mesh, &mut |_| ());
-    for technique in ["hamburger", "hamburger-6", "evsm4", "esm"] {
-        let error = |mips: &str| {
+    for technique in ["hamburger", "hamburger-6", "evsm4"] {
+        let errors = |mips: &str| {
             let (scene, mesh) = scene(&format!("technique = '{technique}'\nsize = 1024\n{mips}"));
             let picture: Arriving = by_technique(&scene, &mesh).unwrap_or_else(|e| panic!("{e}"));
             let errors = picture.errors(&rays).unwrap();
             println!("{technique}, {mips:?}: {errors}");
-            errors.rms
+            errors
         };
-        let without = error("");
-        let trilinear = error("mips = true");
-        let anisotropic = error("mips = true\nanisotropy = 16");
-        assert!(
-            anisotropic < without && anisotropic < trilinear,
-            "{technique}: {without}, {trilinear}, {anisotropic}"
-        );
+        let without = errors("");
+        let round = errors("mips = true");
+        let long = errors("mips = true\nanisotropy = 16");
+        assert!(round.wrongly_dark < without.wrongly_dark, "{technique}");
+        assert!(long.wrongly_dark < round.wrongly_dark, "{technique}");
+        assert!(long.rms < round.rms, "{technique}");
     }
 }
 
