@@ -116,6 +116,31 @@ fn a_player_that_knows_no_hankel_draws_the_same() {
     );
 }
 
+/// The levels of a map are copied together, and looked up.
+#[test]
+fn mip_levels_are_played() {
+    let desk = Desk::new();
+    for technique in ["hamburger", "hamburger-6", "esm"] {
+        let shadow = format!("[shadow]\ntechnique = \"{technique}\"\nmips = true\nanisotropy = 4");
+        desk.write("scene.toml", SCENE.replace("[shadow]", &shadow));
+        desk.hankel("build --scene scene.toml --out frame --target wgsl")
+            .code(0);
+        let expected = rendered(&desk, "scene.toml", "");
+        let (share, largest) = compare(&played(&desk, "frame"), &expected);
+        assert!(
+            share <= ROUNDED,
+            "{technique}: {share}, the most by {largest}"
+        );
+        let frame = json(&desk, "frame/frame.json");
+        assert_eq!(frame["shadow"]["anisotropy"], 4);
+        let passes = frame["passes"].as_array().expect("a list");
+        let levels = passes.iter().find(|pass| pass["kind"] == "levels");
+        // 128 x 128 texels to one.
+        let levels = levels.expect("levels")["levels"].as_array().map(Vec::len);
+        assert_eq!(levels, Some(8), "{technique}");
+    }
+}
+
 /// What is blended, kept sample by sample, or scattered on the way to the camera, is played too.
 #[test]
 fn glass_and_a_medium_are_played() {

@@ -90,6 +90,16 @@ pub struct Shadow {
     pub depth_bias: f32,
     /// Shadow below this much is light.
     pub leak_cut: f32,
+    /// Whether the map has mip levels.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub mips: bool,
+    /// How many times as long as wide a pixel's footprint in such a map is at most, 1 or more.
+    #[serde(default = "one")]
+    pub anisotropy: u32,
+}
+
+const fn one() -> u32 {
+    1
 }
 
 /// A buffer.
@@ -156,6 +166,10 @@ pub struct Texture {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum TextureUsage {
+    /// A level of it is copied to.
+    CopyDestination,
+    /// It is copied from.
+    CopySource,
     /// It is drawn into, or the samples of what was drawn are resolved into it.
     RenderAttachment,
     /// Shaders write or read texels of it in its own format.
@@ -276,6 +290,15 @@ pub enum Pass {
         /// render attachments, so that a pass that draws nothing can fill them.
         #[serde(skip_serializing_if = "Option::is_none", default)]
         value: Option<[f64; 4]>,
+    },
+    /// Copies textures into the mip levels of one.
+    Levels {
+        /// Its name.
+        label: String,
+        /// What they are copied into, all of its levels.
+        texture: String,
+        /// Textures with one level each, level 0 first.
+        levels: Vec<String>,
     },
     /// Runs a compute shader.
     Compute {
@@ -464,7 +487,7 @@ impl Frame {
     fn draws(&self) -> impl Iterator<Item = &Draw> {
         self.passes.iter().filter_map(|pass| match pass {
             Pass::Draw(draw) => Some(&**draw),
-            Pass::Clear { .. } | Pass::Compute { .. } => None,
+            Pass::Clear { .. } | Pass::Levels { .. } | Pass::Compute { .. } => None,
         })
     }
 }

@@ -42,6 +42,8 @@ pub fn export(scene: &Scene, file: &str, mesh: &Mesh) -> Result<Draft> {
         moment_bias: shadow.moment_bias,
         depth_bias: shadow.depth_bias,
         leak_cut: shadow.leak_cut,
+        mips: shadow.mips,
+        anisotropy: shadow.anisotropy,
     };
     let needed = graph.needed();
     let mut export = Export::new(&graph, &needed);
@@ -87,6 +89,8 @@ pub fn recorded(shadow: &frame::Shadow) -> Option<Shadow> {
         size: shadow.size,
         filter: shadow.filter,
         fit: fit.into_iter().find(|fit| fit.name() == shadow.fit)?,
+        mips: shadow.mips,
+        anisotropy: shadow.anisotropy,
         ..Shadow::of(technique, *map)
     })
 }
@@ -374,6 +378,25 @@ impl<'g> Export<'g> {
                     label: label.into(),
                     resources: resources.collect(),
                     value: (!is_zero).then(|| value.to_array().map(f64::from)),
+                }
+            }
+            Work::Levels(levels) => {
+                let mut copied = |handle: &Handle, usage| {
+                    let name = self.name(*handle);
+                    if let Some(texture) = self.textures.get_mut(&name) {
+                        texture.usage.insert(usage);
+                    }
+                    name
+                };
+                FramePass::Levels {
+                    label: label.into(),
+                    texture: writes.first().map_or_else(String::new, |made| {
+                        copied(made, TextureUsage::CopyDestination)
+                    }),
+                    levels: levels
+                        .iter()
+                        .map(|level| copied(level, TextureUsage::CopySource))
+                        .collect(),
                 }
             }
             Work::Compute(call) => {

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::error::{FrameError, Result};
 use crate::executor::{Clock, Executor, Memory, Progress, Run, Shaders, Timing};
-use crate::graph::{self, Graph, Handle, Summary};
+use crate::graph::{self, Graph, Handle, Summary, Work};
 use crate::passes::{Given, Translucent};
 use crate::picture::{Difference, Picture};
 use crate::scene::{Camera, CameraView, Fit, LightView, Mesh, Scene};
@@ -151,9 +151,16 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         ),
     };
     let space = Space::of(scene, mesh, show);
+    let lit = graph.buffer("normals", &normals);
+    // Those of the light alone are lit as if they faced it.
+    let planes = match show {
+        Show::Light => graph.buffer("planes", &mesh.normals),
+        Show::Picture | Show::Scattered => lit,
+    };
     let given = Given {
         positions: graph.buffer("positions", &mesh.positions),
-        normals: graph.buffer("normals", &normals),
+        normals: lit,
+        planes,
         colours: graph.buffer("colours", &colours),
         indices: graph.buffer("indices", mesh.opaque().as_flattened()),
         translucent,
@@ -221,6 +228,12 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
             picture = (medium.technique.add)(&mut graph, &given, &volume, picture)?;
         }
         None => graph.omit("scattering", "there is no medium"),
+    }
+    if scene.shadow.mips && !graph.omitted().iter().any(|it| it.what == "mips") {
+        let has_levels = |pass: &graph::Pass| matches!(pass.work, Work::Levels(_));
+        if !graph.passes().iter().any(has_levels) {
+            graph.omit("mips", "the technique interpolates no map");
+        }
     }
     graph.keep(picture);
     Ok((graph, given, picture))

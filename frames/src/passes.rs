@@ -8,6 +8,7 @@ use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::Blend;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_shadows::blur::Direction;
+use hankel_shadows::mips::Raster;
 use hankel_shadows::shade::encoding;
 use hankel_shadows::soft::Lines;
 
@@ -42,8 +43,10 @@ pub struct Volume {
 pub struct Given {
     /// World-space positions of the vertices.
     pub positions: Handle,
-    /// Their unit normals.
+    /// Unit normals that they are lit by.
     pub normals: Handle,
+    /// Their own unit normals: the planes that pixels see.
+    pub planes: Handle,
     /// Their colours.
     pub colours: Handle,
     /// Three for each triangle.
@@ -297,7 +300,7 @@ pub fn resolve<'g>(
     kernel: impl Into<Cow<'static, str>>,
 ) -> AddCompute<'g> {
     let format = given.shadow.map.format;
-    if format.bytes() == 4 * format.channels() {
+    if !format.is_integer() && format.bytes() == 4 * format.channels() {
         graph.omit("quantisation", "32 bits hold what is filtered as it is");
     }
     graph.compute("resolve", kernel)
@@ -322,7 +325,6 @@ pub fn gaussian(taps: u32) -> Vec<f32> {
 /// # Errors
 /// See [`light_depth`].
 pub fn blur(graph: &mut Graph, given: &Given, map: Handle) -> Result<Handle> {
-    graph.omit("mips", "the map is read at its own resolution");
     let taps = given.shadow.filter;
     let Some(Shape::Texture(shape)) = graph.value(map).map(|v| v.shape.clone()) else {
         return Ok(map);
@@ -345,6 +347,27 @@ pub fn blur(graph: &mut Graph, given: &Given, map: Handle) -> Result<Handle> {
             .image([shape.size[0], shape.size[1]])?;
     }
     Ok(map)
+}
+
+/// A filtered map with all of its mip levels.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn mips(graph: &mut Graph, map: Handle) -> Result<Handle> {
+    let Some(Shape::Texture(shape)) = graph.value(map).map(|v| v.shape.clone()) else {
+        return Ok(map);
+    };
+    let mut levels = vec![map];
+    let mut finer = map;
+    for level in 1..shape.most_levels() {
+        let [width, height, _] = shape.level_size(level);
+        finer = graph
+            .compute("mips", format!("halve_{}", shape.format.name()))
+            .arg("source", finer)
+            .image([width, height])?;
+        levels.push(finer);
+    }
+    graph.levels("mips", &levels)
 }
 
 /// The summed-area table of each texel's mean moments: `resolve` makes elements of depths, `sum` adds them up
@@ -418,6 +441,14 @@ pub fn shade(
     kernel: &'static str,
     bind: impl FnOnce(AddDraw<'_>) -> AddDraw<'_>,
 ) -> Result<Handle> {
+    let pass = surface(graph, given, "surface").fragment(kernel);
+    let pass = bind(pass.arg("light", given.light));
+    let picture = pass.colour(given.size, given.format, given.background)?;
+    see_through(graph, given, picture)
+}
+
+/// Begins the pass that draws the picture; `vertex` hands on at least `world`, `normal` and `colour`.
+fn surface<'g>(graph: &'g mut Graph, given: &Given, vertex: &'static str) -> AddDraw<'g> {
     if given.shadow.depth_bias == 0.0 {
         graph.omit("depth bias", "it is 0");
     }
@@ -426,15 +457,58 @@ pub fn shade(
         indices: given.indices,
         clip_from_world: given.camera,
     };
-    let pass = graph
-        .draw("shade", surfaces, "surface")
+    graph
+        .draw("shade", surfaces, vertex)
         .arg("position", given.positions)
         .arg("normal", given.normals)
         .arg("colour", given.colours)
         .arg("camera", given.camera)
-        .fragment(kernel)
-        .arg("light", given.light);
-    let picture = bind(pass).colour(given.size, given.format, given.background)?;
+}
+
+/// As [`shade`] for a kernel that interpolates `maps`, each by its parameter's name. If the scene asks for mip
+/// levels, they get them, and the kernel is the one whose name ends in `_mips`.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn shade_filtered(
+    graph: &mut Graph,
+    given: &Given,
+    kernel: &'static str,
+    maps: &[(&'static str, Handle)],
+    bind: impl FnOnce(AddDraw<'_>) -> AddDraw<'_>,
+) -> Result<Handle> {
+    fn with<'g>(pass: AddDraw<'g>, maps: &[(&'static str, Handle)]) -> AddDraw<'g> {
+        let pass = pass.arg("sampler", BILINEAR);
+        maps.iter()
+            .fold(pass, |pass, (name, map)| pass.arg(*name, *map))
+    }
+    if !given.shadow.mips {
+        graph.omit("mips", "the map is read at its own resolution");
+        return shade(graph, given, kernel, |pass| bind(with(pass, maps)));
+    }
+    let mut maps = maps.to_vec();
+    for (_, map) in &mut maps {
+        *map = mips(graph, *map)?;
+    }
+    let [width, height] = given.size.map(|n| n as f32);
+    let raster = Raster {
+        width,
+        height,
+        anisotropy: given.shadow.anisotropy as f32,
+    };
+    let raster = graph.constant("raster", &raster);
+    graph.describe(
+        raster,
+        "Pixels of the picture, and how long what one sees of the shadow map may be.",
+    );
+    let pass = surface(graph, given, "surface_with_plane")
+        .arg("plane", given.planes)
+        .fragment(format!("{kernel}_mips"))
+        .arg("light", given.light)
+        .arg("camera", given.camera)
+        .arg("raster", raster);
+    let pass = bind(with(pass, &maps));
+    let picture = pass.colour(given.size, given.format, given.background)?;
     see_through(graph, given, picture)
 }
 

@@ -15,6 +15,10 @@ fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
         "glass" => "[3.4, 2.6, 4.6]",
         _ => "[7.4, 6.2, 12.4]",
     };
+    let size = match shadow.contains("size = ") {
+        true => "",
+        false => "size = 256",
+    };
     let text = format!(
         r#"
         [geometry]
@@ -26,7 +30,7 @@ fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
         direction = [0.62, -0.62, 0.48]
         {light}
         [shadow]
-        size = 256
+        {size}
         {shadow}
         [output]
         width = 240
@@ -87,6 +91,24 @@ fn every_map_agrees_in_the_yard() {
         "filter = 1",
     ] {
         agree("yard", map);
+    }
+}
+
+/// Levels that samplers interpolate, looked up with a footprint.
+#[test]
+fn mip_levels_agree_in_the_yard() {
+    for map in [
+        "technique = 'hamburger'\nanisotropy = 1",
+        "technique = 'hamburger'\nformat = 'rgba32float'\nanisotropy = 16",
+        "technique = 'hausdorff'\nanisotropy = 4",
+        "technique = 'hamburger-6'\nanisotropy = 4",
+        "technique = 'vsm'\nanisotropy = 4",
+        "technique = 'tmsm'\nanisotropy = 4",
+        "technique = 'esm'\nanisotropy = 4",
+        "technique = 'evsm4'\nanisotropy = 4",
+        "technique = 'evsm2'\nformat = 'rgba16float'\nanisotropy = 4",
+    ] {
+        agree("yard", &format!("size = 500\nmips = true\n{map}"));
     }
 }
 

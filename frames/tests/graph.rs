@@ -368,6 +368,43 @@ fn draws_are_checked_as_well() {
     assert_eq!(g.summary().passes.len(), 2);
 }
 
+#[test]
+fn mip_levels_halve() {
+    let mut g = graph();
+    let format = TexelFormat::Rgba16Unorm;
+    let mut texture = |size: [u32; 2]| {
+        let shape = TextureShape::d2(size[0], size[1], format);
+        g.cleared(format!("{size:?}"), shape)
+    };
+    let [whole, half, quarter, least] = [[5, 3], [2, 1], [1, 1], [1, 1]].map(&mut texture);
+    let numbers = g.buffer("numbers", &[1.0_f32]);
+    refused(
+        g.levels("mips", &[]),
+        &["pass `mips`, level 0", "it is not given"],
+    );
+    refused(
+        g.levels("mips", &[whole, quarter]),
+        &["pass `mips`, level 1", "`[1, 1]`", "2x1 of rgba16unorm"],
+    );
+    refused(
+        g.levels("mips", &[whole, numbers]),
+        &["level 1", "`numbers` is a buffer"],
+    );
+    refused(
+        g.levels("mips", &[whole, half, quarter, least]),
+        &["level 3", "3 are all"],
+    );
+    assert_eq!(g.passes().len(), 4);
+    let all = g.levels("mips", &[whole, half, quarter]).unwrap();
+    assert_eq!(g.levels("again", &[whole, half, quarter]).unwrap(), all);
+    g.keep(all);
+    let text = g.summary().to_string();
+    assert!(
+        text.contains("mips: copies, 5x3, rgba16unorm, 3 levels"),
+        "{text}"
+    );
+}
+
 /// Passes that nothing kept needs are not part of the frame.
 #[test]
 fn only_what_is_needed_is_planned() {

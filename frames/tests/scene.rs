@@ -89,6 +89,8 @@ fn every_field_is_read() {
         moment_bias = 1e-4
         depth_bias = 0.001
         leak_cut = 0.1
+        mips = true
+        anisotropy = 8
         [output]
         width = 320
         height = 200
@@ -134,6 +136,8 @@ fn every_field_is_read() {
             moment_bias: 1e-4,
             depth_bias: 0.001,
             leak_cut: 0.1,
+            mips: true,
+            anisotropy: 8,
         }
     );
     assert_eq!((scene.width, scene.height), (320, 200));
@@ -228,6 +232,14 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             with("[shadow]\nleak_cut = 1.0"),
             &["`shadow.leak_cut` is 1", "0 to 0.9"],
+        ),
+        (
+            with("[shadow]\nmips = true\nanisotropy = 17"),
+            &["`shadow.anisotropy` is 17", "1 to 16"],
+        ),
+        (
+            with("[shadow]\nanisotropy = 4"),
+            &["`shadow.anisotropy` is 4", "`mips = true`"],
         ),
         (
             with("[shadow]\ntechnique = 'magic'"),

@@ -901,6 +901,35 @@ fn a_range_in_a_buffer_is_refused_beside_elements() {
     }
 }
 
+/// Textures become levels of another one, and only such as fit.
+#[test]
+fn textures_are_copied_into_levels() {
+    for device in [&mut NativeDevice::new() as &mut dyn Device, &mut vulkan()] {
+        let format = TexelFormat::R32Float;
+        let whole = TextureShape::d2(5, 3, format).with_levels(3);
+        let whole = device.texture("whole", &whole).unwrap();
+        let mut all = Vec::new();
+        for (level, [width, height]) in (0..).zip([[5, 3], [2, 1], [1, 1]]) {
+            let shape = TextureShape::d2(width, height, format);
+            let texels: Vec<f32> = (0..width * height)
+                .map(|i| (10 * level + i) as f32)
+                .collect();
+            let part = device
+                .texture_from("part", &shape, &bytes(&texels))
+                .unwrap();
+            device.copy_to_level(part, whole, level).unwrap();
+            all.extend(texels);
+            let text = device.copy_to_level(part, whole, 3 - level).unwrap_err();
+            assert!(text.to_string().contains("level"), "{text}");
+        }
+        assert_eq!(f32s(&device.read_texture(whole).unwrap()), all);
+        let other = TextureShape::d2(5, 3, TexelFormat::R32Uint);
+        let other = device.texture("other", &other).unwrap();
+        let text = device.copy_to_level(other, whole, 0).unwrap_err();
+        assert!(text.to_string().contains("r32uint"), "{text}");
+    }
+}
+
 /// A texture is filled with a value as its format holds it, drawn into or not.
 #[test]
 fn textures_and_buffers_are_cleared() {

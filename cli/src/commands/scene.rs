@@ -77,6 +77,8 @@ pub fn with_technique(shadow: Shadow, name: &str) -> Result<Shadow> {
         size: shadow.size,
         filter: shadow.filter,
         fit: shadow.fit,
+        mips: shadow.mips,
+        anisotropy: shadow.anisotropy,
         ..Shadow::of(technique, technique.maps[0])
     })
 }

@@ -101,6 +101,11 @@ enum Pass {
         /// What textures are filled with, if that is not zeros.
         value: Option<wgpu::Color>,
     },
+    /// Textures that are copied into the mip levels of one.
+    Levels {
+        texture: String,
+        levels: Vec<String>,
+    },
     Compute {
         pipeline: wgpu::ComputePipeline,
         groups: Vec<(u32, wgpu::BindGroup)>,
@@ -356,6 +361,17 @@ impl Player {
                         });
                     }
                 }
+                Pass::Levels { texture, levels } => {
+                    let whole = &find(&self.textures, texture)?.texture;
+                    for (mip_level, name) in (0..).zip(levels) {
+                        let level = &find(&self.textures, name)?.texture;
+                        let to = wgpu::TexelCopyTextureInfo {
+                            mip_level,
+                            ..whole.as_image_copy()
+                        };
+                        encoder.copy_texture_to_texture(level.as_image_copy(), to, level.size());
+                    }
+                }
                 Pass::Compute {
                     pipeline,
                     groups,
@@ -594,6 +610,14 @@ impl Make<'_> {
                     buffers,
                     textures,
                     value: pass.get("value").map(colour).transpose()?,
+                })
+            }
+            "levels" => {
+                let levels = list(pass, "levels")?.iter();
+                let name = |it: &Value| it.as_str().unwrap_or_default().to_owned();
+                Ok(Pass::Levels {
+                    texture: text(pass, "texture")?.to_owned(),
+                    levels: levels.map(name).collect(),
                 })
             }
             "compute" => {

@@ -117,6 +117,8 @@ words! {
         "vertex" => wgpu::BufferUsages::VERTEX,
     }
     fn texture_usage() -> wgpu::TextureUsages {
+        "copy-destination" => wgpu::TextureUsages::COPY_DST,
+        "copy-source" => wgpu::TextureUsages::COPY_SRC,
         "render-attachment" => wgpu::TextureUsages::RENDER_ATTACHMENT,
         "storage-binding" => wgpu::TextureUsages::STORAGE_BINDING,
         "texture-binding" => wgpu::TextureUsages::TEXTURE_BINDING,

@@ -517,6 +517,18 @@ impl<'d> Executor<'d> {
                 }
                 Ok(None)
             }
+            Work::Levels(levels) => {
+                for made in &pass.writes {
+                    let whole = place.texture(*made)?;
+                    for (level, from) in (0..).zip(levels) {
+                        let from = place.texture(*from)?;
+                        self.device
+                            .copy_to_level(from, whole, level)
+                            .map_err(during(&pass.label))?;
+                    }
+                }
+                Ok(None)
+            }
             Work::Compute(call) => {
                 let Stage { program, args, .. } = place.stage(call)?;
                 self.device

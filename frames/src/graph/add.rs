@@ -180,6 +180,39 @@ impl Graph {
         }
     }
 
+    /// Adds a pass that copies textures into the mip levels of one, the largest first: each has half as many texels
+    /// along each axis as the one before, rounded down, and one at least. If the same pass is there already, it
+    /// gives what that one makes.
+    ///
+    /// # Errors
+    /// [`GraphError::Levels`]; the graph is then as it was.
+    pub fn levels(
+        &mut self,
+        label: impl Into<Cow<'static, str>>,
+        levels: &[Handle],
+    ) -> Result<Handle> {
+        let label = label.into();
+        let shape = self.check_levels(&label, levels)?;
+        let same = self.passes.iter().find_map(|pass| match &pass.work {
+            Work::Levels(there) if there == levels => pass.writes.first().copied(),
+            _ => None,
+        });
+        if let Some(made) = same
+            && self.is_current(made)
+        {
+            return Ok(made);
+        }
+        let made = self.made(label.clone(), Shape::Texture(shape));
+        self.passes.push(Pass {
+            label,
+            work: Work::Levels(levels.to_vec()),
+            reads: levels.to_vec(),
+            writes: vec![made],
+            note: Some(format!("{} levels", levels.len())),
+        });
+        Ok(made)
+    }
+
     /// Begins a pass that draws triangles.
     pub fn draw(
         &mut self,

@@ -46,6 +46,16 @@ pub enum GraphError {
         /// What does not fit, and what would.
         problem: String,
     },
+    /// Textures that are to be the mip levels of one.
+    #[error("pass `{pass}`, level {level}: {problem}")]
+    Levels {
+        /// The pass.
+        pass: String,
+        /// The level, from 0.
+        level: usize,
+        /// What does not fit, and what would.
+        problem: String,
+    },
     /// A texture that cannot hold what it is filled with.
     #[error("`{value}`: its texels are {format}, which are integers: make it with `cleared`")]
     Fill {
@@ -203,6 +213,63 @@ impl Graph {
             )));
         }
         Ok(value)
+    }
+
+    /// What holds mip levels, if they can be those of one texture.
+    pub(super) fn check_levels(&self, pass: &str, levels: &[Handle]) -> Result<TextureShape> {
+        let mut whole: Option<TextureShape> = None;
+        for (level, handle) in levels.iter().enumerate() {
+            let refuse = |problem: String| GraphError::Levels {
+                pass: pass.into(),
+                level,
+                problem,
+            };
+            let value = self.current(*handle, refuse)?;
+            let Shape::Texture(shape) = value.shape else {
+                return Err(refuse(format!(
+                    "`{}` is a buffer: give textures",
+                    value.label
+                )));
+            };
+            let whole = *whole.get_or_insert(shape);
+            let wanted = TextureShape {
+                size: whole.level_size(level as u32),
+                ..TextureShape::d2(1, 1, whole.format.texel())
+            };
+            if shape != wanted {
+                let [width, height, _] = wanted.size;
+                return Err(refuse(format!(
+                    "`{}` is {:?} texels of {} in {} dimensions, with {} levels, {} layers and {} samples, but \
+                     {width}x{height} of {} are wanted, with one of each",
+                    value.label,
+                    shape.size,
+                    shape.format.name(),
+                    shape.dimensions,
+                    shape.levels,
+                    shape.layers,
+                    shape.samples,
+                    wanted.format.name(),
+                )));
+            }
+        }
+        let Some(whole) = whole else {
+            return Err(GraphError::Levels {
+                pass: pass.into(),
+                level: 0,
+                problem: "it is not given: a texture has one level at least".into(),
+            });
+        };
+        if levels.len() > whole.most_levels() as usize {
+            return Err(GraphError::Levels {
+                pass: pass.into(),
+                level: levels.len() - 1,
+                problem: format!(
+                    "the level before has one texel: {} are all",
+                    whole.most_levels()
+                ),
+            });
+        }
+        Ok(whole.with_levels(levels.len() as u32))
     }
 
     /// The value that was first in the place of another: the same for all that share a place.

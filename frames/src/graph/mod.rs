@@ -214,6 +214,8 @@ pub enum Target {
 pub enum Work {
     /// Fills with one value: a buffer with zeros, a texture with what [`Graph::filled`] was given.
     Clear(Vec4),
+    /// Copies textures into the mip levels of one.
+    Levels(Vec<Handle>),
     /// Runs a compute kernel.
     Compute(Call),
     /// Draws triangles.
@@ -512,7 +514,7 @@ impl Graph {
     /// The kernels that a pass calls, by number.
     pub(crate) fn calls(pass: &Pass) -> impl Iterator<Item = &Call> {
         let (first, second) = match &pass.work {
-            Work::Clear(_) => (None, None),
+            Work::Clear(_) | Work::Levels(_) => (None, None),
             Work::Compute(call) => (Some(call), None),
             Work::Draw {
                 vertex, fragment, ..

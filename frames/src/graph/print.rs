@@ -11,8 +11,11 @@ use super::{Graph, Omission, Pass, Shape, Target, Work};
 pub struct PassSummary {
     /// Its name.
     pub pass: String,
-    /// The kernels that it runs, vertex before fragment; none for one that only clears.
+    /// The kernels that it runs, vertex before fragment; none for one that only clears or copies.
     pub kernels: Vec<String>,
+    /// What it does without a kernel.
+    #[serde(skip)]
+    does: &'static str,
     /// What it writes: sizes, samples and format, or bytes.
     pub writes: Vec<String>,
     /// What else there is to know.
@@ -33,7 +36,7 @@ impl fmt::Display for PassSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.pass)?;
         let kernels = match self.kernels.as_slice() {
-            [] => "zeros".into(),
+            [] => self.does.into(),
             names => names.join(" and "),
         };
         f.write_str(&kernels)?;
@@ -110,6 +113,11 @@ impl Graph {
             kernels: Self::calls(pass)
                 .map(|call| self.kernels[call.kernel].kernel.name.clone())
                 .collect(),
+            does: match pass.work {
+                Work::Clear(_) => "zeros",
+                Work::Levels(_) => "copies",
+                Work::Compute(_) | Work::Draw { .. } => "",
+            },
             writes: written.collect(),
             note: pass.note.clone(),
         }

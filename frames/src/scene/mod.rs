@@ -264,6 +264,12 @@ pub struct Shadow {
     pub depth_bias: f32,
     /// Shadow below this much is light: the rest is stretched. 0 to 0.9.
     pub leak_cut: f32,
+    /// Whether the filtered map has mip levels, from which a pixel takes the mean over all that it sees of the map.
+    /// Techniques without a map that is interpolated have none.
+    pub mips: bool,
+    /// With mip levels, how many times as long as wide what a pixel sees of the map is at most, 1 to
+    /// [`Scene::MAX_ANISOTROPY`]: longer ones are taken for wider ones, and 1 is trilinear lookup.
+    pub anisotropy: u32,
 }
 
 impl Default for Shadow {
@@ -286,6 +292,8 @@ impl Shadow {
             moment_bias: map.moment_bias,
             depth_bias: technique.depth_bias,
             leak_cut: 0.02,
+            mips: false,
+            anisotropy: 1,
         }
     }
 }
@@ -299,6 +307,8 @@ impl Scene {
     pub const MAX_MAP: u32 = 4096;
     /// Most taps of the filter along an axis.
     pub const MAX_FILTER: u32 = 31;
+    /// The most anisotropy of a lookup in mip levels.
+    pub const MAX_ANISOTROPY: u32 = 16;
     /// Most samples of a soft shadow's search and filter, each.
     pub const MAX_SAMPLES: u32 = 1024;
     /// Most steps along a ray through a medium.

@@ -79,6 +79,9 @@ struct ShadowText {
     moment_bias: Option<Spanned<f32>>,
     depth_bias: Option<Spanned<f32>>,
     leak_cut: Option<Spanned<f32>>,
+    #[serde(default)]
+    mips: bool,
+    anisotropy: Option<Spanned<i64>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -382,6 +385,15 @@ impl Reader<'_> {
             }
             None => d.samples,
         };
+        if let Some(anisotropy) = s.anisotropy.as_ref().filter(|_| !s.mips) {
+            return self.refuse(
+                anisotropy.span(),
+                "shadow.anisotropy",
+                anisotropy.get_ref(),
+                "left out, or with `mips = true` beside it",
+            );
+        }
+        let most = Scene::MAX_ANISOTROPY;
         let bias = 0.0..=0.1;
         Ok(Shadow {
             samples,
@@ -396,6 +408,8 @@ impl Reader<'_> {
             )?,
             depth_bias: self.number("shadow.depth_bias", s.depth_bias, d.depth_bias, bias)?,
             leak_cut: self.number("shadow.leak_cut", s.leak_cut, d.leak_cut, 0.0..=0.9)?,
+            mips: s.mips,
+            anisotropy: self.integer("shadow.anisotropy", s.anisotropy, d.anisotropy, 1..=most)?,
             ..d
         })
     }

@@ -5,7 +5,7 @@ use hankel_dsl::native::describe::TexelFormat;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, DEPTHS, Given, blur, light_depth, resolve, shade};
+use crate::passes::{DEPTHS, Given, blur, light_depth, resolve, shade_filtered};
 
 /// The authors' own for 32-bit floats, of which the largest is exp(88): what is left is room for sums.
 const EXPONENT: f32 = 80.0;
@@ -32,9 +32,7 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         .arg("exponent", exponent)
         .image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;
-    shade(graph, given, "shade_esm", |pass| {
+    shade_filtered(graph, given, "shade_esm", &[("map", map)], |pass| {
         pass.arg("exponent", exponent)
-            .arg("map", map)
-            .arg("sampler", BILINEAR)
     })
 }

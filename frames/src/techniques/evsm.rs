@@ -6,7 +6,7 @@ use hankel_shadows::exponential::Exponents;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, Given, blur, light_depth, resolve, shade};
+use crate::passes::{Given, blur, light_depth, resolve, shade_filtered};
 use crate::scene::DepthRange;
 
 /// By `Map::encoding`: what is usual for 32-bit floats, and the most of which 16 bits hold the square.
@@ -67,10 +67,7 @@ fn add(graph: &mut Graph, given: &Given, warps: u32) -> Result<Handle> {
         .arg("exponents", exponents)
         .image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;
-    shade(graph, given, "shade_evsm", |pass| {
-        pass.arg("exponents", exponents)
-            .arg("map", map)
-            .arg("sampler", BILINEAR)
-            .constant("warps", warps)
+    shade_filtered(graph, given, "shade_evsm", &[("map", map)], |pass| {
+        pass.arg("exponents", exponents).constant("warps", warps)
     })
 }

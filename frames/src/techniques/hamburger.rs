@@ -3,7 +3,7 @@
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, Given, POWER_MOMENTS, blur, moment_map, shade};
+use crate::passes::{Given, POWER_MOMENTS, blur, moment_map, shade_filtered};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "hamburger",
@@ -19,9 +19,7 @@ pub const TECHNIQUE: Technique = Technique {
 fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let map = moment_map(graph, given)?;
     let map = blur(graph, given, map)?;
-    shade(graph, given, "shade_hamburger", |pass| {
-        pass.arg("map", map)
-            .arg("sampler", BILINEAR)
-            .constant("encoding", given.shadow.map.encoding)
+    shade_filtered(graph, given, "shade_hamburger", &[("map", map)], |pass| {
+        pass.constant("encoding", given.shadow.map.encoding)
     })
 }

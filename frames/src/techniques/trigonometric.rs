@@ -6,7 +6,7 @@ use hankel_shadows::trigonometric::encoding;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, Given, blur, light_depth, resolve, shade};
+use crate::passes::{Given, blur, light_depth, resolve, shade_filtered};
 use crate::scene::DepthRange;
 
 pub const TECHNIQUE: Technique = Technique {
@@ -53,9 +53,11 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         .arg("depth", depth)
         .image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;
-    shade(graph, given, "shade_trigonometric", |pass| {
-        pass.arg("map", map)
-            .arg("sampler", BILINEAR)
-            .constant("encoding", encoding)
-    })
+    shade_filtered(
+        graph,
+        given,
+        "shade_trigonometric",
+        &[("map", map)],
+        |pass| pass.constant("encoding", encoding),
+    )
 }

@@ -123,6 +123,9 @@ impl<D: Inner> Device for Counting<D> {
     fn clear_texture(&mut self, texture: TextureId, value: Vec4) -> Result<()> {
         self.device.device().clear_texture(texture, value)
     }
+    fn copy_to_level(&mut self, from: TextureId, to: TextureId, level: u32) -> Result<()> {
+        self.device.device().copy_to_level(from, to, level)
+    }
     fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>> {
         self.device.device().read_buffer(buffer)
     }

@@ -303,6 +303,39 @@ fn check_clear(what: &str, shape: &TextureShape, value: Vec4) -> Result<()> {
     Ok(())
 }
 
+/// Refuses to copy a texture into a level of another that it is not like.
+fn check_copy(from: &TextureShape, to: &TextureShape, level: u32) -> Result<()> {
+    let is_plain = |shape: &TextureShape| {
+        shape.samples == 1 && shape.layers == 1 && shape.format != Format::Depth32
+    };
+    let problem = if level >= to.levels {
+        format!("it has {} levels, and none is number {level}", to.levels)
+    } else if !is_plain(from) || !is_plain(to) || from.levels != 1 {
+        "only textures of colours with one sample and one layer are copied, into a level from one that has one"
+            .into()
+    } else if (from.format, from.dimensions) != (to.format, to.dimensions) {
+        format!(
+            "its texels are {} in {} dimensions, those of the copied texture {} in {}",
+            to.format.name(),
+            to.dimensions,
+            from.format.name(),
+            from.dimensions
+        )
+    } else if from.size != to.level_size(level) {
+        format!(
+            "level {level} has {:?} texels, the copied texture {:?}",
+            to.level_size(level),
+            from.size
+        )
+    } else {
+        return Ok(());
+    };
+    Err(DeviceError::Transfer {
+        what: "texture".into(),
+        problem,
+    })
+}
+
 /// The bytes of a texture that holds one value.
 fn filled(shape: &TextureShape, value: Vec4) -> Vec<u8> {
     let format = shape.format.texel();
@@ -566,6 +599,13 @@ pub trait Device {
     /// [`DeviceError::Handle`], [`DeviceError::Lost`], [`DeviceError::Transfer`] for a value other than 0
     /// in a texture of integers.
     fn clear_texture(&mut self, texture: TextureId, value: Vec4) -> Result<()>;
+
+    /// Copies a texture with one level into a level of another one, which has as many texels there and the same
+    /// format.
+    ///
+    /// # Errors
+    /// [`DeviceError::Handle`], [`DeviceError::Lost`], [`DeviceError::Transfer`] for textures that are not alike.
+    fn copy_to_level(&mut self, from: TextureId, to: TextureId, level: u32) -> Result<()>;
 
     /// Waits, and reads a buffer.
     ///

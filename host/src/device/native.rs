@@ -316,6 +316,26 @@ impl Device for NativeDevice {
         Ok(())
     }
 
+    fn copy_to_level(&mut self, from: TextureId, to: TextureId, level: u32) -> Result<()> {
+        let (source, target) = (self.texture_at(from)?, self.texture_at(to)?);
+        let (Some(one), Some(other)) = (&self.textures[source], &self.textures[target]) else {
+            return Ok(());
+        };
+        super::check_copy(&one.shape, &other.shape, level)?;
+        // A texture is no level of itself unless it is the only one.
+        if source == target {
+            return Ok(());
+        }
+        let copied = self.textures[source].take();
+        if let (Some(from), Some(to)) = (&copied, &mut self.textures[target]) {
+            let start = to.shape.bytes_before(level);
+            let bytes = from.memory.get();
+            to.memory.get_mut()[start..start + bytes.len()].copy_from_slice(bytes);
+        }
+        self.textures[source] = copied;
+        Ok(())
+    }
+
     fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>> {
         let index = self.buffer_at(buffer)?;
         Ok(self.buffers[index]

@@ -59,8 +59,8 @@ pub use moments::{Moments4, Moments6};
 pub use quantization::{
     Fixed4, Fixed6, FixedPoint, Packed6, Quantized4, Quantized6, Rectangle4, Rectangle6, Region,
     Span, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6,
-    from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, quantize_unit_6,
-    to_unorm,
+    from_unorm, pack_10, pack_16, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
+    quantize_unit_6, to_unorm, unpack_10, unpack_16,
 };
 pub use scattering::{
     RectifiedBounds, henyey_greenstein, inclination, rectified_bounds, rectified_depth,

@@ -6,13 +6,13 @@ mod validity;
 
 use common::{Distribution, distribution};
 use hankel_dsl::Real;
-use hankel_dsl::glam::Vec4;
+use hankel_dsl::glam::{Vec2, Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::{
     Fixed4, Fixed6, FixedPoint, Moments4, Moments6, Packed6, Quantized4, Quantized6, Rectangle4,
     Rectangle6, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4,
-    dequantize_unit_6, from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
-    quantize_unit_6, to_unorm,
+    dequantize_unit_6, from_unorm, pack_10, pack_16, quantize_symmetric_4, quantize_symmetric_6,
+    quantize_unit_4, quantize_unit_6, to_unorm, unpack_10, unpack_16,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng};
@@ -533,6 +533,19 @@ proptest! {
     fn packing_is_storing_in_10_bits(x in prop::array::uniform6(-0.5..1.5_f32)) {
         let q = channels_6(&x);
         prop_assert_eq!(Packed6::pack(q).unpack(), q.stored::<10>());
+        let words = [Vec3::new(q.r0, q.g0, q.b0), Vec3::new(q.r1, q.g1, q.b1)].map(pack_10);
+        prop_assert_eq!(words, [Packed6::pack(q).first, Packed6::pack(q).second]);
+        let stored = q.stored::<10>();
+        prop_assert_eq!(unpack_10(words[1]), Vec3::new(stored.r1, stored.g1, stored.b1));
+    }
+
+    /// Two channels of 16 bits in a word: what a texture of such channels keeps.
+    #[test]
+    fn packing_is_storing_in_16_bits(x in -0.5..1.5_f32, y in -0.5..1.5_f32) {
+        let stored = |x: f32| from_unorm::<f32, 16>(to_unorm::<f32, 16>(x));
+        let word = pack_16(Vec2::new(x, y));
+        prop_assert_eq!(unpack_16(word), Vec2::new(stored(x), stored(y)));
+        prop_assert_eq!(pack_16(unpack_16(word)), word);
     }
 }
 

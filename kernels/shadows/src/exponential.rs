@@ -118,9 +118,14 @@ pub fn shade_esm(
     #[sampler] sampler: Sampler,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
-        let mean = map.sample_level(sampler, uv, 0.0).x;
-        markov_1(mean, exponential(*exponent, z))
+        exponential_shadow(*exponent, map.sample_level(sampler, uv, 0.0), z)
     })
+}
+
+/// The least shadow that the mean of exponentials allows for a receiver's depth from 0 to 1.
+#[inline(always)]
+pub(crate) fn exponential_shadow(exponent: f32, texel: Vec4, z: f32) -> f32 {
+    markov_1(texel.x, exponential(exponent, z))
 }
 
 /// Shading with exponential variance shadow mapping, by the warp that grows with depth or by both: the
@@ -152,14 +157,26 @@ pub fn shade_evsm(
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
         let texel = map.sample_level(sampler, uv, 0.0);
-        let (positive, negative) = exponents.warp(z);
-        let (nearer, _) = warped_2(texel.x, texel.y, positive, light.moment_bias);
-        if warps == 1 {
-            nearer
-        } else {
-            // What falls with depth is larger where depth is less.
-            let (_, also_nearer) = warped_2(texel.z, texel.w, negative, light.moment_bias);
-            Real::max(nearer, also_nearer)
-        }
+        warped_shadow(light, exponents, texel, z, warps)
     })
+}
+
+/// The least shadow that a texel's warps allow for a receiver's depth from 0 to 1.
+#[inline(always)]
+pub(crate) fn warped_shadow(
+    light: &Light,
+    exponents: &Exponents,
+    texel: Vec4,
+    z: f32,
+    warps: u32,
+) -> f32 {
+    let (positive, negative) = exponents.warp(z);
+    let (nearer, _) = warped_2(texel.x, texel.y, positive, light.moment_bias);
+    if warps == 1 {
+        nearer
+    } else {
+        // What falls with depth is larger where depth is less.
+        let (_, also_nearer) = warped_2(texel.z, texel.w, negative, light.moment_bias);
+        Real::max(nearer, also_nearer)
+    }
 }

@@ -200,6 +200,32 @@ pub(crate) fn biased(light: &Light, m: Moments4<f32>) -> Moments4<f32> {
     m.lerp(target, light.moment_bias)
 }
 
+/// The least shadow that a texel's four moments allow for a receiver's depth from 0 to 1, with depths
+/// anywhere on the line.
+#[inline(always)]
+pub(crate) fn hamburger_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> f32 {
+    hamburger_4(biased(light, decode(texel, how)), in_range(z, how))
+}
+
+/// The same with depths within the map's range.
+#[inline(always)]
+pub(crate) fn hausdorff_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> f32 {
+    let m = biased(light, decode(texel, how));
+    let z = in_range(z, how);
+    if how == encoding::UNIT {
+        hausdorff_4(m, z)
+    } else {
+        hausdorff_4_symmetric(m, z)
+    }
+}
+
+/// The same by mean and variance.
+#[inline(always)]
+pub(crate) fn variance_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> f32 {
+    let m = decode(texel, how);
+    variance_2(m.b1, m.b2, in_range(z, how), light.moment_bias)
+}
+
 /// Shading with Hamburger four moment shadow mapping.
 #[kernel(
     fragment,
@@ -226,8 +252,7 @@ pub fn shade_hamburger(
     encoding: u32,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
-        let m = look_up(map, sampler, encoding, uv);
-        hamburger_4(biased(light, m), in_range(z, encoding))
+        hamburger_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
     })
 }
 
@@ -257,13 +282,7 @@ pub fn shade_hausdorff(
     encoding: u32,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
-        let m = biased(light, look_up(map, sampler, encoding, uv));
-        let z = in_range(z, encoding);
-        if encoding == encoding::UNIT {
-            hausdorff_4(m, z)
-        } else {
-            hausdorff_4_symmetric(m, z)
-        }
+        hausdorff_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
     })
 }
 
@@ -294,8 +313,7 @@ pub fn shade_variance(
     encoding: u32,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
-        let m = look_up(map, sampler, encoding, uv);
-        variance_2(m.b1, m.b2, in_range(z, encoding), light.moment_bias)
+        variance_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
     })
 }
 

@@ -197,27 +197,40 @@ pub fn shade_hamburger_6(
     shade_with(light, world, normal, colour, |uv, z| {
         let odd = first.sample_level(sampler, uv, 0.0);
         let even = second.sample_level(sampler, uv, 0.0);
-        let m = if encoding == encoding::SYMMETRIC {
-            dequantize_symmetric_6(Quantized6 {
-                r0: odd.x,
-                g0: odd.y,
-                b0: odd.z,
-                r1: even.x,
-                g1: even.y,
-                b1: even.z,
-            })
-        } else {
-            Moments6 {
-                b1: odd.x,
-                b2: even.x,
-                b3: odd.y,
-                b4: even.y,
-                b5: odd.z,
-                b6: even.z,
-            }
-        };
-        hamburger_6(m.lerp(*target, light.moment_bias), 2.0 * z - 1.0).lower
+        hamburger_6_shadow(light, target, odd, even, z, encoding)
     })
+}
+
+/// The least shadow that six moments allow for a receiver's depth from 0 to 1, of a texel of each texture.
+#[inline(always)]
+pub(crate) fn hamburger_6_shadow(
+    light: &Light,
+    target: &Moments6<f32>,
+    odd: Vec4,
+    even: Vec4,
+    z: f32,
+    how: u32,
+) -> f32 {
+    let m = if how == encoding::SYMMETRIC {
+        dequantize_symmetric_6(Quantized6 {
+            r0: odd.x,
+            g0: odd.y,
+            b0: odd.z,
+            r1: even.x,
+            g1: even.y,
+            b1: even.z,
+        })
+    } else {
+        Moments6 {
+            b1: odd.x,
+            b2: even.x,
+            b3: odd.y,
+            b4: even.y,
+            b5: odd.z,
+            b6: even.z,
+        }
+    };
+    hamburger_6(m.lerp(*target, light.moment_bias), 2.0 * z - 1.0).lower
 }
 
 /// A depth's quantised moments.

@@ -160,20 +160,25 @@ pub fn shade_trigonometric(
     encoding: u32,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
-        let texel = map.sample_level(sampler, uv, 0.0);
-        let held = |x: f32| {
-            if encoding == encoding::UNORM {
-                2.0 * x - 1.0
-            } else {
-                x
-            }
-        };
-        let m = TrigonometricMoments {
-            c1: held(texel.x),
-            s1: held(texel.y),
-            c2: held(texel.z),
-            s2: held(texel.w),
-        };
-        trigonometric_4(m.biased(light.moment_bias), HalfAngle::of_depth(z)).lower
+        trigonometric_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
     })
+}
+
+/// The least shadow that a texel's moments allow for a receiver's depth from 0 to 1.
+#[inline(always)]
+pub(crate) fn trigonometric_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> f32 {
+    let held = |x: f32| {
+        if how == encoding::UNORM {
+            2.0 * x - 1.0
+        } else {
+            x
+        }
+    };
+    let m = TrigonometricMoments {
+        c1: held(texel.x),
+        s1: held(texel.y),
+        c2: held(texel.z),
+        s2: held(texel.w),
+    };
+    trigonometric_4(m.biased(light.moment_bias), HalfAngle::of_depth(z)).lower
 }

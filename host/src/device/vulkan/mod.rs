@@ -385,6 +385,16 @@ impl Device for VulkanDevice {
         self.write_texture(texture, &filled)
     }
 
+    fn copy_to_level(&mut self, from: TextureId, to: TextureId, level: u32) -> Result<()> {
+        let (source, target) = (self.image(from)?, self.image(to)?);
+        super::check_copy(&source.shape, &target.shape, level)?;
+        // A texture is no level of itself unless it is the only one.
+        if from == to {
+            return Ok(());
+        }
+        self.copy_texels(source, target, level)
+    }
+
     fn read_buffer(&mut self, buffer: BufferId) -> Result<Vec<u8>> {
         let memory = self.memory(buffer)?;
         let mut bytes = self.download(&memory.buffer, memory.physical(), &memory.what())?;

@@ -321,6 +321,20 @@ impl VulkanDevice {
         })
     }
 
+    /// Copies a texture with one level into a level of another one.
+    pub(super) fn copy_texels(&self, from: &Texture, to: &Texture, level: u32) -> Result<()> {
+        let during = || format!("copying {} to level {level} of {}", from.what(), to.what());
+        self.guarded(&during, |device| {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            encoder.copy_texture_to_texture(
+                from.texture.as_image_copy(),
+                level_of(&to.texture, level),
+                extent(&from.shape, 0),
+            );
+            self.queue.submit([encoder.finish()]);
+        })
+    }
+
     /// Fills a texture that can be drawn into, by passes that draw nothing.
     pub(super) fn fill(&self, texture: &Texture, value: Vec4) -> Result<()> {
         let shape = &texture.shape;

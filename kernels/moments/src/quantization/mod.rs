@@ -9,7 +9,8 @@
 //! | --- | --- | --- |
 //! | four | 4 x 16 bits, normalised | [`Quantized4`], a texture `rgba16unorm` |
 //! | four | 4 x 32-bit floats | the moments themselves, no transform |
-//! | six | 2 x R10G10B10A2, normalised | [`Quantized6`], [`Packed6`] |
+//! | six | 2 x R10G10B10A2, normalised | [`Quantized6`], [`Packed6`], [`pack_10`] |
+//! | six | 3 x 2 x 16 bits, normalised | [`Quantized6`], [`pack_16`] |
 //! | either | 32-bit integers of a summed-area table | [`FixedPoint`], [`Fixed4`], [`Fixed6`], [`Region`] |
 //!
 //! All maps are affine, so filtering commutes with them. They take moments in [-1, 1] and channels
@@ -27,7 +28,7 @@ pub use fixed_point::{Fixed4, Fixed6, FixedPoint, Rectangle4, Rectangle6};
 pub use four::{
     Quantized4, dequantize_symmetric_4, dequantize_unit_4, quantize_symmetric_4, quantize_unit_4,
 };
-pub use packed::Packed6;
+pub use packed::{Packed6, pack_10, pack_16, unpack_10, unpack_16};
 pub use six::{
     Quantized6, dequantize_symmetric_6, dequantize_unit_6, quantize_symmetric_6, quantize_unit_6,
 };

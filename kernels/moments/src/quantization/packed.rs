@@ -1,5 +1,6 @@
-//! Six moments in 64 bits.
+//! Six moments in 64 or 96 bits.
 
+use hankel_dsl::glam::{Vec2, Vec3};
 use hankel_dsl::{Element, to_i32};
 
 use super::six::Quantized6;
@@ -52,4 +53,36 @@ fn word(r: f32, g: f32, b: f32) -> u32 {
 #[inline(always)]
 fn channel(word: u32) -> f32 {
     from_unorm::<f32, 10>((word & 0x3ff) as f32)
+}
+
+/// Three channels in a word, 10 bits each, the first one lowest, as [`Packed6`] has them; each rounded as
+/// [`to_unorm`] has it.
+#[inline(always)]
+#[must_use]
+pub fn pack_10(channels: Vec3) -> u32 {
+    word(channels.x, channels.y, channels.z)
+}
+
+/// The channels of [`pack_10`], in [0, 1].
+#[inline(always)]
+#[must_use]
+pub fn unpack_10(word: u32) -> Vec3 {
+    Vec3::new(channel(word), channel(word >> 10), channel(word >> 20))
+}
+
+/// Two channels in a word, 16 bits each, the first one lowest, as `rg16unorm` in WebGPU has them; each
+/// rounded as [`to_unorm`] has it. Six moments take three such words.
+#[inline(always)]
+#[must_use]
+pub fn pack_16(channels: Vec2) -> u32 {
+    let bits = |x: f32| to_i32(to_unorm::<f32, 16>(x)) as u32;
+    bits(channels.x) | bits(channels.y) << 16
+}
+
+/// The channels of [`pack_16`], in [0, 1].
+#[inline(always)]
+#[must_use]
+pub fn unpack_16(word: u32) -> Vec2 {
+    let channel = |bits: u32| from_unorm::<f32, 16>(bits as f32);
+    Vec2::new(channel(word & 0xffff), channel(word >> 16))
 }

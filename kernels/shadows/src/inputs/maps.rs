@@ -4,16 +4,16 @@
 
 use std::vec::Vec;
 
-use hankel_dsl::glam::{IVec2, Vec3, Vec4};
+use hankel_dsl::glam::{IVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
-use hankel_dsl::native::inputs::{Given, Request, Source};
+use hankel_dsl::native::inputs::{Given, Request, Source, Value};
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_moments::bias::{
-    Bias, CLAMPED_4_16, SYMMETRIC_4_16, SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32,
+    Bias, CLAMPED_4_16, MEASURED, SYMMETRIC_4_16, SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32,
     TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32,
 };
 use hankel_moments::{
-    Moments4, Moments6, TrigonometricMoments, from_unorm, quantize_symmetric_4,
+    Moments4, Moments6, TrigonometricMoments, from_unorm, pack_10, pack_16, quantize_symmetric_4,
     quantize_symmetric_6, quantize_unit_4, to_unorm,
 };
 
@@ -27,7 +27,7 @@ pub(super) const SIZE: [u32; 2] = [61, 37];
 /// Samples of a texel.
 pub(super) const SAMPLES: usize = 4;
 /// Fragments of a run.
-const FRAGMENTS: usize = 1009;
+pub(super) const FRAGMENTS: usize = 1009;
 
 /// The boxes' ends along u and v, and their depths.
 const BOXES: [[f64; 5]; 4] = [
@@ -70,7 +70,7 @@ pub(super) fn samples() -> Vec<f64> {
 }
 
 /// How a map holds moments, and the bias that is published for it.
-fn published(how: u32) -> Bias {
+pub(super) fn published(how: u32) -> Bias {
     match how {
         encoding::UNIT => CLAMPED_4_16,
         encoding::SYMMETRIC => SYMMETRIC_4_16,
@@ -79,7 +79,7 @@ fn published(how: u32) -> Bias {
 }
 
 /// The mean of what `of` gives for the depths of each texel, filtered over 3 x 3 texels.
-fn filtered<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[f64; N]> {
+pub(super) fn filtered<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[f64; N]> {
     let all = samples();
     let [width, height] = SIZE.map(|n| n as i32);
     let plus = |sum: &mut [f64; N], w: f64, with: [f64; N]| {
@@ -111,6 +111,22 @@ fn filtered<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[f64; N]> {
     map
 }
 
+/// A depth's four channels in a map that is stored as `how` says, before they are rounded.
+pub(super) fn channels(how: u32, z: f64) -> [f64; 4] {
+    let z = if how == encoding::UNIT {
+        z
+    } else {
+        2.0 * z - 1.0
+    };
+    let m = Moments4::of_depth(z);
+    let q = match how {
+        encoding::UNIT => quantize_unit_4(m),
+        encoding::SYMMETRIC => quantize_symmetric_4(m),
+        _ => return [m.b1, m.b2, m.b3, m.b4],
+    };
+    [q.r, q.g, q.b, q.a]
+}
+
 /// The texels of a map of four moments, stored as `how` says.
 pub(super) fn texels(how: u32) -> Vec<Vec4> {
     let map = filtered(|z| {
@@ -128,7 +144,7 @@ pub(super) fn texels(how: u32) -> Vec<Vec4> {
 }
 
 /// What is left of numbers in 16 bits from 0 to 1.
-fn unorm(channels: [f64; 4]) -> Vec4 {
+pub(super) fn unorm(channels: [f64; 4]) -> Vec4 {
     let channel = |x: f64| from_unorm::<f64, 16>(to_unorm::<f64, 16>(x)) as f32;
     Vec4::from_array(channels.map(channel))
 }
@@ -302,15 +318,108 @@ pub fn shaded_trigonometric(request: &Request) -> Vec<Given> {
 }
 
 /// The warps of a depth for exponential variance shadow maps, and their squares.
-fn warps(exponents: &Exponents, z: f64) -> [f64; 4] {
+pub(super) fn warps(exponents: &Exponents, z: f64) -> [f64; 4] {
     let z = 2.0 * z - 1.0;
     let positive = f64::exp(f64::from(exponents.positive) * z);
     let negative = f64::exp(-f64::from(exponents.negative) * z);
     [positive, positive * positive, negative, negative * negative]
 }
 
+/// Six quantised moments in words: two of 10 bits a channel, or three of 16.
+fn words(of: impl Fn([Vec3; 2]) -> Vec<u32>) -> Vec<Vec<u32>> {
+    let map = filtered(|z| {
+        let q = quantize_symmetric_6(Moments6::of_depth(2.0 * z - 1.0));
+        [q.r0, q.g0, q.b0, q.r1, q.g1, q.b1]
+    });
+    let texels = map.iter().map(|m| {
+        let [a, b, c, d, e, f] = m.map(|x| x as f32);
+        of([Vec3::new(a, b, c), Vec3::new(d, e, f)])
+    });
+    texels.collect()
+}
+
+fn words_10() -> Vec<Vec<u32>> {
+    words(|[first, second]| [pack_10(first), pack_10(second)].into())
+}
+
+fn words_16() -> Vec<Vec<u32>> {
+    words(|[first, second]| {
+        let pairs = [
+            Vec2::new(first.x, first.y),
+            Vec2::new(first.z, second.x),
+            Vec2::new(second.y, second.z),
+        ];
+        pairs.map(pack_16).into()
+    })
+}
+
+/// Textures of words, each of some of a texel's.
+fn with_words(mut given: Given, textures: &[(&str, TexelFormat)], texels: &[Vec<u32>]) -> Given {
+    let mut first = 0;
+    for (name, format) in textures {
+        let words = texels
+            .iter()
+            .flat_map(|texel| &texel[first..first + format.channels()]);
+        let value = Value::Texture {
+            size: [SIZE[0], SIZE[1], 1],
+            levels: 1,
+            layers: 1,
+            samples: 1,
+            format: *format,
+            bytes: words.flat_map(|word| word.to_le_bytes()).collect(),
+        };
+        given.args.push(((*name).into(), value));
+        first += format.channels();
+    }
+    given
+}
+
+const IN_10: [(&str, TexelFormat); 1] = [("map", TexelFormat::Rg32Uint)];
+const IN_16: [(&str, TexelFormat); 3] = [
+    ("low", TexelFormat::R32Uint),
+    ("middle", TexelFormat::R32Uint),
+    ("high", TexelFormat::R32Uint),
+];
+
+/// What shading with six moments in 10 bits each reads.
+#[must_use]
+pub fn shaded_10(request: &Request) -> Vec<Given> {
+    // The bias that is measured for six moments of depths in [-1, 1] in 10 bits.
+    let bias = MEASURED[11].bias;
+    let given = with_bias(request, &bias, &[]).into_iter();
+    given
+        .map(|given| with_words(given.uniform("target", &bias.six()), &IN_10, &words_10()))
+        .collect()
+}
+
+/// What shading with six moments in 16 bits each reads.
+#[must_use]
+pub fn shaded_16(request: &Request) -> Vec<Given> {
+    let bias = SYMMETRIC_6_16;
+    let given = with_bias(request, &bias, &[]).into_iter();
+    given
+        .map(|given| with_words(given.uniform("target", &bias.six()), &IN_16, &words_16()))
+        .collect()
+}
+
+/// Six moments in 10 bits each, and the weights of a filter.
+#[must_use]
+pub fn blurred_10(_: &Request) -> Vec<Given> {
+    filters("a map of words", |given| {
+        with_words(given, &IN_10, &words_10())
+    })
+}
+
+/// Six moments in 16 bits each, and the weights of a filter.
+#[must_use]
+pub fn blurred_16(_: &Request) -> Vec<Given> {
+    filters("maps of words", |given| {
+        with_words(given, &IN_16, &words_16())
+    })
+}
+
 /// Exponents for maps of 32 and of 16 bits, and the relative variances that go with them.
-const EXPONENTS: [(&str, Exponents, f32); 2] = [
+pub(super) const EXPONENTS: [(&str, Exponents, f32); 2] = [
     (
         "exponents for 32 bits",
         Exponents {
@@ -457,6 +566,11 @@ pub fn blurred_warps(_: &Request) -> Vec<Given> {
 
 /// A map, filtered along each axis.
 pub(super) fn with_filter(what: &str, map: &[Vec4]) -> Vec<Given> {
+    filters(what, |given| with_map(given, "source", map))
+}
+
+/// Filters along each axis, of what `with` adds.
+fn filters(what: &str, with: impl Fn(Given) -> Given) -> Vec<Given> {
     [(IVec2::X, 0.75_f64), (IVec2::Y, 1.5)]
         .into_iter()
         .map(|(step, sigma)| {
@@ -468,7 +582,7 @@ pub(super) fn with_filter(what: &str, map: &[Vec4]) -> Vec<Given> {
             let given = Given::new(what)
                 .uniform("direction", &Direction { step })
                 .buffer("weights", &weights);
-            with_map(given, "source", map)
+            with(given)
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 //! Only for the host: parity runs them.
 
 pub mod maps;
+pub mod mips;
 pub mod scattering;
 pub mod soft;
 pub mod tiles;

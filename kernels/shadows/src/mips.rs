@@ -1,0 +1,593 @@
+//! Mip levels of filtered maps, and lookup in them with the footprint of a pixel: trilinear, or anisotropic
+//! with several places along its longer axis.
+//!
+//! What maps hold is the mean of something over depths, so the mean of texels is what the map of a coarser
+//! level holds: whatever a technique makes of a texel it makes of a texel of any level.
+//!
+//! Footprints come from the camera and the plane of the surface, not from differences between neighbouring
+//! pixels: they are the same on every device, and where a triangle ends, too. Places are sampled one by one,
+//! because which ones a sampler takes for an anisotropic lookup is up to the device.
+
+#![allow(
+    clippy::too_many_arguments,
+    reason = "a kernel's parameters are its bindings"
+)]
+
+use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel, math};
+use hankel_moments::Moments6;
+
+use crate::depth::{Transform, row_times_point};
+use crate::exponential::{Exponents, exponential_shadow, warped_shadow};
+use crate::grid::within;
+use crate::shade::{
+    Light, encoding, hamburger_shadow, hausdorff_shadow, shade_with, variance_shadow,
+};
+use crate::six::hamburger_6_shadow;
+use crate::trigonometric::{self, trigonometric_shadow};
+
+/// The sum of the texels that a texel of the next level covers, each by the share of it that is covered: 2 x 2
+/// of even sizes; of odd sizes 3 along an axis, of which the outer ones are shared with the neighbours.
+#[inline(always)]
+fn halved(at: UVec2, source: Texture2d<'_>) -> Vec4 {
+    let size = source.size();
+    let (columns, rows) = (2 + (size.x & 1), 2 + (size.y & 1));
+    let mut sum = Vec4::ZERO;
+    let mut y = 0;
+    while y < rows {
+        let mut row = Vec4::ZERO;
+        let mut x = 0;
+        while x < columns {
+            let texel = source.load(UVec2::new(
+                within((2 * at.x + x) as i32, size.x),
+                within((2 * at.y + y) as i32, size.y),
+            ));
+            row += texel * share(at.x, x, size.x);
+            x += 1;
+        }
+        sum += row * share(at.y, y, size.y);
+        y += 1;
+    }
+    sum
+}
+
+/// How much of texel `at` of the next level texel `2 at + tap` of `size` is.
+#[inline(always)]
+fn share(at: u32, tap: u32, size: u32) -> f32 {
+    let half = (size / 2) as f32;
+    // In parts of a texel of which `size` make one of the next level.
+    let parts = if tap == 0 {
+        half - at as f32
+    } else if tap == 1 {
+        half
+    } else {
+        at as f32 + 1.0
+    };
+    if size & 1 == 0 {
+        0.5
+    } else {
+        parts / size as f32
+    }
+}
+
+/// The next mip level: half of the texels along each axis, rounded down.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16unorm, rgba32float),
+    inputs = crate::inputs::mips::halved,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        exact(rgba32float),
+        non_finite,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn halve(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec4 {
+    halved(at, source)
+}
+
+/// The same of four 16-bit floats.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16float),
+    inputs = crate::inputs::mips::halved,
+    parity(
+        ulp = 1,
+        non_finite,
+        why = "sums and products only, then rounding to 16 bits, up or down: one step; absurd numbers overflow"
+    )
+)]
+pub fn halve_rgba16float(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec4 {
+    halved(at, source)
+}
+
+/// The same of one 32-bit float.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(r32float),
+    inputs = crate::inputs::mips::halved,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+)]
+pub fn halve_r32float(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> f32 {
+    halved(at, source).x
+}
+
+/// The picture that footprints are those of a pixel of, and how maps are looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Raster {
+    /// Pixels of a row.
+    #[range(16.0..=4096.0)]
+    pub width: f32,
+    /// Rows.
+    #[range(16.0..=4096.0)]
+    pub height: f32,
+    /// How many times as long as wide a footprint is at most, from 1 (trilinear lookup) to 16. Longer ones are
+    /// taken for wider ones.
+    #[range(1.0..=16.0)]
+    pub anisotropy: f32,
+}
+
+/// A vertex as the camera sees it, with its own normal beside the one that it is lit by: the plane that
+/// footprints are on.
+#[kernel(
+    vertex,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+)]
+pub fn surface_with_plane(
+    #[attribute] position: Vec3,
+    #[attribute]
+    #[unit_vector]
+    normal: Vec3,
+    #[attribute]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[attribute]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] camera: &Transform,
+) -> (Vec4, Vec3, Vec3, Vec3, Vec3) {
+    (camera.apply(position), position, normal, colour, plane)
+}
+
+/// What a pixel sees of a map: an ellipse, as places along its longer axis.
+#[derive(Clone, Copy)]
+struct Footprint {
+    /// Its longer axis over its shorter one, 1 or more.
+    length: f32,
+    /// From a place to the next, in coordinates of the map.
+    step: Vec2,
+    /// The level whose texels are as wide as it is.
+    level: f32,
+}
+
+#[inline(always)]
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    Vec3::new(
+        a.y * b.z - a.z * b.y,
+        a.z * b.x - a.x * b.z,
+        a.x * b.y - a.y * b.x,
+    )
+}
+
+/// `row` times a vector.
+#[inline(always)]
+fn along(row: Vec4, v: Vec3) -> f32 {
+    row.x * v.x + row.y * v.y + row.z * v.z
+}
+
+impl Footprint {
+    /// Of the pixel that sees the point `world` of a surface with the normal `plane`, whatever its length and
+    /// sign, in a map of `size` texels.
+    ///
+    /// On the surface, a step that moves the picture's x by one pixel and leaves y as it is has three
+    /// projections that are known: on the normal, and on the gradients of both coordinates. The ellipse's axes
+    /// are the singular values of both steps in the map.
+    #[inline(always)]
+    fn of(
+        light: &Light,
+        camera: &Transform,
+        raster: &Raster,
+        world: Vec3,
+        plane: Vec3,
+        size: UVec2,
+    ) -> Self {
+        // What lies beside the camera is not seen; the floor keeps its quotients finite.
+        let w = Real::max(row_times_point(camera.row_w, world), 1e-6);
+        // In clip space, times w.
+        let gradient = |row: Vec4| {
+            let at = row_times_point(row, world) / w;
+            Vec3::new(
+                row.x - at * camera.row_w.x,
+                row.y - at * camera.row_w.y,
+                row.z - at * camera.row_w.z,
+            )
+        };
+        let (right, up) = (gradient(camera.row_x), gradient(camera.row_y));
+        let (across, down) = (cross(up, plane), cross(plane, right));
+        // Seen edge-on, a pixel sees all of a plane: the clamps below have a map's.
+        let volume = across.x * right.x + across.y * right.y + across.z * right.z;
+        let scale = 2.0 * w / Real::max(Real::abs(volume), 1e-12);
+        let (scale_x, scale_y) = (scale / raster.width, scale / raster.height);
+        let (columns, rows) = (size.x as f32, size.y as f32);
+        let texels = |t: f32| Real::clamp(t, -1e6, 1e6);
+        let (xu, xv) = (
+            texels(along(light.row_u, across) * scale_x * columns),
+            texels(along(light.row_v, across) * scale_x * rows),
+        );
+        let (yu, yv) = (
+            texels(along(light.row_u, down) * scale_y * columns),
+            texels(along(light.row_v, down) * scale_y * rows),
+        );
+        // The squares of the axes are the eigenvalues of [[uu, uv], [uv, vv]].
+        let (uu, uv, vv) = (xu * xu + yu * yu, xu * xv + yu * yv, xv * xv + yv * yv);
+        let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
+        let root = Real::sqrt(half * half + uv * uv);
+        let long = Real::sqrt(mean + root);
+        let short = Real::abs(xu * yv - xv * yu) / Real::max(long, 1e-6);
+        let anisotropy = Real::clamp(raster.anisotropy, 1.0, 16.0);
+        let width = Real::max(Real::max(short, long / anisotropy), 1.0);
+        let length = Real::max(long / width, 1.0);
+        // The longer axis; of a circle none.
+        let (u, v) = if half > 0.0 {
+            (root + half, uv)
+        } else {
+            (uv, root - half)
+        };
+        let step = long / (length * Real::max(Real::sqrt(u * u + v * v), 1e-12));
+        Self {
+            length,
+            step: Vec2::new(u * step / columns, v * step / rows),
+            level: math::log2(width),
+        }
+    }
+
+    /// The mean over the footprint of what `sample` gives for a place and a level. Places have distances as
+    /// large as the footprint is wide; those that stick out count in part, so that nothing jumps where there is
+    /// one more.
+    #[inline(always)]
+    fn mean(self, uv: Vec2, sample: impl Fn(Vec2, f32) -> Vec4) -> Vec4 {
+        let reach = 0.5 * (self.length + 1.0);
+        let mut sum = sample(uv, self.level);
+        let mut i = 1;
+        while (i as f32) < reach {
+            let away = self.step * i as f32;
+            let weight = Real::min(reach - i as f32, 1.0);
+            sum += (sample(uv + away, self.level) + sample(uv - away, self.level)) * weight;
+            i += 1;
+        }
+        sum / self.length
+    }
+}
+
+/// What all pixels share.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    light: &'a Light,
+    camera: &'a Transform,
+    raster: &'a Raster,
+    size: UVec2,
+}
+
+impl View<'_> {
+    /// Lambert's law with what `shadow` gives for a pixel's footprint, its coordinates in the map and its depth.
+    #[inline(always)]
+    fn light_up(
+        self,
+        world: Vec3,
+        normal: Vec3,
+        colour: Vec3,
+        plane: Vec3,
+        shadow: impl FnOnce(Footprint, Vec2, f32) -> f32,
+    ) -> Vec4 {
+        shade_with(self.light, world, normal, colour, |uv, z| {
+            let View {
+                light,
+                camera,
+                raster,
+                size,
+            } = self;
+            let footprint = Footprint::of(light, camera, raster, world, plane, size);
+            shadow(footprint, uv, z)
+        })
+    }
+}
+
+/// Shading with Hamburger four moment shadow mapping, with mip levels.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::mips::shaded,
+    parity(
+        ulp = 0,
+        absolute = 5e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
+    )
+)]
+pub fn shade_hamburger_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+    encoding: u32,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: map.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
+        hamburger_shadow(light, texel, z, encoding)
+    })
+}
+
+/// Shading with Hausdorff four moment shadow mapping, with mip levels.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::mips::shaded,
+    parity(
+        ulp = 0,
+        absolute = 5e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
+    )
+)]
+pub fn shade_hausdorff_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+    encoding: u32,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: map.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
+        hausdorff_shadow(light, texel, z, encoding)
+    })
+}
+
+/// Shading with variance shadow mapping, with mip levels.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::mips::shaded,
+    parity(
+        ulp = 0,
+        absolute = 5e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
+    )
+)]
+pub fn shade_variance_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+    encoding: u32,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: map.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
+        variance_shadow(light, texel, z, encoding)
+    })
+}
+
+/// Shading with Hamburger six moment shadow mapping, with mip levels. `target` is the moment vector that the bias
+/// mixes in; the light's own is for four.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::mips::shaded_6,
+    parity(
+        ulp = 0,
+        absolute = 4e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7; with the least bias, 5e-6, the bound's steepest slope is 0.65 over a deviation of 1.5e-3, and the light's strength is 2.5"
+    )
+)]
+pub fn shade_hamburger_6_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[uniform] target: &Moments6<f32>,
+    #[texture] first: Texture2d<'_>,
+    #[texture] second: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::SYMMETRIC)]
+    encoding: u32,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: first.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let odd = footprint.mean(uv, |uv, level| first.sample_level(sampler, uv, level));
+        let even = footprint.mean(uv, |uv, level| second.sample_level(sampler, uv, level));
+        hamburger_6_shadow(light, target, odd, even, z, encoding)
+    })
+}
+
+/// Shading with trigonometric moment shadow mapping, with mip levels.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::mips::shaded_trigonometric,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "the depth in the light's view is rounded, by up to 1.5e-7; with the least bias, 4e-7, the bound's steepest slope is 0.65 over a deviation of 4.5e-4 on the circle, 7.1e-5 in depth, and the light's strength is 2.5"
+    )
+)]
+pub fn shade_trigonometric_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 1)]
+    #[values(trigonometric::encoding::PLAIN, trigonometric::encoding::UNORM)]
+    encoding: u32,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: map.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
+        trigonometric_shadow(light, texel, z, encoding)
+    })
+}
+
+/// Shading with exponential shadow mapping, with mip levels.
+#[kernel(
+    fragment,
+    pinned,
+    inputs = crate::inputs::mips::shaded_exponential
+)]
+pub fn shade_esm_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[uniform]
+    #[range(1.0..=80.0)]
+    exponent: &f32,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: map.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
+        exponential_shadow(*exponent, texel, z)
+    })
+}
+
+/// Shading with exponential variance shadow mapping, with mip levels.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::mips::shaded_warps,
+    parity(
+        ulp = 0,
+        absolute = 5e-3,
+        why = "the depth in the light's view is rounded, by up to 3e-7, and a warp 40 times as much; the bound's steepest slope with a relative variance of 1.6e-5 is 0.65 / 4e-3, and the light's strength is 2.5"
+    )
+)]
+pub fn shade_evsm_mips(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[varying]
+    #[unit_vector]
+    plane: Vec3,
+    #[uniform] light: &Light,
+    #[uniform] camera: &Transform,
+    #[uniform] raster: &Raster,
+    #[uniform] exponents: &Exponents,
+    #[texture] map: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+    #[constant(id = 0, default = 2)]
+    #[values(1, 2)]
+    warps: u32,
+) -> Vec4 {
+    let view = View {
+        light,
+        camera,
+        raster,
+        size: map.size(),
+    };
+    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+        let texel = footprint.mean(uv, |uv, level| map.sample_level(sampler, uv, level));
+        warped_shadow(light, exponents, texel, z, warps)
+    })
+}
