@@ -16,6 +16,7 @@ mod executor;
 mod export;
 mod frame;
 pub mod graph;
+mod lights;
 pub mod measure;
 pub mod passes;
 mod picture;

@@ -24,8 +24,9 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::executor::{Progress, Shaders, Timing};
-use crate::frame::{Show, graph, light_view};
+use crate::frame::{Show, graph};
 use crate::graph::{Omission, Summary};
+use crate::lights::light_view;
 use crate::measure::{Choices, Configuration, Sample, median, sample};
 use crate::passes::TRANSLUCENT;
 use crate::scene::{Fit, Mesh, Scene};
@@ -596,7 +597,7 @@ fn gain(scene: &Scene, mesh: &Mesh) -> Gain {
     let view = |fit| {
         let mut scene = scene.clone();
         scene.shadow.fit = fit;
-        light_view(&scene, scene.light, mesh)
+        light_view(&scene, &scene.lights[0], mesh)
     };
     let (whole, fitted) = (view(Fit::Scene), view(Fit::Camera));
     let area = |texel: [f32; 2]| f64::from(texel[0]) * f64::from(texel[1]);

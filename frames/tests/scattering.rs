@@ -206,7 +206,7 @@ fn a_medium_follows_camera_and_light() {
                 Frame::new(&mut device, &NoShaders, &first, &mesh, Show::Scattered).unwrap();
             moved.run(Clock::Frame, &mut Quiet).unwrap();
             moved.set_camera(&second.camera).unwrap();
-            moved.set_light(second.light).unwrap();
+            moved.set_light(0, &second.lights[0]).unwrap();
             moved.run(Clock::Frame, &mut Quiet).unwrap();
             let picture: Vec<f32> = moved.linear().unwrap().iter().map(|c| c.x).collect();
             let wanted = scattered_by_technique(&second, &mesh).unwrap();

@@ -55,10 +55,15 @@ impl Configuration {
         name
     }
 
-    /// Whether it is meant for a scene's light.
+    /// Whether it is meant for a scene's lights.
     #[must_use]
     pub fn suits(&self, scene: &Scene) -> bool {
-        !self.technique.is_soft || scene.area.radius > 0.0
+        let has_medium = scene.medium.is_some();
+        let mut lights = scene.lights.iter();
+        let has_area = lights.any(|light| light.area.radius > 0.0);
+        let mut lights = scene.lights.iter();
+        let is_refused = lights.any(|l| l.refuses(has_medium, self.technique).is_some());
+        (!self.technique.is_soft || has_area) && !is_refused
     }
 
     /// A scene with these shadows. What else the scene says of them, biases for example, was for
@@ -177,7 +182,7 @@ pub fn sample(
     scene: &Scene,
     mesh: &Mesh,
 ) -> Result<Sample> {
-    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Picture)?;
+    let mut frame = Frame::still(device, shaders, scene, mesh, Show::Picture)?;
     frame.run(Clock::Frame, &mut Quiet)?;
     let passes = frame.executor().steady(1)?;
     Ok(Sample {

@@ -33,8 +33,7 @@ impl Subject {
 
     /// What it holds, as a number (FNV-1a) that is another for another content.
     fn fingerprint(&self) -> u64 {
-        let (camera, light) = (&self.scene.camera, self.scene.light);
-        let mut view = format!("{camera:?} {light:?} {:?}", self.scene.area);
+        let mut view = format!("{:?} {:?}", self.scene.camera, self.scene.lights);
         if let Some(medium) = &self.scene.medium {
             view.push_str(&format!(" {medium:?}"));
         }

@@ -1,6 +1,5 @@
 //! What a medium scatters towards the camera, by rays: from places along each pixel's rays to the light.
 
-use hankel_dsl::glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -29,8 +28,10 @@ struct Ray {
     offset: f64,
     /// Places that are lit; those behind translucent casters count as what reaches them.
     lit: f64,
-    /// Towards the light.
-    toward: DVec3,
+    /// Its pixel, and by which number it goes on to the light: of an area, the rays of a pixel have different
+    /// points.
+    pixel: [u32; 2],
+    number: u32,
 }
 
 /// The scattered light of all pixels: the share of light that is scattered towards the camera and reaches it, but
@@ -70,8 +71,8 @@ impl Scattered {
                 taken: -f64::exp_m1(-extinction * length),
                 offset: offset(pixel, number),
                 lit: 0.0,
-                // Of an area, the rays of a pixel have different points.
-                toward: pixels.toward(at, number * GRID * GRID),
+                pixel: at,
+                number: number * GRID * GRID,
             }
         };
         let rays: Vec<Ray> = (0..scene.width * scene.height * count)
@@ -112,7 +113,8 @@ impl Scattered {
                 let light = |k: u32| {
                     let share = (f64::from(k) + ray.offset) / f64::from(steps);
                     let s = -f64::ln_1p(-share * ray.taken) / extinction;
-                    pixels.reaching(&ray.segment, (s / ray.length).min(1.0), ray.toward)
+                    let t = (s / ray.length).min(1.0);
+                    pixels.reaching(&ray.segment, t, ray.pixel, ray.number)
                 };
                 let wanted = (0..steps).filter(|k| parts.is_none_or(|parity| k % 2 == parity));
                 ray.lit += wanted.map(light).sum::<f64>();
