@@ -14,7 +14,7 @@ use crate::executor::{Clock, Executor, Memory, Progress, Run, Shaders, Timing};
 use crate::graph::{self, Graph, GraphError, Handle, Omission, Summary};
 use crate::lights::{Lit, area, facing, light_view, reaching, translucent, uniform};
 use crate::passes::{Given, Translucent};
-use crate::picture::{Difference, Picture};
+use crate::picture::{Difference, Linear, Picture};
 use crate::scene::{Camera, CameraView, Fit, Light, LightView, Mesh, Scene};
 use crate::volume::Space;
 
@@ -428,6 +428,9 @@ pub struct Rendering {
     /// The picture.
     #[serde(skip)]
     pub picture: Picture,
+    /// The same in linear light.
+    #[serde(skip)]
+    pub linear: Linear,
     /// Which device made it.
     pub device: String,
     /// The scene's triangles.
@@ -546,10 +549,15 @@ pub fn render_on(
     let run = frame.run(Clock::Passes, progress)?;
     timings.extend(run.ran);
     let start = Instant::now();
-    let picture = frame.picture()?;
+    let linear = Linear {
+        width: scene.width,
+        height: scene.height,
+        pixels: frame.linear()?,
+    };
     timings.push(Timing::new("read back", start.elapsed()));
     Ok(Rendering {
-        picture,
+        picture: linear.picture(),
+        linear,
         device: name,
         triangles: mesh.triangles.len(),
         texel: light_view(scene, &scene.lights[0], mesh).texel,

@@ -35,7 +35,7 @@ pub use frame::{
     AMPLIFICATION, Comparison, Frame, Rendering, Show, compare, graph as graph_of, render,
     render_on,
 };
-pub use picture::{Difference, Picture};
+pub use picture::{Difference, Linear, Picture};
 
 /// The page about frames: its code is compiled and run.
 #[cfg(doctest)]
