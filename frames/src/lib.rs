@@ -30,7 +30,7 @@ mod volume;
 
 pub use error::{FrameError, Result};
 pub use executor::{Clock, Executor, Memory, NoShaders, Progress, Quiet, Run, Shaders, Timing};
-pub use export::{export, recorded};
+pub use export::{export, recorded, recorded_medium};
 pub use frame::{
     AMPLIFICATION, Comparison, Frame, Rendering, Show, compare, graph as graph_of, render,
     render_on,

@@ -575,6 +575,7 @@ fn a_plan_says_which_methods_cannot_show_glass() {
         sizes: vec![128],
         filters: vec![1],
         fits: vec![Fit::Scene],
+        ..Choices::default()
     };
     let wanted = Wanted {
         error: 0.5,
