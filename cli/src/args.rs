@@ -498,6 +498,7 @@ Examples:
   hankel render scenes/hard.toml --out hard.png --backend vulkan
   hankel render scenes/scan.toml --out scan.png --compare
   hankel render scenes/hard.toml --out hard.png --errors
+  hankel render scenes/lamp.toml --out lamp.exr
   hankel render scenes/fence.toml --out fence.png --technique auto --error 0.05
 
 With --compare, OUT is the native picture; OUT-vulkan and OUT-difference are written beside it.")]
@@ -505,7 +506,7 @@ pub struct Render {
     /// Scene file (TOML).
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Picture to write (PNG).
+    /// Picture to write: PNG, or linear light in floats if its name ends with .exr.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Where to render.
@@ -570,6 +571,15 @@ pub struct Choose {
     /// Only this technique; several with commas between, or repeated [default: all].
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub technique: Vec<String>,
+    /// Only this technique of scattering, in scenes with a medium; several with commas between, or repeated
+    /// [default: all].
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub scattering: Vec<String>,
+    /// Steps along each ray, of techniques of scattering that march along rays, 1 to 4096; several with commas
+    /// between [default: 8,32,128].
+    #[arg(long, value_name = "STEPS", value_delimiter = ',',
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(Scene::MAX_STEPS)))]
+    pub steps: Vec<u32>,
     #[command(flatten)]
     pub maps: Maps,
 }
@@ -619,7 +629,8 @@ Examples:
   hankel plan scenes/fence.toml --error 0.05 --backend vulkan --time 20 --memory 30
   hankel plan scenes/fence.toml --error 0.1 --technique hamburger,vsm --format json
 
-The error is the root mean square of the light that arrives (1 minus the shadow) against rays. The plan is
+The error is the root mean square of the light that arrives (1 minus the shadow) against rays; in a scene with
+a medium, of the light that comes through it with what it scatters. The plan is
 found by probes on the backend: times of small maps, and pictures against rays through some of their pixels.
 
 Exit code 1: nothing is within the budgets.")]

@@ -5,6 +5,8 @@ use std::io::ErrorKind;
 
 use hankel_codegen as codegen;
 #[cfg(feature = "frames")]
+use hankel_frames::graph::GraphError;
+#[cfg(feature = "frames")]
 use hankel_frames::{FrameError, measure::StoreError, scene::SceneError};
 use hankel_host::crates::CrateError;
 use hankel_host::device::DeviceError;
@@ -226,6 +228,7 @@ impl From<FrameError> for Failure {
             FrameError::Scene(_) | FrameError::Sizes { .. } | FrameError::Value { .. } => {
                 Blame::Input
             }
+            FrameError::Graph(GraphError::Light { .. }) => Blame::Input,
             FrameError::Device { source, .. } => blame_of(source),
             FrameError::Graph(_) | FrameError::NoShader { .. } => Blame::Kernel,
             FrameError::Write(error) => blame_of_output(error),

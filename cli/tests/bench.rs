@@ -159,6 +159,24 @@ fn frames_are_measured_once() {
     assert_eq!(read("measured.jsonl"), kept);
     assert!(read("frames-plans.csv").contains("none"));
 
+    // A medium is scattered by each technique, with each number of steps.
+    write("mist.toml", &format!("{SCENE}[medium]\nextinction = 0.2\n"));
+    let line = "bench frames --scene mist.toml --technique pcf --size 64 --filter 1 --fit scene --steps 2,4 \
+                --scattering ray-marching,prefiltered --output 16x9 --rounds 1 --out mist";
+    let output = hankel(folder.path(), line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let table = std::fs::read_to_string(folder.path().join("mist/frames-scattering.csv"));
+    let table = table.expect("there is a table of scattering");
+    for way in [
+        "prefiltered",
+        "\"ray-marching, 2 steps\"",
+        "\"ray-marching, 4 steps\"",
+    ] {
+        assert!(table.contains(way), "{way}: {table}");
+    }
+    assert_eq!(table.lines().count(), 4, "{table}");
+
     fails(
         folder.path(),
         "bench frames --out report",

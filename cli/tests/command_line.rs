@@ -694,6 +694,18 @@ fn a_scene_is_rendered_and_compared() {
         let bytes = fs::read(desk.path(file)).expect("it was written");
         assert_eq!(&bytes[1..4], b"PNG", "{file}");
     }
+    // Linear light, in floats.
+    desk.hankel("render scene.toml --out a.EXR").code(0);
+    let bytes = fs::read(desk.path("a.EXR")).expect("it was written");
+    assert_eq!(bytes[..4], [0x76, 0x2f, 0x31, 0x01]);
+    desk.hankel("render scene.toml --out b.exr --compare")
+        .fails(2, &["b.exr", "PNG", "--compare"]);
+    // A light that a technique is not for.
+    let lamp = SCENE.replace("[light]", "[light]\nposition = [0.0, 3.0, 0.0]");
+    desk.write("lamp.toml", lamp);
+    desk.hankel("render lamp.toml --out c.png").code(0);
+    desk.hankel("render lamp.toml --out b.png --technique soft")
+        .fails(2, &["light 1", "`soft`", "directional"]);
     desk.hankel("render nowhere.toml --out b.png")
         .fails(2, &["nowhere.toml"]);
     desk.write("bad.toml", SCENE.replace("64", "0"));
@@ -725,6 +737,8 @@ fn a_scene_is_planned() {
         .fails(2, &["above 0"]);
     desk.hankel("plan scene.toml --error 0.1 --technique magic")
         .fails(2, &["no technique magic", "hamburger"]);
+    desk.hankel("plan scene.toml --error 0.1 --scattering fog")
+        .fails(2, &["no technique of scattering fog", "ray-marching"]);
     desk.hankel("plan scene.toml --error 0.1 --filter 4")
         .fails(2, &["odd number"]);
 

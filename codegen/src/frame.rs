@@ -50,6 +50,9 @@ pub struct Frame {
     pub scene: String,
     /// How the scene's shadows are made.
     pub shadow: Shadow,
+    /// How the light of the scene's medium is made, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub scattering: Option<Scattering>,
     /// The texture that holds the picture after the last pass: linear light, rows from the top.
     pub picture: String,
     /// Buffers, by name.
@@ -100,6 +103,15 @@ pub struct Shadow {
 
 const fn one() -> u32 {
     1
+}
+
+/// How a medium's light is made, as scene files say it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Scattering {
+    /// The technique.
+    pub technique: String,
+    /// Steps along each ray, where one is marched along.
+    pub steps: u32,
 }
 
 /// A buffer.

@@ -19,7 +19,8 @@ use crate::frame::{Show, graph as graph_of};
 use crate::graph::{
     Argument, Call, Graph, GraphError, Handle, Origin, Result, Shape, Surfaces, Target, Work,
 };
-use crate::scene::{Fit, Mesh, Scene, Shadow};
+use crate::scattering::Scattering;
+use crate::scene::{Fit, Medium, Mesh, Scene, Shadow};
 use crate::techniques::Technique;
 use crate::visibility::{CULL, FAR, SEEN, TOPOLOGY};
 
@@ -58,6 +59,10 @@ pub fn export(scene: &Scene, file: &str, mesh: &Mesh) -> Result<Draft> {
             made_by: Versions::with(""),
             scene: file.into(),
             shadow,
+            scattering: scene.medium.map(|medium| frame::Scattering {
+                technique: medium.technique.name.into(),
+                steps: medium.steps,
+            }),
             picture,
             buffers: export.buffers,
             textures: export.textures,
@@ -92,6 +97,16 @@ pub fn recorded(shadow: &frame::Shadow) -> Option<Shadow> {
         mips: shadow.mips,
         anisotropy: shadow.anisotropy,
         ..Shadow::of(technique, *map)
+    })
+}
+
+/// A medium whose light is made as a frame says it is; `None` if there is no such technique.
+#[must_use]
+pub fn recorded_medium(medium: &Medium, scattering: &frame::Scattering) -> Option<Medium> {
+    Some(Medium {
+        technique: Scattering::named(&scattering.technique)?,
+        steps: scattering.steps,
+        ..*medium
     })
 }
 

@@ -6,26 +6,20 @@ use std::time::Instant;
 use hankel_dsl::glam::{Mat4, Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_host::device::{self, Backend, Device};
-use hankel_moments::FixedPoint;
 use hankel_shadows::depth::Transform;
-use hankel_shadows::shade::Light;
-use hankel_shadows::soft::{Area, MOST_REACH};
 use serde::Serialize;
 
 use crate::error::{FrameError, Result};
 use crate::executor::{Clock, Executor, Memory, Progress, Run, Shaders, Timing};
-use crate::graph::{self, Graph, Handle, Summary, Work};
+use crate::graph::{self, Graph, GraphError, Handle, Omission, Summary, Work};
+use crate::lights::{Lit, area, facing, light_view, reaching, translucent, uniform};
 use crate::passes::{Given, Translucent};
-use crate::picture::{Difference, Picture};
-use crate::scene::{Camera, CameraView, Fit, LightView, Mesh, Scene};
+use crate::picture::{Difference, Linear, Picture};
+use crate::scene::{Camera, CameraView, Fit, Light, LightView, Mesh, Scene};
 use crate::volume::Space;
 
 /// What is seen where nothing is: a pale sky, in linear light.
 const BACKGROUND: [f32; 3] = [0.5, 0.6, 0.72];
-/// Light from the sky.
-const AMBIENT: Vec4 = Vec4::new(0.24, 0.28, 0.33, 0.0);
-/// What the light adds on a surface that faces it.
-pub(crate) const IRRADIANCE: f32 = 1.15;
 /// What pictures are kept in until they are encoded: linear light.
 const PICTURE: TexelFormat = TexelFormat::Rgba16Float;
 
@@ -42,23 +36,6 @@ pub(crate) fn camera_view(scene: &Scene, camera: &Camera, mesh: &Mesh) -> Camera
     CameraView::new(camera, mesh, scene.width as f32 / scene.height as f32)
 }
 
-pub(crate) fn light_view(scene: &Scene, direction: Vec3, mesh: &Mesh) -> LightView {
-    let shadow = &scene.shadow;
-    // The filter and the sampler's interpolation stay inside of the map.
-    let margin = shadow.filter / 2 + 1;
-    match shadow.fit {
-        Fit::Scene => LightView::new(direction, mesh, shadow.size, margin),
-        Fit::Camera => {
-            let camera = camera_view(scene, &scene.camera, mesh);
-            let fitted = match scene.medium {
-                Some(_) => LightView::fitted_to_space,
-                None => LightView::fitted,
-            };
-            fitted(direction, mesh, shadow.size, margin, &camera)
-        }
-    }
-}
-
 /// What a frame shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Show {
@@ -72,163 +49,148 @@ pub enum Show {
     Scattered,
 }
 
-/// The light as the shading kernels take it.
-pub(crate) fn light(scene: &Scene, view: &LightView, show: Show) -> Light {
-    let shadow = &scene.shadow;
-    let clip = view.clip_from_world;
-    let (irradiance, ambient) = match show {
-        Show::Picture => (IRRADIANCE, AMBIENT),
-        Show::Light | Show::Scattered => (1.0, Vec4::ZERO),
-    };
-    Light {
-        row_u: clip.row(0) * 0.5 + Vec4::W * 0.5,
-        // Rows of the map count from the top.
-        row_v: clip.row(1) * -0.5 + Vec4::W * 0.5,
-        row_depth: clip.row(2),
-        toward: (-view.direction).extend(irradiance),
-        ambient,
-        bias_target: Vec4::from_array(shadow.map.bias_target),
-        moment_bias: shadow.moment_bias,
-        depth_bias: shadow.depth_bias,
-        light_leak: shadow.leak_cut,
-        filter_radius: shadow.filter / 2,
-    }
-}
-
-/// Steepness, depth over width, of the steepest surface that must not shade itself in a soft shadow.
-const STEEPEST: f32 = 2.0;
-/// The same for a region that is compared as a whole: of a steeper one, less than half is in front of its
-/// own middle, and moments bound little of that. More would lose what is in contact.
-const MARGIN: f32 = 0.5;
-
-/// The light's area as the kernels of soft shadows take it.
-pub(crate) fn area(scene: &Scene, view: &LightView) -> Area {
-    let radius = scene.area.radius;
-    let spread = view.texel.map(|texel| radius * view.depth / texel);
-    // Texels of the largest rectangle that is read of a table, which is a texel wide at least.
-    let [x, y] = spread.map(|s| 2 * s.clamp(0.5, MOST_REACH).ceil() as u32);
-    Area {
-        spread: spread.into(),
-        slack: (STEEPEST * radius).min(0.5),
-        margin: (MARGIN * radius).min(0.5),
-        one: FixedPoint::for_kernel(x * y).one,
-        padding: 0,
-    }
-}
-
-/// The graph of a scene's frame: what its technique starts from, and the picture, in linear light.
+/// The graph of a scene's frame: what its technique starts from for each light, and the picture, in linear light.
+/// Lights that reach nothing that the camera sees are left out.
 ///
 /// # Errors
-/// [`graph::GraphError`] for a technique that does not fit its kernels.
-pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Given, Handle)> {
-    let view = light_view(scene, scene.light, mesh);
+/// [`graph::GraphError`] for a technique that does not fit its kernels, or that is not for the scene's lights.
+pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Vec<Given>, Handle)> {
+    let (numbers, omitted) = reaching(scene, mesh);
+    let (mut graph, given, picture) = with_lights(scene, mesh, show, &numbers)?;
+    for Omission { what, why } in omitted {
+        graph.omit(what, why);
+    }
+    Ok((graph, given, picture))
+}
+
+/// The same with these of its lights.
+fn with_lights(
+    scene: &Scene,
+    mesh: &Mesh,
+    show: Show,
+    numbers: &[usize],
+) -> graph::Result<(Graph, Vec<Given>, Handle)> {
+    let technique = scene.shadow.technique;
+    for (number, light) in scene.lights.iter().enumerate() {
+        if let Some(problem) = light.refuses(scene.medium.is_some(), technique) {
+            let number = number + 1;
+            return Err(GraphError::Light { number, problem });
+        }
+    }
     let camera = camera_view(scene, &scene.camera, mesh);
     let mut graph = Graph::new(hankel_shadows::entries());
-    let translucent = mesh.translucent_along(view.direction);
-    let translucent = (!translucent.is_empty()).then(|| Translucent {
-        indices: graph.buffer("translucent indices", translucent.as_flattened()),
-        opacities: graph.buffer("opacities", &mesh.all_opacities()),
-    });
     let vertices = mesh.positions.len();
-    let (normals, colours, format, [r, g, b]) = match show {
+    let (colours, format, [red, green, blue]) = match show {
         Show::Picture => (
-            Cow::Borrowed(&mesh.normals),
             Cow::Borrowed(&mesh.colours),
             PICTURE,
             BACKGROUND.map(f64::from),
         ),
         Show::Light => (
-            Cow::Owned(vec![-view.direction; vertices]),
             Cow::Owned(vec![Vec3::ONE; vertices]),
             TexelFormat::Rgba32Float,
             [1.0; 3],
         ),
         Show::Scattered => (
-            Cow::Borrowed(&mesh.normals),
             Cow::Owned(vec![Vec3::ZERO; vertices]),
             TexelFormat::Rgba32Float,
             [0.0; 3],
         ),
     };
-    let space = Space::of(scene, mesh, show);
-    let lit = graph.buffer("normals", &normals);
+    let positions = graph.buffer("positions", &mesh.positions);
+    let colours = graph.buffer("colours", &colours);
+    let indices = graph.buffer("indices", mesh.opaque().as_flattened());
+    let is_translucent = !mesh.translucent().is_empty();
+    let opacities = is_translucent.then(|| graph.buffer("opacities", &mesh.all_opacities()));
+    let camera = graph.parameter("camera", &transform(camera.clip_from_world));
     // Those of the light alone are lit as if they faced it.
     let planes = match show {
         Show::Light => graph.buffer("planes", &mesh.normals),
-        Show::Picture | Show::Scattered => lit,
+        Show::Picture | Show::Scattered => graph.buffer("normals", &mesh.normals),
     };
-    let given = Given {
-        positions: graph.buffer("positions", &mesh.positions),
-        normals: lit,
-        planes,
-        colours: graph.buffer("colours", &colours),
-        indices: graph.buffer("indices", mesh.opaque().as_flattened()),
-        translucent,
-        light_view: graph.parameter("light's view", &transform(view.clip_from_world)),
-        camera: graph.parameter("camera", &transform(camera.clip_from_world)),
-        light: graph.parameter("light", &light(scene, &view, show)),
-        area: graph.parameter("light's area", &area(scene, &view)),
-        source: scene.area,
-        volume: space.map(|space| space.add_to(&mut graph)),
-        shadow: scene.shadow,
-        size: [scene.width, scene.height],
-        format,
-        background: [r, g, b, 1.0],
-        is_tinted: show == Show::Picture,
-    };
+    let own_normals = (show != Show::Light).then_some(planes);
     for (value, meaning) in [
-        (given.positions, "Positions of the vertices in world space."),
-        (
-            given.normals,
-            "Unit normals of the vertices in world space.",
-        ),
-        (given.colours, "Colours of the vertices, linear."),
-        (given.indices, "Three vertices for each triangle."),
-        (
-            given.light_view,
-            "From world space to the clip space of the shadow map.",
-        ),
-        (
-            given.camera,
-            "From world space to the clip space of the picture.",
-        ),
-        (
-            given.light,
-            "The light, and how its shadow map is read. The rows follow from the transform to the shadow \
-             map's clip space: u and v are half of x and of -y plus a half, depth is z.",
-        ),
-        (given.area, "The light's area, as its shadow map sees it."),
+        (positions, "Positions of the vertices in world space."),
+        (colours, "Colours of the vertices, linear."),
+        (indices, "Three vertices for each triangle."),
+        (camera, "From world space to the clip space of the picture."),
     ] {
         graph.describe(value, meaning);
     }
-    if let Some(volume) = given.volume {
-        for (value, meaning) in [
-            (
-                volume.view,
-                "How pixels look into the world; it follows from the camera.",
-            ),
-            (volume.medium, "What scatters between surfaces."),
-            (
-                volume.rectified,
-                "Coordinates in which rays from the camera are rows of the shadow map; they follow from the camera \
-                 and the light.",
-            ),
-            (
-                volume.rows,
-                "What differs from row to row of the rectified map; it follows from the camera and the light.",
-            ),
-        ] {
-            graph.describe(value, meaning);
+    let mut all = Vec::with_capacity(numbers.len());
+    let mut sum: Option<Handle> = None;
+    for (i, number) in numbers.iter().enumerate() {
+        let light = &scene.lights[*number];
+        let view = light_view(scene, light, mesh);
+        let lit = Lit {
+            light,
+            view: &view,
+            is_first: i == 0,
+            count: numbers.len(),
+        };
+        // Of several lights, each has its own.
+        let named = |label: &'static str| -> Cow<'static, str> {
+            match numbers.len() {
+                1 => label.into(),
+                _ => format!("{label} of light {}", number + 1).into(),
+            }
+        };
+        let normals =
+            own_normals.unwrap_or_else(|| graph.buffer(named("normals"), &facing(light, mesh)));
+        let translucent = opacities.map(|opacities| {
+            let triangles = translucent(light, mesh);
+            Translucent {
+                indices: graph.buffer(named("translucent indices"), triangles.as_flattened()),
+                opacities,
+            }
+        });
+        let space = Space::of(scene, &view, mesh, show);
+        let given = Given {
+            positions,
+            normals,
+            planes,
+            colours,
+            indices,
+            translucent,
+            light_view: graph.parameter(named("light's view"), &transform(view.clip_from_world)),
+            camera,
+            light: graph.parameter(named("light"), &uniform(scene, &lit, show)),
+            area: graph.parameter(named("light's area"), &area(light, &view)),
+            source: light.area,
+            volume: space.map(|space| space.add_to(&mut graph, &named)),
+            shadow: scene.shadow,
+            size: [scene.width, scene.height],
+            format,
+            // What is behind all surfaces is there once.
+            background: match i {
+                0 => [red, green, blue, 1.0],
+                _ => [0.0, 0.0, 0.0, 1.0],
+            },
+            is_tinted: show == Show::Picture,
+        };
+        describe(&mut graph, &given);
+        let mut picture = (technique.add)(&mut graph, &given)?;
+        // Where there is a medium, there is its volume.
+        match scene.medium.as_ref().zip(given.volume) {
+            Some((medium, volume)) => {
+                picture = (medium.technique.add)(&mut graph, &given, &volume, picture)?;
+            }
+            None => graph.omit("scattering", "there is no medium"),
         }
+        sum = Some(match sum {
+            None => picture,
+            Some(before) => graph
+                .compute("sum", format!("sum_lights_{}", format.name()))
+                .arg("first", before)
+                .arg("second", picture)
+                .image(given.size)?,
+        });
+        all.push(given);
     }
-    let mut picture = (scene.shadow.technique.add)(&mut graph, &given)?;
-    // Where there is a medium, there is its volume.
-    match scene.medium.as_ref().zip(given.volume) {
-        Some((medium, volume)) => {
-            picture = (medium.technique.add)(&mut graph, &given, &volume, picture)?;
-        }
-        None => graph.omit("scattering", "there is no medium"),
-    }
+    let Some(picture) = sum else {
+        let problem = "there is none: a scene has one light or more".into();
+        return Err(GraphError::Light { number: 1, problem });
+    };
     if scene.shadow.mips && !graph.omitted().iter().any(|it| it.what == "mips") {
         let has_levels = |pass: &graph::Pass| matches!(pass.work, Work::Levels(_));
         if !graph.passes().iter().any(has_levels) {
@@ -236,21 +198,67 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Gi
         }
     }
     graph.keep(picture);
-    Ok((graph, given, picture))
+    Ok((graph, all, picture))
 }
 
-/// A scene's frame on a device: to be drawn again after the camera or the light has moved.
+/// Says what a light's values mean.
+fn describe(graph: &mut Graph, given: &Given) {
+    for (value, meaning) in [
+        (
+            given.normals,
+            "Unit normals of the vertices in world space.",
+        ),
+        (
+            given.light_view,
+            "From world space to the clip space of the shadow map.",
+        ),
+        (
+            given.light,
+            "The light, and how its shadow map is read. The rows follow from the transform to the shadow \
+             map's clip space, whose rows are x, y, z and w: u is half of x + w, v half of w - y, depth is z.",
+        ),
+        (given.area, "The light's area, as its shadow map sees it."),
+    ] {
+        graph.describe(value, meaning);
+    }
+    let Some(volume) = given.volume else {
+        return;
+    };
+    for (value, meaning) in [
+        (
+            volume.view,
+            "How pixels look into the world; it follows from the camera.",
+        ),
+        (volume.medium, "What scatters between surfaces."),
+        (
+            volume.rectified,
+            "Coordinates in which rays from the camera are rows of the shadow map; they follow from the camera \
+             and the light.",
+        ),
+        (
+            volume.rows,
+            "What differs from row to row of the rectified map; it follows from the camera and the light.",
+        ),
+    ] {
+        graph.describe(value, meaning);
+    }
+}
+
+/// A scene's frame on a device: to be drawn again after the camera or a light has moved.
 pub struct Frame<'d> {
     executor: Executor<'d>,
     scene: Scene,
     mesh: &'d Mesh,
     show: Show,
-    given: Given,
+    /// Of each light that the frame has, its number in the scene.
+    numbers: Vec<usize>,
+    given: Vec<Given>,
     picture: Handle,
 }
 
 impl<'d> Frame<'d> {
-    /// Makes everything that the frame needs on the device.
+    /// Makes everything that the frame needs on the device, with all lights: they may reach something after the
+    /// camera or a light has moved.
     ///
     /// # Errors
     /// See [`FrameError`].
@@ -261,12 +269,41 @@ impl<'d> Frame<'d> {
         mesh: &'d Mesh,
         show: Show,
     ) -> Result<Self> {
-        let (graph, given, picture) = graph(scene, mesh, show)?;
+        let numbers: Vec<usize> = (0..scene.lights.len()).collect();
+        let made = with_lights(scene, mesh, show, &numbers)?;
+        Self::of(device, shaders, scene, mesh, show, (numbers, made))
+    }
+
+    /// The same for one picture: lights that reach nothing that the camera sees are left out.
+    ///
+    /// # Errors
+    /// See [`FrameError`].
+    pub fn still(
+        device: &'d mut dyn Device,
+        shaders: &'d dyn Shaders,
+        scene: &Scene,
+        mesh: &'d Mesh,
+        show: Show,
+    ) -> Result<Self> {
+        let (numbers, _) = reaching(scene, mesh);
+        let made = graph(scene, mesh, show)?;
+        Self::of(device, shaders, scene, mesh, show, (numbers, made))
+    }
+
+    fn of(
+        device: &'d mut dyn Device,
+        shaders: &'d dyn Shaders,
+        scene: &Scene,
+        mesh: &'d Mesh,
+        show: Show,
+        (numbers, (graph, given, picture)): (Vec<usize>, (Graph, Vec<Given>, Handle)),
+    ) -> Result<Self> {
         Ok(Self {
             executor: Executor::new(device, shaders, graph)?,
             scene: scene.clone(),
             mesh,
             show,
+            numbers,
             given,
             picture,
         })
@@ -280,42 +317,74 @@ impl<'d> Frame<'d> {
         self.scene.camera = *camera;
         let view = camera_view(&self.scene, camera, self.mesh);
         let transform = transform(view.clip_from_world);
-        self.executor.set(self.given.camera, &transform)?;
-        match self.scene.shadow.fit {
-            Fit::Scene => self.set_space(),
-            Fit::Camera => self.set_light(self.scene.light),
+        let numbers = self.numbers.clone();
+        for (i, number) in numbers.into_iter().enumerate() {
+            // It is one for all.
+            if i == 0 {
+                self.executor.set(self.given[i].camera, &transform)?;
+            }
+            match self.scene.shadow.fit {
+                Fit::Scene => {
+                    let light = self.scene.lights[number];
+                    let view = light_view(&self.scene, &light, self.mesh);
+                    self.set_space(i, &view)?;
+                }
+                Fit::Camera => self.set_light(number, &self.scene.lights[number].clone())?,
+            }
         }
+        Ok(())
     }
 
-    /// Turns the light: `direction` is the way it goes, not zero.
+    /// Moves a light, or makes it another one of its kind; the first has the number 0.
     ///
     /// # Errors
-    /// [`FrameError::Device`].
-    pub fn set_light(&mut self, direction: Vec3) -> Result<()> {
-        self.scene.light = direction;
-        let view = light_view(&self.scene, direction, self.mesh);
-        let uniform = light(&self.scene, &view, self.show);
+    /// [`FrameError::Device`]; [`FrameError::Value`] for a light that the frame does not have.
+    pub fn set_light(&mut self, number: usize, light: &Light) -> Result<()> {
+        let Some(i) = self.numbers.iter().position(|n| *n == number) else {
+            return Err(FrameError::Value {
+                value: format!("light {number}"),
+                problem: format!(
+                    "the frame has {} lights, counted from 0",
+                    self.numbers.len()
+                ),
+            });
+        };
+        if let Some(problem) =
+            light.refuses(self.scene.medium.is_some(), self.scene.shadow.technique)
+        {
+            let number = number + 1;
+            return Err(GraphError::Light { number, problem }.into());
+        }
+        self.scene.lights[number] = *light;
+        let given = self.given[i];
+        let view = light_view(&self.scene, light, self.mesh);
+        let lit = Lit {
+            light,
+            view: &view,
+            is_first: i == 0,
+            count: self.numbers.len(),
+        };
+        let uniform = uniform(&self.scene, &lit, self.show);
         if self.show == Show::Light {
-            let normals = vec![-view.direction; self.mesh.positions.len()];
-            self.executor.set_buffer(self.given.normals, &normals)?;
+            let normals = facing(light, self.mesh);
+            self.executor.set_buffer(given.normals, &normals)?;
         }
-        if let Some(translucent) = self.given.translucent {
-            let triangles = self.mesh.translucent_along(view.direction);
-            let indices = triangles.as_flattened();
-            self.executor.set_buffer(translucent.indices, indices)?;
+        if let Some(Translucent { indices, .. }) = given.translucent {
+            let triangles = translucent(light, self.mesh);
+            let triangles = triangles.as_flattened();
+            self.executor.set_buffer(indices, triangles)?;
         }
-        self.executor.set(self.given.light, &uniform)?;
-        let area = area(&self.scene, &view);
-        self.executor.set(self.given.area, &area)?;
+        self.executor.set(given.light, &uniform)?;
+        self.executor.set(given.area, &area(light, &view))?;
         let transform = transform(view.clip_from_world);
-        self.executor.set(self.given.light_view, &transform)?;
-        self.set_space()
+        self.executor.set(given.light_view, &transform)?;
+        self.set_space(i, &view)
     }
 
     /// What the medium's kernels take of camera and light.
-    fn set_space(&mut self) -> Result<()> {
-        let space = Space::of(&self.scene, self.mesh, self.show);
-        let (Some(volume), Some(space)) = (self.given.volume, space) else {
+    fn set_space(&mut self, i: usize, view: &LightView) -> Result<()> {
+        let space = Space::of(&self.scene, view, self.mesh, self.show);
+        let (Some(volume), Some(space)) = (self.given[i].volume, space) else {
             return Ok(());
         };
         self.executor.set(volume.view, &space.view)?;
@@ -336,13 +405,18 @@ impl<'d> Frame<'d> {
         &mut self.executor
     }
 
+    /// What the picture's texels are.
+    fn graph_format(&self) -> TexelFormat {
+        self.given.first().map_or(PICTURE, |given| given.format)
+    }
+
     /// The picture of the last run, in linear light, rows from the top.
     ///
     /// # Errors
     /// [`FrameError::Value`] before the first run; [`FrameError::Device`].
     pub fn linear(&mut self) -> Result<Vec<Vec4>> {
         let texels = self.executor.read(self.picture)?;
-        let format = self.given.format;
+        let format = self.graph_format();
         let texels = texels.chunks_exact(format.bytes());
         Ok(texels.map(|t| format.load(t)).collect())
     }
@@ -352,10 +426,9 @@ impl<'d> Frame<'d> {
     /// # Errors
     /// As for [`Frame::linear`].
     pub fn picture(&mut self) -> Result<Picture> {
-        let [width, height] = self.given.size;
         Ok(Picture::from_linear(
-            width,
-            height,
+            self.scene.width,
+            self.scene.height,
             self.linear()?.into_iter(),
         ))
     }
@@ -367,11 +440,14 @@ pub struct Rendering {
     /// The picture.
     #[serde(skip)]
     pub picture: Picture,
+    /// The same in linear light.
+    #[serde(skip)]
+    pub linear: Linear,
     /// Which device made it.
     pub device: String,
     /// The scene's triangles.
     pub triangles: usize,
-    /// Edge of the shadow map's texels in world units, along x and y.
+    /// Edge of the shadow map's texels in world units, along x and y; of the first light's map.
     pub texel: [f32; 2],
     /// Share of the pixels whose samples see different triangles, where that was counted
     /// (natively): where rounding may decide what a sample sees.
@@ -480,18 +556,23 @@ pub fn render_on(
 ) -> Result<Rendering> {
     let start = Instant::now();
     let name = device.name().to_string();
-    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Picture)?;
+    let mut frame = Frame::still(device, shaders, scene, mesh, Show::Picture)?;
     let mut timings = vec![Timing::new("set-up", start.elapsed())];
     let run = frame.run(Clock::Passes, progress)?;
     timings.extend(run.ran);
     let start = Instant::now();
-    let picture = frame.picture()?;
+    let linear = Linear {
+        width: scene.width,
+        height: scene.height,
+        pixels: frame.linear()?,
+    };
     timings.push(Timing::new("read back", start.elapsed()));
     Ok(Rendering {
-        picture,
+        picture: linear.picture(),
+        linear,
         device: name,
         triangles: mesh.triangles.len(),
-        texel: light_view(scene, scene.light, mesh).texel,
+        texel: light_view(scene, &scene.lights[0], mesh).texel,
         edges: run.edges,
         plan: frame.executor.graph().summary(),
         memory: frame.executor.memory(),

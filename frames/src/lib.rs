@@ -16,6 +16,7 @@ mod executor;
 mod export;
 mod frame;
 pub mod graph;
+mod lights;
 pub mod measure;
 pub mod passes;
 mod picture;
@@ -29,12 +30,12 @@ mod volume;
 
 pub use error::{FrameError, Result};
 pub use executor::{Clock, Executor, Memory, NoShaders, Progress, Quiet, Run, Shaders, Timing};
-pub use export::{export, recorded};
+pub use export::{export, recorded, recorded_medium};
 pub use frame::{
     AMPLIFICATION, Comparison, Frame, Rendering, Show, compare, graph as graph_of, render,
     render_on,
 };
-pub use picture::{Difference, Picture};
+pub use picture::{Difference, Linear, Picture};
 
 /// The page about frames: its code is compiled and run.
 #[cfg(doctest)]

@@ -1,5 +1,6 @@
-//! Pictures: from linear light to PNG, and how two of them differ.
+//! Pictures: from linear light to PNG and OpenEXR, and how two of them differ.
 
+use exr::image::write::WritableImage as _;
 use hankel_dsl::glam::Vec4;
 use hankel_system::output::{Output, OutputError};
 
@@ -110,6 +111,50 @@ impl Picture {
             over_1: over[0] as f64 / count,
             over_8: over[1] as f64 / count,
         })
+    }
+}
+
+/// Linear light, as it was drawn: red, green, blue, rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Linear {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` pixels; alpha is passed over.
+    pub pixels: Vec<Vec4>,
+}
+
+impl Linear {
+    /// The same as it is shown.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
+        Picture::from_linear(self.width, self.height, self.pixels.iter().copied())
+    }
+
+    /// Writes an OpenEXR file of 32-bit floats, compressed without loss.
+    ///
+    /// # Errors
+    /// [`FrameError::Write`].
+    pub fn save(&self, output: Output) -> Result<()> {
+        let exr = self
+            .exr()
+            .map_err(|e| OutputError::write(output.path(), std::io::Error::other(e)))?;
+        Ok(output.finish(&exr)?)
+    }
+
+    fn exr(&self) -> exr::error::Result<Vec<u8>> {
+        let width = self.width as usize;
+        let pixel = |at: exr::math::Vec2<usize>| {
+            let c = self.pixels.get(at.y() * width + at.x());
+            let c = c.copied().unwrap_or_default();
+            (c.x, c.y, c.z)
+        };
+        let channels = exr::image::SpecificChannels::rgb(pixel);
+        let image = exr::image::Image::from_channels((width, self.height as usize), channels);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write().non_parallel().to_buffered(&mut bytes)?;
+        Ok(bytes.into_inner())
     }
 }
 

@@ -6,8 +6,11 @@
 //! 1. **Time.** Each method (a technique and its map) is timed with small maps and with and without a
 //!    filter. Its time is taken to be linear in the map's texels and in the filter's taps; that orders all
 //!    configurations from the fastest to the slowest.
+//!    In a scene with a medium, the time of a technique of scattering is taken to be what it adds to the first
+//!    method's.
 //! 2. **Error.** In this order the light of each configuration is drawn in full and compared with rays
-//!    ([`Pixels`]) in some pixels. Pixels are added until it is decided, at three standard errors, whether
+//!    ([`Pixels`]) in some pixels; in a scene with a medium it is the light that comes through that, with what it
+//!    scatters ([`Through`]). Pixels are added until it is decided, at three standard errors, whether
 //!    the error is within the budget; with all of them it is exact. Rays are the expensive part, and are
 //!    shared by all configurations. A larger map is not tried if half its size was too far off for
 //!    [`DOUBLING`] to make up.
@@ -24,12 +27,14 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::executor::{Progress, Shaders, Timing};
-use crate::frame::{Show, graph, light_view};
+use crate::frame::{Show, graph};
 use crate::graph::{Omission, Summary};
-use crate::measure::{Choices, Configuration, Sample, median, sample};
+use crate::lights::light_view;
+use crate::measure::{Choices, Configuration, Pictures, Sample, Scattered, median, sample};
 use crate::passes::TRANSLUCENT;
 use crate::scene::{Fit, Mesh, Scene};
-use crate::truth::{Arriving, Pixels, by_technique_on};
+use crate::truth::scattering::Through;
+use crate::truth::{Arriving, Pixels};
 
 /// By how much a map of twice the size may divide the root mean square error at most. What
 /// `hankel bench frames` has measured is less, but for errors that are near 0: see docs/frames.md.
@@ -51,7 +56,8 @@ const SURE: f64 = 3.0;
 /// What is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Wanted {
-    /// The greatest root mean square error of the light against rays, above 0.
+    /// The greatest root mean square error of the light against rays, above 0; in a scene with a medium, of the
+    /// light that comes through it with what it scatters.
     pub error: f64,
     /// The greatest time of a frame in seconds.
     pub seconds: Option<f64>,
@@ -184,9 +190,19 @@ impl fmt::Display for Impossible {
     }
 }
 
+/// Steps along rays through a medium are enough if their doubling changes this share of the greatest error that is
+/// allowed.
+const STEADY: f64 = 0.1;
+
+/// What rays tell of a pixel.
+enum Rays {
+    Light(Pixels),
+    Through(Through),
+}
+
 /// Rays through some of a picture's pixels, as many as are asked for.
 struct Truth {
-    pixels: Pixels,
+    rays: Rays,
     /// All pixels, such that any number of the first ones is spread over the picture.
     order: Vec<usize>,
     width: usize,
@@ -195,11 +211,12 @@ struct Truth {
 }
 
 impl Truth {
-    fn new(scene: &Scene, mesh: &Mesh) -> Self {
+    fn new(scene: &Scene, mesh: &Mesh, budget: f64) -> Self {
         let width = scene.width as usize;
+        let through = Through::new(scene, mesh, STEADY * budget);
         let count = width * scene.height as usize;
         Self {
-            pixels: Pixels::of(scene, mesh),
+            rays: through.map_or_else(|| Rays::Light(Pixels::of(scene, mesh)), Rays::Through),
             order: spread(count),
             width,
             known: Vec::new(),
@@ -209,9 +226,12 @@ impl Truth {
     fn know(&mut self, count: usize) {
         let (known, count) = (self.known.len(), count.min(self.order.len()));
         if known < count {
-            let light = |&pixel: &usize| {
-                let at = [(pixel % self.width) as u32, (pixel / self.width) as u32];
-                self.pixels.light(at)
+            let light = |&pixel: &usize| match &self.rays {
+                Rays::Light(pixels) => {
+                    let at = [pixel % self.width, pixel / self.width];
+                    pixels.light(at.map(|i| i as u32))
+                }
+                Rays::Through(through) => through.pixel(pixel as u32),
             };
             let more: Vec<f32> = self.order[known..count].par_iter().map(light).collect();
             self.known.extend(more);
@@ -329,6 +349,7 @@ struct Search<'a> {
     shaders: &'a dyn Shaders,
     scene: &'a Scene,
     mesh: &'a Mesh,
+    pictures: Pictures,
 }
 
 impl Search<'_> {
@@ -338,8 +359,9 @@ impl Search<'_> {
     }
 
     fn light(&mut self, configuration: &Configuration) -> Result<Arriving> {
-        let scene = configuration.on(self.scene);
-        by_technique_on(self.device, self.shaders, &scene, self.mesh)
+        let (device, shaders) = (&mut *self.device, self.shaders);
+        self.pictures
+            .light(device, shaders, self.scene, self.mesh, configuration)
     }
 
     /// Times a method with two sizes and filters.
@@ -388,6 +410,65 @@ impl Search<'_> {
     }
 }
 
+impl Search<'_> {
+    /// Times each method with the first way to make what a medium scatters, and each of these ways with the first
+    /// method.
+    fn predictions(
+        &mut self,
+        configurations: &[Configuration],
+        choices: &Choices,
+        progress: &mut dyn Progress,
+    ) -> Result<Predictions> {
+        let mut this = Predictions::default();
+        let Some(first) = configurations.first() else {
+            return Ok(this);
+        };
+        for (i, c) in configurations.iter().enumerate() {
+            if let Entry::Vacant(method) = this.methods.entry(c.method()) {
+                let scattering = first.scattering;
+                let of = Configuration { scattering, ..*c };
+                method.insert(self.times(&of, choices)?);
+            }
+            if let Some(scattering) = c.scattering.filter(|s| Some(*s) != first.scattering)
+                && let Entry::Vacant(way) = this.ways.entry(scattering.to_string())
+            {
+                let scattering = c.scattering;
+                let of = Configuration {
+                    scattering,
+                    ..*first
+                };
+                way.insert(self.times(&of, choices)?);
+            }
+            progress.advance((i + 1) as f32 / configurations.len() as f32);
+        }
+        this.first = this.methods.get(&first.method()).copied();
+        Ok(this)
+    }
+}
+
+/// Predicted times.
+#[derive(Default)]
+struct Predictions {
+    methods: BTreeMap<String, Times>,
+    /// The first method's.
+    first: Option<Times>,
+    /// Those of the first method with another way to make what a medium scatters.
+    ways: BTreeMap<String, Times>,
+}
+
+impl Predictions {
+    fn of(&self, c: &Configuration) -> Option<f64> {
+        let own = self.methods.get(&c.method())?.of(c.size, c.filter);
+        let way = |scattering: Scattered| {
+            let with = self.ways.get(&scattering.to_string())?;
+            Some(with.of(c.size, c.filter) - self.first?.of(c.size, c.filter))
+        };
+        let more = c.scattering.and_then(way).unwrap_or(0.0);
+        // Noise must not make anything free.
+        Some((own + more).max(0.25 * own))
+    }
+}
+
 /// A configuration that does what is wanted.
 struct Found {
     configuration: Configuration,
@@ -413,28 +494,23 @@ pub fn plan(
         shaders,
         scene,
         mesh,
+        pictures: Pictures::default(),
     };
     let mut configurations = choices.configurations();
     configurations.retain(|c| c.suits(scene));
     let blind = blind(&configurations, scene, mesh)?;
     configurations.retain(|c| blind.iter().all(|b| b.what != c.method()));
     progress.begin("timing each method", 1, 3);
-    let mut times: BTreeMap<String, Times> = BTreeMap::new();
-    for (i, c) in configurations.iter().enumerate() {
-        if let Entry::Vacant(method) = times.entry(c.method()) {
-            method.insert(search.times(c, choices)?);
-        }
-        progress.advance((i + 1) as f32 / configurations.len() as f32);
-    }
+    let predictions = search.predictions(&configurations, choices, progress)?;
     let mut order: Vec<(f64, Configuration)> = configurations
         .iter()
-        .filter_map(|c| Some((times.get(&c.method())?.of(c.size, c.filter), *c)))
+        .filter_map(|c| Some((predictions.of(c)?, *c)))
         .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
 
     progress.begin("comparing with rays", 2, 3);
     let mut why = Reasons::default();
-    let mut truth = Truth::new(scene, mesh);
+    let mut truth = Truth::new(scene, mesh, wanted.error);
     let mut found: Vec<Found> = Vec::new();
     let mut errors: Vec<(Configuration, Estimate)> = Vec::new();
     for (i, (predicted, c)) in order.iter().enumerate() {
@@ -596,7 +672,7 @@ fn gain(scene: &Scene, mesh: &Mesh) -> Gain {
     let view = |fit| {
         let mut scene = scene.clone();
         scene.shadow.fit = fit;
-        light_view(&scene, scene.light, mesh)
+        light_view(&scene, &scene.lights[0], mesh)
     };
     let (whole, fitted) = (view(Fit::Scene), view(Fit::Camera));
     let area = |texel: [f32; 2]| f64::from(texel[0]) * f64::from(texel[1]);
@@ -625,10 +701,16 @@ struct Reasons {
 
 impl Reasons {
     fn add(&mut self, configuration: &Configuration, reason: Reason) {
-        self.of
-            .entry(configuration.method())
-            .or_default()
-            .push(reason);
+        for what in Self::names(configuration) {
+            self.of.entry(what).or_default().push(reason);
+        }
+    }
+
+    /// Under which names its reason is told: the method's, and that of the way to make what a medium scatters.
+    fn names(configuration: &Configuration) -> impl Iterator<Item = String> {
+        let scattering = configuration.scattering.as_ref();
+        let scattering = scattering.map(|s| format!("scattering by {s}"));
+        [configuration.method()].into_iter().chain(scattering)
     }
 
     /// For each method one sentence.
@@ -664,7 +746,7 @@ impl Reasons {
                 count(|r| matches!(r, Reason::Memory)),
                 "beyond the memory budget",
             );
-            let is_chosen = chosen.is_some_and(|c| c.method() == *method);
+            let is_chosen = chosen.is_some_and(|c| Self::names(c).any(|name| name == *method));
             let what = if is_chosen {
                 format!("{method} otherwise")
             } else {

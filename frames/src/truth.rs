@@ -2,7 +2,8 @@
 //!
 //! - [`by_rays`] knows no map: 256 rays through each pixel, and one from each place that they meet
 //!   towards the light; each towards another point of it if the light has an area. Of the light, translucent
-//!   surfaces let pass the product of 1 minus each one's opacity.
+//!   surfaces let pass the product of 1 minus each one's opacity. Of a spot light it is what its cone leaves of it,
+//!   whatever the distance; of several lights their mean, those left out that reach nothing.
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
@@ -21,10 +22,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{FrameError, Result};
 use crate::executor::{Clock, NoShaders, Progress, Quiet, Shaders};
-use crate::frame::{Frame, Show, camera_view, light, light_view, transform};
+use crate::frame::{Frame, Show, camera_view, transform};
+use crate::lights::{Lit, light_view, reaching, uniform};
 use crate::passes::gaussian;
 use crate::picture::Picture;
-use crate::scene::{Area, Mesh, Scene};
+use crate::scene::{Light, LightView, Mesh, Scene, Source};
 use crate::visibility::SAMPLES;
 use crate::visibility::cast::{Caster, Lens, SAMPLES as AT, Segment, in_bands};
 use crate::visibility::fragments::{Fragments, Varying};
@@ -192,7 +194,7 @@ fn shown(
     mesh: &Mesh,
     show: Show,
 ) -> Result<Arriving> {
-    let mut frame = Frame::new(device, shaders, scene, mesh, show)?;
+    let mut frame = Frame::still(device, shaders, scene, mesh, show)?;
     frame.run(Clock::Frame, &mut Quiet)?;
     Ok(Arriving {
         width: scene.width,
@@ -206,7 +208,7 @@ fn shown(
 pub struct Measured {
     /// Against [`by_rays`]: what an observer would say.
     pub rays: Errors,
-    /// Against [`filtered`]: what the reconstruction adds. Only for a light that is a point.
+    /// Against [`filtered`]: what the reconstruction adds. Only for lights that are points.
     pub filtered: Option<Errors>,
     /// Of what the medium scatters, against rays. Only of a scene with a medium.
     pub scattered: Option<scattering::Compared>,
@@ -220,7 +222,7 @@ pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Resul
     let steps = if scene.medium.is_some() { 5 } else { 3 };
     progress.begin("light by the technique", 1, steps);
     let picture = by_technique(scene, mesh)?;
-    let is_point = scene.area.radius == 0.0;
+    let is_point = scene.lights.iter().all(|light| light.area.radius == 0.0);
     progress.begin("light by all samples", 2, steps);
     let soft = is_point.then(|| filtered(scene, mesh, &mut |share| progress.advance(share)));
     progress.begin("light by rays", 3, steps);
@@ -254,11 +256,32 @@ pub struct Pixels {
     lens: Lens,
     /// Length of the scene's diagonal.
     diagonal: f64,
-    /// Towards the middle of the light.
-    toward: DVec3,
-    /// From there to the middle of its edge, along x and y of the shadow map; nothing for a point.
+    lamps: Vec<Lamp>,
+}
+
+/// A light that rays go to.
+struct Lamp {
+    light: Light,
+    /// From its middle to that of its edge, along x and y of the shadow map, one unit before it; nothing for a point.
     axes: [DVec3; 2],
-    area: Area,
+}
+
+impl Lamp {
+    /// The way from a place to the light, all of it to a spot light; and what the cone of that leaves of its light.
+    /// Ray `i` of a pixel goes to another point of an area.
+    fn toward(&self, place: DVec3, pixel: [u32; 2], i: u32) -> (DVec3, f64) {
+        match self.light.source {
+            Source::Spot(spot) => (spot.position.as_dvec3() - place, spot.within(place)),
+            Source::Directional { direction } => {
+                let toward = -direction.as_dvec3().normalize_or(DVec3::Y);
+                if self.light.area.radius == 0.0 {
+                    return (toward, 1.0);
+                }
+                let [x, y] = self.light.area.point(light_sample(pixel, i));
+                (toward + self.axes[0] * x + self.axes[1] * y, 1.0)
+            }
+        }
+    }
 }
 
 /// Translucent surfaces.
@@ -305,16 +328,23 @@ impl Pixels {
     #[must_use]
     pub fn of(scene: &Scene, mesh: &Mesh) -> Self {
         let view = camera_view(scene, &scene.camera, mesh);
-        let clip = light_view(scene, scene.light, mesh).clip_from_world;
-        let radius = f64::from(scene.area.radius);
+        let (numbers, _) = reaching(scene, mesh);
+        let lamp = |number: usize| {
+            let light = scene.lights[number];
+            let clip = light_view(scene, &light, mesh).clip_from_world;
+            let radius = f64::from(light.area.radius);
+            let axis = |i| clip.row(i).truncate().as_dvec3().normalize_or_zero();
+            Lamp {
+                light,
+                axes: [0, 1].map(|i| axis(i) * radius),
+            }
+        };
         Self {
             caster: Caster::of(mesh),
             translucent: Layers::of(mesh),
             lens: Lens::new(view.clip_from_world, scene.width, scene.height),
             diagonal: mesh.bounds().map_or(1.0, |b| f64::from(b.size().length())),
-            toward: -scene.light.as_dvec3().normalize_or(DVec3::NEG_Y),
-            axes: [0, 1].map(|i| clip.row(i).truncate().as_dvec3().normalize_or_zero() * radius),
-            area: scene.area,
+            lamps: numbers.into_iter().map(lamp).collect(),
         }
     }
 
@@ -328,35 +358,45 @@ impl Pixels {
             let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
             let segment = self.lens.segment(pixel, at);
             let hit = self.caster.first(&segment);
-            hit.map_or(1.0, |hit| {
-                self.reaching(&segment, hit.t, self.toward(pixel, i))
-            })
+            hit.map_or(1.0, |hit| self.reaching(&segment, hit.t, pixel, i))
         };
         let sum: f64 = (0..GRID * GRID).map(arriving).sum();
         (sum / f64::from(GRID * GRID)) as f32
     }
 
-    /// The share of the light that reaches a place of a segment: none through an opaque caster, some through
-    /// a translucent one.
-    fn reaching(&self, segment: &Segment, t: f64, toward: DVec3) -> f64 {
-        let from = segment.at(t) + toward * (AWAY * self.diagonal);
-        let to_light = Segment::new(from, toward * (2.0 * self.diagonal));
-        if self.caster.first(&to_light).is_some() {
+    /// The share of the light that reaches a place of a segment, the mean of all lights: none through an opaque
+    /// caster, some through a translucent one. Ray `i` of a pixel goes to another point of an area.
+    fn reaching(&self, segment: &Segment, t: f64, pixel: [u32; 2], i: u32) -> f64 {
+        let place = segment.at(t);
+        let of = |lamp: &Lamp| {
+            let (toward, within) = lamp.toward(place, pixel, i);
+            if within == 0.0 {
+                return 0.0;
+            }
+            let away = self.diagonal * AWAY;
+            let (from, way) = match lamp.light.source {
+                Source::Directional { .. } => {
+                    (place + toward * away, toward * (2.0 * self.diagonal))
+                }
+                Source::Spot(spot) => {
+                    let from = place + toward.normalize_or_zero() * away;
+                    (from, spot.position.as_dvec3() - from)
+                }
+            };
+            within * self.passing(&Segment::new(from, way))
+        };
+        self.lamps.iter().map(of).sum::<f64>() / self.lamps.len().max(1) as f64
+    }
+
+    /// The share of light that passes what a segment meets.
+    fn passing(&self, to_light: &Segment) -> f64 {
+        if self.caster.first(to_light).is_some() {
             return 0.0;
         }
         let translucent = self.translucent.as_ref();
         translucent.map_or(1.0, |t| {
-            f64::from(t.caster.transmittance(&to_light, &t.opacities))
+            f64::from(t.caster.transmittance(to_light, &t.opacities))
         })
-    }
-
-    /// Where ray `i` of a pixel goes on.
-    fn toward(&self, pixel: [u32; 2], i: u32) -> DVec3 {
-        if self.area.radius == 0.0 {
-            return self.toward;
-        }
-        let [x, y] = self.area.point(light_sample(pixel, i));
-        self.toward + self.axes[0] * x + self.axes[1] * y
     }
 }
 
@@ -410,6 +450,32 @@ struct Filter {
 }
 
 impl Filter {
+    /// What a light's map holds, and the scene's filter.
+    fn of(
+        scene: &Scene,
+        mesh: &Mesh,
+        caster: &Caster,
+        view: &LightView,
+        advance: &mut dyn FnMut(f32),
+    ) -> Self {
+        let size = scene.shadow.size;
+        let from_light = transform(view.clip_from_world);
+        let places = mesh.positions.iter();
+        let clip: Vec<Vec4> = places.map(|p| from_light.apply(*p)).collect();
+        let lens = Lens::new(view.clip_from_world, size, size);
+        let half = gaussian(scene.shadow.filter);
+        let weights = half[1..].iter().rev().chain(&half).map(|w| f64::from(*w));
+        let weights: Vec<f64> = weights.collect();
+        let sum: f64 = weights.iter().sum();
+        Self {
+            size: i64::from(size),
+            translucent: Layers::of(mesh)
+                .map_or_else(Vec::new, |t| t.of_samples(&lens, &clip, size)),
+            depths: caster.depths(&lens, &clip, [size; 2], advance),
+            weights: weights.iter().map(|w| w / sum).collect(),
+        }
+    }
+
     /// The share of light that does not get past a depth in a sample.
     fn shadow(&self, sample: usize, z: f32) -> f64 {
         if self.depths[sample] < z {
@@ -465,31 +531,10 @@ impl Filter {
 #[must_use]
 pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
     let caster = Caster::of(mesh);
-    let view = light_view(scene, scene.light, mesh);
-    let uniform = light(scene, &view, Show::Light);
-    let size = scene.shadow.size;
-    let from_light = transform(view.clip_from_world);
-    let clip: Vec<Vec4> = mesh
-        .positions
-        .iter()
-        .map(|p| from_light.apply(*p))
-        .collect();
-    let lens = Lens::new(view.clip_from_world, size, size);
-    let half = gaussian(scene.shadow.filter);
-    let weights = half[1..].iter().rev().chain(&half).map(|w| f64::from(*w));
-    let weights: Vec<f64> = weights.collect();
-    let sum: f64 = weights.iter().sum();
-    let filter = Filter {
-        size: i64::from(size),
-        translucent: Layers::of(mesh).map_or_else(Vec::new, |t| t.of_samples(&lens, &clip, size)),
-        depths: caster.depths(&lens, &clip, [size; 2], &mut |share| advance(share * 0.4)),
-        weights: weights.iter().map(|w| w / sum).collect(),
-    };
-
     let camera = camera_view(scene, &scene.camera, mesh);
     let lens = Lens::new(camera.clip_from_world, scene.width, scene.height);
     let pixels = [scene.width, scene.height];
-    let fragments = Fragments::find(&caster, &lens, pixels, &mut |s| advance(0.4 + s * 0.3));
+    let fragments = Fragments::find(&caster, &lens, pixels, &mut |s| advance(s * 0.3));
     let world = Varying {
         components: 3,
         vertices: bytemuck::cast_slice(&mesh.positions).to_vec(),
@@ -497,20 +542,42 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
     let world = fragments.interpolate(&caster, &lens, &[world]);
     let world: &[Vec3] = bytemuck::cast_slice(&world[0]);
     let mut arriving = vec![0.0; world.len()];
-    let mut rest = |share: f32| advance(0.7 + share * 0.3);
-    in_bands(
-        &mut arriving,
-        1 << 10,
-        &mut rest,
-        |band, part: &mut [f64]| {
-            let places = &world[band << 10..];
-            for (value, p) in part.iter_mut().zip(places) {
-                let row = |row: Vec4| row_times_point(row, *p);
-                let z = row(uniform.row_depth) - uniform.depth_bias;
-                *value = 1.0 - filter.at(row(uniform.row_u), row(uniform.row_v), z);
-            }
-        },
-    );
+    let (numbers, _) = reaching(scene, mesh);
+    let count = numbers.len();
+    for (i, number) in numbers.into_iter().enumerate() {
+        let light = &scene.lights[number];
+        let mut advance =
+            |share: f32| advance(0.3 + 0.7 * (i as f32 + share) / count.max(1) as f32);
+        let view = light_view(scene, light, mesh);
+        let filter = Filter::of(scene, mesh, &caster, &view, &mut |s| advance(s * 0.6));
+        let lit = Lit {
+            light,
+            view: &view,
+            is_first: i == 0,
+            count,
+        };
+        let uniform = uniform(scene, &lit, Show::Light);
+        let cone = light.spot();
+        let mut rest = |share: f32| advance(0.6 + share * 0.4);
+        in_bands(
+            &mut arriving,
+            1 << 10,
+            &mut rest,
+            |band, part: &mut [f64]| {
+                let places = &world[band << 10..];
+                for (value, p) in part.iter_mut().zip(places) {
+                    let within = cone.map_or(1.0, |spot| spot.within(p.as_dvec3()));
+                    if within > 0.0 {
+                        let row = |row: Vec4| row_times_point(row, *p);
+                        let w = row(uniform.row_w);
+                        let z = row(uniform.row_depth) / w - uniform.depth_bias / (w * w);
+                        let shadow = filter.at(row(uniform.row_u) / w, row(uniform.row_v) / w, z);
+                        *value += within * (1.0 - shadow) / count as f64;
+                    }
+                }
+            },
+        );
+    }
     let pixel = |samples: [Option<usize>; SAMPLES as usize]| {
         let sum: f64 = samples.iter().map(|s| s.map_or(1.0, |i| arriving[i])).sum();
         (sum / f64::from(SAMPLES)) as f32
@@ -525,6 +592,7 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Area;
 
     fn row(values: &[f32]) -> Arriving {
         Arriving {

@@ -1,12 +1,13 @@
 //! From a scene's medium to what the kernels of single scattering take.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use hankel_dsl::glam::{DVec3, Vec3, Vec4};
 use hankel_moments::{rectified_bounds, row_extinction, row_inclinations};
 use hankel_shadows::scattering::{Medium, Rectified, View};
 
-use crate::frame::{IRRADIANCE, Show, camera_view, light, light_view};
+use crate::frame::{Show, camera_view};
 use crate::graph::Graph;
 use crate::passes::Volume;
 use crate::scene::{CameraView, LightView, Mesh, Scene};
@@ -24,22 +25,21 @@ pub(crate) struct Space {
 }
 
 impl Space {
-    /// Of a scene's camera and light; `None` for a scene without a medium, and where what is shown is not behind
-    /// it.
-    pub fn of(scene: &Scene, mesh: &Mesh, show: Show) -> Option<Self> {
+    /// Of a scene's camera and one of its lights, with what its map holds; `None` for a scene without a medium, and
+    /// where what is shown is not behind it.
+    pub fn of(scene: &Scene, light_view: &LightView, mesh: &Mesh, show: Show) -> Option<Self> {
         let medium = scene.medium.filter(|_| show != Show::Light)?;
         let camera = camera_view(scene, &scene.camera, mesh);
-        let light_view = light_view(scene, scene.light, mesh);
         let (source, anisotropy) = match show {
             // Surfaces take the irradiance as what a white one sends out: divided by π.
             Show::Picture => {
                 let albedo = medium.scattering / medium.extinction;
-                (albedo * IRRADIANCE * PI as f32, medium.anisotropy)
+                (albedo * PI as f32, medium.anisotropy)
             }
             // All that is scattered counts as 1.
             Show::Scattered | Show::Light => (4.0 * PI as f32, 0.0),
         };
-        let (rectified, rows) = rectified(scene, &camera, &light_view, medium.extinction);
+        let (rectified, rows) = rectified(scene, &camera, light_view, medium.extinction);
         Some(Self {
             view: view(&camera, [scene.width, scene.height]),
             medium: Medium {
@@ -53,12 +53,17 @@ impl Space {
         })
     }
 
-    pub fn add_to(&self, graph: &mut Graph) -> Volume {
+    /// `named` makes labels that tell lights apart.
+    pub fn add_to(
+        &self,
+        graph: &mut Graph,
+        named: &dyn Fn(&'static str) -> Cow<'static, str>,
+    ) -> Volume {
         Volume {
-            view: graph.parameter("view", &self.view),
-            medium: graph.parameter("medium", &self.medium),
-            rectified: graph.parameter("rectified", &self.rectified),
-            rows: graph.buffer("rows", &self.rows),
+            view: graph.parameter(named("view"), &self.view),
+            medium: graph.parameter(named("medium"), &self.medium),
+            rectified: graph.parameter(named("rectified"), &self.rectified),
+            rows: graph.buffer(named("rows"), &self.rows),
             texels: [self.rectified.columns, self.rectified.rows],
             steps: self.medium.steps,
         }
@@ -93,12 +98,9 @@ fn rectified(
     let away = |azimuth: f64| axes[0] * azimuth.cos() + axes[1] * azimuth.sin();
     let across = away(bounds.azimuth);
     let aside = away(bounds.azimuth + 0.5 * PI);
-    let uniform = light(scene, light_view, Show::Light);
-    let in_map = |row: Vec4| {
-        let row = row.as_dvec4();
-        (row.truncate().dot(camera.eye.as_dvec3()) + row.w) as f32
-    };
-    let eye = [uniform.row_u, uniform.row_v, uniform.row_depth].map(in_map);
+    let eye = light_view.clip_from_world.as_dmat4();
+    let eye = eye.transform_point3(camera.eye.as_dvec3());
+    let eye = [0.5 + 0.5 * eye.x, 0.5 - 0.5 * eye.y, eye.z].map(|x| x as f32);
     let size = scene.shadow.size;
     let rows = (0..size).map(|row| {
         let share = 2.0 * (f64::from(row) + 0.5) / f64::from(size) - 1.0;

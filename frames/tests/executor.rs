@@ -7,7 +7,7 @@ use hankel_conformance::Pair;
 use hankel_conformance::general::Grid;
 use hankel_dsl::glam::{UVec2, Vec3};
 use hankel_frames::graph::{Graph, Handle};
-use hankel_frames::scene::Scene;
+use hankel_frames::scene::{Light, Scene};
 use hankel_frames::{Clock, Executor, Frame, FrameError, NoShaders, Quiet, Show};
 use hankel_host::device::{Backend, NativeDevice, open};
 
@@ -234,11 +234,12 @@ fn moves(backend: Backend, shaders: &dyn hankel_frames::Shaders) {
     assert_ne!(moved, first);
     let quiet = frame.run(Clock::Frame, &mut Quiet).unwrap();
     assert_eq!((quiet.ran.len(), quiet.unchanged.len()), (0, 5));
-    frame.set_light(Vec3::new(-1.0, -1.0, 0.2)).unwrap();
+    let turned = Light::directional(Vec3::new(-1.0, -1.0, 0.2));
+    frame.set_light(0, &turned).unwrap();
     assert_eq!(names(&mut frame), all);
     assert_ne!(frame.picture().unwrap(), moved);
     // Back again, it is the picture of before.
-    frame.set_light(scene.light).unwrap();
+    frame.set_light(0, &scene.lights[0]).unwrap();
     frame.set_camera(&scene.camera).unwrap();
     names(&mut frame);
     assert_eq!(frame.picture().unwrap(), first);

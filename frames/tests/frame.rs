@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hankel_dsl::glam::{DVec3, Vec3};
-use hankel_frames::scene::{CameraView, Procedural, Scene};
+use hankel_frames::scene::{CameraView, Light, Procedural, Scene};
 use hankel_frames::techniques::Technique;
 use hankel_frames::visibility::cast::{Caster, Lens, Segment};
 use hankel_frames::{
@@ -136,7 +136,7 @@ fn truth(scene: &Scene) -> Vec<Truth> {
         scene.width as f32 / scene.height as f32,
     );
     let lens = Lens::new(view.clip_from_world, scene.width, scene.height);
-    let towards = -scene.light.as_dvec3() * 100.0;
+    let towards = -scene.lights[0].direction().as_dvec3() * 100.0;
     (0..scene.width * scene.height)
         .map(|i| {
             let segment = lens.segment([i % scene.width, i / scene.width], [0.5, 0.5]);
@@ -299,7 +299,7 @@ fn the_picture_is_upright_and_not_mirrored() {
     let mut scene = scene("filter = 1\nsize = 256");
     scene.camera.eye = Vec3::new(0.0, 2.0, 9.0);
     scene.camera.target = Vec3::ZERO;
-    scene.light = Vec3::new(1.0, -1.0, 0.0).normalize();
+    scene.lights = vec![Light::directional(Vec3::new(1.0, -1.0, 0.0))];
     let picture = native(&scene);
     let at = |x: usize, y: usize| picture.pixels[y * 192 + x];
     assert_eq!(at(10, 4), at(180, 4));
@@ -365,7 +365,7 @@ fn any_valid_scene_renders() {
         let mut scene = scene("size = 16\nfilter = 31");
         scene.camera.eye = eye;
         scene.camera.target = eye + Vec3::new(-1.0, 0.3, 0.2);
-        scene.light = light.normalize();
+        scene.lights = vec![Light::directional(light)];
         (scene.width, scene.height) = (width, height);
         assert_eq!(native(&scene).pixels.len(), (width * height) as usize);
     }

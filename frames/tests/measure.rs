@@ -34,6 +34,7 @@ fn choices() -> Choices {
         sizes: vec![64, 128],
         filters: vec![1, 3],
         fits: vec![Fit::Camera],
+        ..Choices::default()
     }
 }
 
@@ -107,7 +108,9 @@ fn exhaustively(subject: &Subject, truth: &Arriving) -> BTreeMap<String, f64> {
         let light = by_technique(&c.on(&subject.scene), &subject.mesh).unwrap();
         (c.to_string(), light.errors(truth).unwrap().rms)
     };
-    choices().configurations().iter().map(of).collect()
+    let all = choices().configurations();
+    let suiting = all.iter().filter(|c| c.suits(&subject.scene));
+    suiting.map(of).collect()
 }
 
 fn planned(subject: &Subject, wanted: Wanted) -> Result<Plan, hankel_frames::plan::Impossible> {

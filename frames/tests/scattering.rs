@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
+use hankel_frames::measure::{Ask, Choices, Pictures, Session, Subject};
+use hankel_frames::plan::{Wanted, plan};
 use hankel_frames::scattering::{self, Scattering};
-use hankel_frames::scene::{Mesh, Scene};
-use hankel_frames::truth::scattering::{Scattered, compare};
+use hankel_frames::scene::{Fit, Mesh, Scene};
+use hankel_frames::techniques::Technique;
+use hankel_frames::truth::scattering::{Scattered, Through, compare};
 use hankel_frames::truth::{Arriving, by_technique, scattered_by_technique};
 use hankel_frames::{Clock, Frame, NoShaders, Quiet, Show, graph_of, render_on};
 use hankel_host::device::NativeDevice;
@@ -102,6 +105,144 @@ fn scattered_light_is_near_the_rays() {
         // More steps bring marching nearer to the truth.
         let marched = &compared.errors[..3];
         assert!(marched.is_sorted_by(|a, b| a.rms > b.rms), "{name}");
+    }
+}
+
+fn small(steps: &[u32]) -> Choices {
+    Choices {
+        techniques: ["pcf", "hamburger"]
+            .map(|name| Technique::named(name).unwrap())
+            .into(),
+        sizes: vec![64, 128],
+        filters: vec![3],
+        fits: vec![Fit::Scene],
+        steps: steps.into(),
+        ..Choices::default()
+    }
+}
+
+/// What comes through a medium and what that scatters are all of the light where nothing casts a shadow.
+#[test]
+fn nothing_is_lost_in_light_alone() {
+    let (scene, mesh) = open(
+        "eye = [1.0, 2.0, 6.0]
+target = [0, 0.5, 0]",
+        "extinction = 0.2",
+    );
+    let truth = Through::new(&scene, &mesh, 1e-3).unwrap();
+    for pixel in [0, 31, 700, 48 * 30 - 1] {
+        let (seen, surfaces) = (truth.pixel(pixel), truth.surfaces(pixel));
+        // 16 rays for the medium, 256 for surfaces: their means differ where a pixel's rays differ in length.
+        assert!((seen - 1.0).abs() < 5e-3, "{pixel}: {seen}");
+        assert!(surfaces > 0.01 && surfaces < 0.8, "{pixel}: {surfaces}");
+    }
+    let mut device = NativeDevice::new();
+    let mut pictures = Pictures::default();
+    // Coarse depths without a filter shade the ground itself.
+    let all = Choices {
+        techniques: vec![Technique::named("hamburger").unwrap()],
+        sizes: vec![128],
+        ..small(&[16])
+    };
+    for c in all.configurations().iter().filter(|c| c.suits(&scene)) {
+        let light = pictures.light(&mut device, &NoShaders, &scene, &mesh, c);
+        let light = light.unwrap();
+        let off = light.values.iter().map(|v| (f64::from(*v) - 1.0).powi(2));
+        let rms = (off.sum::<f64>() / light.values.len() as f64).sqrt();
+        println!("{c}: {rms:.4}");
+        assert!(rms < 0.03, "{c}: {rms}");
+    }
+}
+
+/// The two truths of what is scattered are one.
+#[test]
+fn pixels_scatter_what_the_whole_picture_does() {
+    let (scene, mesh) = file("shafts", 64);
+    let whole = Scattered::new(&scene, &mesh).unwrap();
+    let picture = whole.picture();
+    // With the steps that the picture begins with.
+    let through = Through::new(&scene, &mesh, 1.0).unwrap();
+    assert_eq!(through.steps(), 2 * whole.steps());
+    let off = (0..scene.width * scene.height).step_by(37).map(|i| {
+        let off = through.scattered(i) - f64::from(picture.values[i as usize]);
+        off * off
+    });
+    let off: Vec<f64> = off.collect();
+    let rms = (off.iter().sum::<f64>() / off.len() as f64).sqrt();
+    assert!(rms < 0.004, "{rms}");
+}
+
+/// A plan chooses among techniques of scattering, too, and says why it leaves the others out; what it predicts is
+/// what a session measures.
+#[test]
+fn a_plan_chooses_how_a_medium_scatters() {
+    let (mut scene, mesh) = file("shafts", 64);
+    (scene.width, scene.height) = (48, 27);
+    let choices = small(&[2, 16]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("measured.jsonl");
+    let subject = Subject {
+        name: "shafts".into(),
+        scene: scene.clone(),
+        mesh: mesh.clone(),
+    };
+    let ask = Ask {
+        configurations: choices.configurations(),
+        rounds: 1,
+    };
+    let mut device = NativeDevice::new();
+    let mut session = Session::open(&file, &[]).unwrap();
+    let all = session
+        .measure(&mut device, &NoShaders, &subject, &ask, &mut |_| ())
+        .unwrap();
+    // Two sizes, four maps, and four ways to scatter.
+    assert_eq!(all.len(), 2 * 4 * 4);
+    let scattered = |way: &str| {
+        let is_it = |m: &&hankel_frames::measure::Measurement| {
+            m.configuration.size == 128
+                && m.configuration
+                    .scattering
+                    .is_some_and(|s| s.to_string() == way)
+        };
+        all.iter().find(is_it).unwrap().scattered.unwrap().rms
+    };
+    assert!(scattered("ray-marching, 16 steps") < scattered("ray-marching, 2 steps"));
+    assert!(scattered("prefiltered-6") < 0.05);
+    let mut errors: Vec<f64> = all.iter().map(|m| m.errors.rms).collect();
+    errors.sort_by(f64::total_cmp);
+    let wanted = Wanted {
+        error: errors[errors.len() / 3],
+        seconds: None,
+        bytes: None,
+    };
+    let found = plan(
+        &mut device,
+        &NoShaders,
+        &scene,
+        &mesh,
+        &choices,
+        wanted,
+        &mut Quiet,
+    );
+    let plan = found.unwrap().unwrap_or_else(|none| panic!("{none}"));
+    let chosen = all.iter().find(|m| m.configuration == plan.configuration);
+    let chosen = chosen.unwrap();
+    assert!(chosen.errors.rms <= wanted.error * 1.02, "{plan}");
+    assert!(
+        (chosen.errors.rms - plan.error.rms).abs() < 0.05 * wanted.error,
+        "{plan}"
+    );
+    assert_eq!(plan.considered, all.len());
+    let medium = plan.scene.medium.unwrap();
+    let scattering = plan.configuration.scattering.unwrap();
+    assert_eq!(
+        (medium.technique, medium.steps),
+        (scattering.technique, scattering.steps)
+    );
+    let text = plan.to_string();
+    for way in choices.scattered() {
+        let named = format!("not scattering by {way}");
+        assert!(text.contains(&named), "{named}: {text}");
     }
 }
 
@@ -206,7 +347,7 @@ fn a_medium_follows_camera_and_light() {
                 Frame::new(&mut device, &NoShaders, &first, &mesh, Show::Scattered).unwrap();
             moved.run(Clock::Frame, &mut Quiet).unwrap();
             moved.set_camera(&second.camera).unwrap();
-            moved.set_light(second.light).unwrap();
+            moved.set_light(0, &second.lights[0]).unwrap();
             moved.run(Clock::Frame, &mut Quiet).unwrap();
             let picture: Vec<f32> = moved.linear().unwrap().iter().map(|c| c.x).collect();
             let wanted = scattered_by_technique(&second, &mesh).unwrap();

@@ -8,7 +8,8 @@ use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
 use hankel_frames::scattering::Scattering;
 use hankel_frames::scene::{
-    Area, AreaShape, DepthRange, Fit, Geometry, Medium, Mesh, Procedural, Scene, SceneError, Shadow,
+    Area, AreaShape, DepthRange, Fit, Geometry, Light, Medium, Mesh, Procedural, Scene, SceneError,
+    Shadow, Source,
 };
 use hankel_frames::techniques::Technique;
 
@@ -39,7 +40,11 @@ fn the_least_scene_has_the_documented_defaults() {
     assert_eq!(scene.geometry, Geometry::Procedural(Procedural::Box));
     assert_eq!(scene.camera.up, Vec3::Y);
     assert_eq!(scene.camera.fov, 40.0);
-    assert!((scene.light.length() - 1.0).abs() < 1e-6);
+    let [light] = scene.lights[..] else {
+        panic!("{:?}", scene.lights);
+    };
+    assert!((light.direction().length() - 1.0).abs() < 1e-6);
+    assert_eq!(light, Light::new(light.source));
     assert_eq!((scene.width, scene.height), (960, 540));
     assert_eq!(scene.shadow, Shadow::default());
     assert_eq!(scene.medium, None);
@@ -70,6 +75,8 @@ fn every_field_is_read() {
         fov = 55.5
         [light]
         direction = [0.0, -3.0, 0.0]
+        strength = 2.5
+        colour = [1.0, 0.5, 0.0]
         radius = 0.05
         shape = "square"
         [medium]
@@ -108,9 +115,16 @@ fn every_field_is_read() {
         }
     );
     assert_eq!(scene.camera.up, Vec3::Z);
-    assert_eq!(scene.light, Vec3::NEG_Y);
     let (radius, shape) = (0.05, AreaShape::Square);
-    assert_eq!(scene.area, Area { radius, shape });
+    let light = Light {
+        source: Source::Directional {
+            direction: Vec3::NEG_Y,
+        },
+        area: Area { radius, shape },
+        strength: 2.5,
+        colour: Vec3::new(1.0, 0.5, 0.0),
+    };
+    assert_eq!(scene.lights, [light]);
     assert_eq!(
         scene.medium,
         Some(Medium {
@@ -220,6 +234,61 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nshape = 'star'"),
             &["light.shape", "star", "disc", "square"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nstrength = -2"),
+            &["`light.strength` is -2", "0 to 1000000"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\ncolour = [1, 1, 1.5]"),
+            &["`light.colour`", "1.5", "0 to 1", "light.strength"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nangle = 30"),
+            &["`light.angle` is 30", "`position`"],
+        ),
+        (
+            LEAST.replace(
+                "[-1, -2, -1]",
+                "[-1, -2, -1]\nposition = [0, 2, 0]\nangle = 170",
+            ),
+            &["`light.angle` is 170", "1 to 150"],
+        ),
+        (
+            LEAST.replace(
+                "[-1, -2, -1]",
+                "[-1, -2, -1]\nposition = [0, 2, 0]\ninner = 60",
+            ),
+            &["`light.inner` is 60", "`light.angle`, which is 60"],
+        ),
+        (
+            LEAST.replace(
+                "[-1, -2, -1]",
+                "[-1, -2, -1]\nposition = [0, 2, 0]\nradius = 0.1",
+            ),
+            &["`light.radius` is 0.1", "directional"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nposition = [0, inf, 0]"),
+            &["`light.position`", "finite"],
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nposition = [0, 2, 0]")
+                + "[medium]\nextinction = 0.1",
+            &["scene.toml:9:12", "`light.position`", "`[medium]`"],
+        ),
+        (
+            LEAST.replace("[light]", "[[light]]") + "[[light]]\ndirection = [0, 0, 0]",
+            &["scene.toml:10:13", "`light.direction`", "all three"],
+        ),
+        (
+            LEAST.replace("[light]", "[[light]]") + "[[light]]\nbrightness = 3",
+            &["light", "brightness"],
+        ),
+        (
+            LEAST.replace("[light]", "[[light]]")
+                + &"[[light]]\ndirection = [0, 1, 0]\n".repeat(16),
+            &["`light` is 17", "1 to 16"],
         ),
         (
             with("[shadow]\nmoment_bias = nan"),

@@ -24,6 +24,7 @@ fn tables(resolve: &'static str, sum: &'static str, size: u32) -> [Vec<u32>; 2] 
     // Penumbrae of so few texels that the table's sums wrap.
     let (scene, mesh) = scene("radius = 0.1", &format!("size = {size}"));
     let (mut graph, given, _) = graph_of(&scene, &mesh, Show::Light).unwrap();
+    let given = given[0];
     let depth = light_depth(&mut graph, &given).unwrap();
     let resolved = graph
         .compute("resolve", resolve)
@@ -111,7 +112,7 @@ fn soft_shadows_are_near_the_rays() {
 /// The scene with the light's middle alone.
 fn point(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    scene.area.radius = 0.0;
+    scene.lights[0].area.radius = 0.0;
     scene
 }
 

@@ -10,7 +10,7 @@ use hankel_frames::graph::{Graph, Handle, Surfaces};
 use hankel_frames::measure::Choices;
 use hankel_frames::passes::TRANSLUCENT;
 use hankel_frames::plan::{Wanted, plan};
-use hankel_frames::scene::{Fit, Mesh, Scene};
+use hankel_frames::scene::{Fit, Light, Mesh, Scene};
 use hankel_frames::techniques::Technique;
 use hankel_frames::truth::{Arriving, by_rays, by_technique, filtered};
 use hankel_frames::visibility::cast::{Caster, Segment};
@@ -503,16 +503,16 @@ fn devices_agree_and_the_order_follows_the_light() {
     println!("devices: {errors}");
     assert!(errors.rms < 0.01 && errors.percentile_99 < 0.02, "{errors}");
 
-    let turned = Vec3::new(0.5, 0.6, -0.3).normalize();
+    let turned = Light::directional(Vec3::new(0.5, 0.6, -0.3));
     let mut device = NativeDevice::new();
     let mut frame = Frame::new(&mut device, &NoShaders, &scene, &mesh, Show::Light).unwrap();
     frame.run(Clock::Frame, &mut Quiet).unwrap();
-    frame.set_light(turned).unwrap();
+    frame.set_light(0, &turned).unwrap();
     frame.run(Clock::Frame, &mut Quiet).unwrap();
     let moved = frame.linear().unwrap();
     drop(frame);
     let made_for = Scene {
-        light: turned,
+        lights: vec![turned],
         ..scene
     };
     let mut frame = Frame::new(&mut device, &NoShaders, &made_for, &mesh, Show::Light).unwrap();
@@ -575,6 +575,7 @@ fn a_plan_says_which_methods_cannot_show_glass() {
         sizes: vec![128],
         filters: vec![1],
         fits: vec![Fit::Scene],
+        ..Choices::default()
     };
     let wanted = Wanted {
         error: 0.5,

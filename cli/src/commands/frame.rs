@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hankel_codegen::build::{Generated, MANIFEST_FILE, check_output, write};
 use hankel_codegen::frame::{self, Draft, FRAME_FILE, Frame};
 use hankel_frames::scene::{Geometry, Scene};
-use hankel_frames::{FrameError, export, recorded};
+use hankel_frames::{FrameError, export, recorded, recorded_medium};
 use hankel_system::input;
 
 use super::build::{depend, tell};
@@ -65,6 +65,9 @@ pub fn build(args: &Build, file: &Path, quiet: bool) -> Result<Outcome> {
     Ok(Outcome::Fine)
 }
 
+/// What to do with a frame that says what is not known.
+const AGAIN: &str = "Build the frame again: another hankel wrote it, or it was edited.";
+
 /// What a folder with the frame of `file` must hold.
 pub fn expected(args: &Check, file: &Path, quiet: bool) -> Result<Generated> {
     refuse(&args.generate)?;
@@ -83,9 +86,21 @@ pub fn expected(args: &Check, file: &Path, quiet: bool) -> Result<Generated> {
                         record.shadow.depth_range,
                         record.shadow.fit
                     ),
-                    "Build the frame again: another hankel wrote it, or it was edited.",
+                    AGAIN,
                 )
             })?;
+            if let (Some(medium), Some(scattering)) = (&mut scene.medium, &record.scattering) {
+                *medium = recorded_medium(medium, scattering).ok_or_else(|| {
+                    Failure::input(
+                        format!(
+                            "{}: there is no technique of scattering {}",
+                            args.folder.join(FRAME_FILE).display(),
+                            scattering.technique
+                        ),
+                        AGAIN,
+                    )
+                })?;
+            }
         }
         Some(name) => scene.shadow = with_technique(scene.shadow, name)?,
     }

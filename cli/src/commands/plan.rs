@@ -1,5 +1,6 @@
 use hankel_frames::measure::Choices;
 use hankel_frames::plan::{Impossible, Plan, Wanted, plan};
+use hankel_frames::scattering::{self, Scattering};
 use hankel_frames::scene::{Fit, Mesh, Scene};
 use hankel_frames::techniques::{self, Technique};
 use hankel_host::device::{self, Device};
@@ -81,23 +82,50 @@ pub fn choices(args: &Choose) -> Result<Choices> {
         let named: Result<Vec<_>> = args.technique.iter().map(|name| technique(name)).collect();
         choices.techniques = named?;
     }
+    if !args.scattering.is_empty() {
+        let named: Result<Vec<_>> = args
+            .scattering
+            .iter()
+            .map(|name| scattering(name))
+            .collect();
+        choices.scatterings = named?;
+    }
+    if !args.steps.is_empty() {
+        choices.steps = sorted(args.steps.clone());
+    }
     let mut seen = Vec::new();
-    choices.techniques.retain(|t| {
-        let is_new = !seen.contains(&t.name);
-        seen.push(t.name);
-        is_new
-    });
+    choices.techniques.retain(|t| is_new(&mut seen, t.name));
+    let mut seen = Vec::new();
+    choices.scatterings.retain(|t| is_new(&mut seen, t.name));
     Ok(choices)
+}
+
+fn is_new(seen: &mut Vec<&'static str>, name: &'static str) -> bool {
+    let is_new = !seen.contains(&name);
+    seen.push(name);
+    is_new
+}
+
+/// The technique of scattering of a name.
+fn scattering(name: &str) -> Result<&'static Scattering> {
+    Scattering::named(name).ok_or_else(|| {
+        let names = scattering::ALL.map(|t| t.name).join(", ");
+        Failure::input(
+            format!("there is no technique of scattering {name}"),
+            format!("There are {names}."),
+        )
+    })
+}
+
+fn sorted(mut all: Vec<u32>) -> Vec<u32> {
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 /// The maps that were chosen, with all techniques.
 pub fn of_maps(args: &Maps) -> Choices {
     let mut choices = Choices::default();
-    let sorted = |mut all: Vec<u32>| {
-        all.sort_unstable();
-        all.dedup();
-        all
-    };
     if !args.size.is_empty() {
         choices.sizes = sorted(args.size.clone());
     }

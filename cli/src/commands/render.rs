@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::args::{Format, Render};
 use crate::commands::scene::Asked;
-use crate::failure::{Outcome, Result};
+use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
 use crate::session::Session;
@@ -41,6 +41,13 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         backend: args.backend,
     };
     let scene = asked.read(&args.scene)?;
+    let is_linear = is_exr(&args.out);
+    if is_linear && args.compare {
+        return Err(Failure::input(
+            format!("{}: --compare writes PNG files", args.out.display()),
+            "Name a file .png, or leave out --compare.",
+        ));
+    }
     let pictures = if args.compare {
         let (vulkan, difference) = (beside(&args.out, "vulkan"), beside(&args.out, "difference"));
         vec![args.out.clone(), vulkan, difference]
@@ -68,7 +75,13 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         let rendering = render(&scene, backend, &shaders, &mut progress)?;
         let errors = errors(args, &scene, &mut progress)?;
         drop(progress);
-        save([&rendering.picture], outputs)?;
+        if is_linear {
+            for output in outputs {
+                rendering.linear.save(output)?;
+            }
+        } else {
+            save([&rendering.picture], outputs)?;
+        }
         let told = Told {
             pictures,
             renderings: &[&rendering],
@@ -121,6 +134,12 @@ fn save<const N: usize>(pictures: [&Picture; N], outputs: Vec<Output>) -> Result
         picture.save(output)?;
     }
     Ok(())
+}
+
+/// Whether a file is to hold linear light.
+fn is_exr(out: &Path) -> bool {
+    out.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
 }
 
 /// `scan.png` and `vulkan` to `scan-vulkan.png`.

@@ -5,11 +5,10 @@ use std::time::{Duration, Instant};
 use hankel_codegen::files::sha256;
 use hankel_frames::measure::growth::growth;
 use hankel_frames::measure::{
-    Ask, Choices, Configuration, Measurement, Session, Status, Subject, median, sample,
+    Ask, Choices, Configuration, Measurement, Pictures, Session, Status, Subject, median, sample,
 };
 use hankel_frames::plan::{Wanted, plan};
 use hankel_frames::scene::Scene;
-use hankel_frames::truth::by_technique_on;
 use hankel_frames::{FrameError, Picture};
 use hankel_host::device::Device;
 use hankel_numerics::report::{
@@ -87,11 +86,13 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
     );
     report.fact("device", bench.device.name());
     report.fact("rounds", args.rounds);
-    report.fact("configurations of each scene", ask.configurations.len());
+    let most = all.iter().map(Vec::len).max().unwrap_or(0);
+    report.fact("configurations of a scene, at most", most);
     report.notes.push(
         "Times are medians of interleaved rounds, each after a run of the same frame. The error is the \
          root mean square of the light that arrives (1 minus the shadow) against 256 rays through each \
-         pixel, over all pixels."
+         pixel, over all pixels. In a scene with a medium it is the light that comes through that, with what \
+         the medium scatters: phase function and absorption are left out, so that it is from 0 to 1."
             .into(),
     );
     let mut fine = true;
@@ -101,6 +102,9 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
         report.tables.push(table);
     }
     report.tables.push(fronts(&all));
+    if all.iter().flatten().any(|m| m.scattered.is_some()) {
+        report.tables.push(scattered(&all));
+    }
     report.tables.push(gain_of_fit(&all));
     report.tables.push(doubling(&all));
     report.tables.push(growths(&all));
@@ -210,6 +214,7 @@ fn identity() -> Vec<Column> {
         Column::count("size"),
         Column::count("taps"),
         Column::text("map holds"),
+        Column::text("scattering"),
     ]
 }
 
@@ -222,7 +227,69 @@ fn identified(m: &Measurement) -> Vec<Cell> {
         (c.size as usize).into(),
         (c.filter as usize).into(),
         c.fit.name().into(),
+        scattering_of(c).as_str().into(),
     ]
+}
+
+/// How a medium's light is made; nothing without one.
+fn scattering_of(c: &Configuration) -> String {
+    c.scattering.map_or_else(String::new, |s| s.to_string())
+}
+
+/// What a medium scatters, by each way to make it: whatever the technique of shadows is.
+fn scattered(all: &[Vec<Measurement>]) -> Table {
+    let mut table = Table::new(
+        "scattering",
+        "What media scatter, by each way to make it, against rays: the error of that alone, and the time of the \
+         fastest frame that has it",
+        [
+            Column::text("scene"),
+            Column::text("picture"),
+            Column::text("scattering"),
+            Column::count("size"),
+            Column::count("taps"),
+            Column::text("map holds"),
+            Column::fixed("rms", 4),
+            Column::fixed("99 %", 3),
+            Column::fixed("worst", 3),
+            Column::number("time").of("ms"),
+            Column::text("with"),
+        ],
+    );
+    for of_subject in all {
+        let mut told: Vec<Configuration> = Vec::new();
+        for m in of_subject {
+            let Some(errors) = m.scattered else {
+                continue;
+            };
+            let c = &m.configuration;
+            let is_same = |other: &Configuration| {
+                (other.scattering, other.size, other.filter, other.fit)
+                    == (c.scattering, c.size, c.filter, c.fit)
+            };
+            if told.iter().any(is_same) {
+                continue;
+            }
+            told.push(*c);
+            let alike = of_subject.iter().filter(|m| is_same(&m.configuration));
+            let fastest = alike.min_by(|a, b| a.seconds().total_cmp(&b.seconds()));
+            let fastest = fastest.unwrap_or(m);
+            table.push([
+                m.scene.as_str().into(),
+                output_of(m).as_str().into(),
+                scattering_of(c).as_str().into(),
+                (c.size as usize).into(),
+                (c.filter as usize).into(),
+                c.fit.name().into(),
+                errors.rms.into(),
+                errors.percentile_99.into(),
+                errors.worst.into(),
+                millis(fastest.seconds()).into(),
+                fastest.configuration.method().as_str().into(),
+            ]);
+        }
+    }
+    table
 }
 
 fn figures() -> Vec<Column> {
@@ -505,11 +572,12 @@ impl Bench<'_> {
             "rays".into(),
             format!("frames-{stem}-rays.png"),
         )?;
+        let mut pictures = Pictures::default();
         for (i, m) in front(of_subject).into_iter().enumerate() {
             let m = &of_subject[m];
-            let scene = m.configuration.on(&subject.scene);
             let (device, shaders) = (&mut *self.device, &self.shaders);
-            let light = by_technique_on(device, shaders, &scene, &subject.mesh)?;
+            let (scene, mesh) = (&subject.scene, &subject.mesh);
+            let light = pictures.light(device, shaders, scene, mesh, &m.configuration)?;
             let (name, rms) = (m.configuration, m.errors.rms);
             add(
                 &light.picture(),

@@ -56,6 +56,14 @@ pub enum GraphError {
         /// What does not fit, and what would.
         problem: String,
     },
+    /// A light that the scene's technique, or its medium, is not for.
+    #[error("light {number}, `position`: {problem}")]
+    Light {
+        /// Which of the scene's lights, from 1.
+        number: usize,
+        /// What to do.
+        problem: String,
+    },
     /// A texture that cannot hold what it is filled with.
     #[error("`{value}`: its texels are {format}, which are integers: make it with `cleared`")]
     Fill {

@@ -39,7 +39,7 @@ impl Against {
 /// How the time of a pass grows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Growth {
-    /// The technique and its map.
+    /// The technique and its map, and how a medium's light is made.
     pub method: String,
     /// The pass.
     pub pass: String,
@@ -74,7 +74,7 @@ pub fn growth(measurements: &[Measurement]) -> Vec<Growth> {
     let mut all = Vec::new();
     let mut methods: Vec<String> = Vec::new();
     for m in measurements {
-        let method = m.configuration.method();
+        let method = m.configuration.way();
         if !methods.contains(&method) {
             methods.push(method);
         }
@@ -82,7 +82,7 @@ pub fn growth(measurements: &[Measurement]) -> Vec<Growth> {
     for method in methods {
         let of_method: Vec<&Measurement> = measurements
             .iter()
-            .filter(|m| m.configuration.method() == method)
+            .filter(|m| m.configuration.way() == method)
             .collect();
         let mut passes: Vec<&str> = Vec::new();
         for m in &of_method {
@@ -193,6 +193,8 @@ mod tests {
             sizes: vec![128, 256, 512],
             filters: vec![1, 3, 5, 9],
             fits: vec![Fit::Scene],
+            scatterings: Vec::new(),
+            steps: Vec::new(),
         };
         let mut all = Vec::new();
         for output in [[64, 32], [128, 64]] {
@@ -231,6 +233,7 @@ mod tests {
                         wrongly_lit: 0.0,
                         wrongly_dark: 0.0,
                     },
+                    scattered: None,
                     bytes: 0,
                     rounds: vec![slow, passes, fast],
                 });

@@ -5,6 +5,7 @@
 //! session that was ended goes on where it was. [`growth`] says how times grow.
 
 pub mod growth;
+mod pictures;
 mod session;
 mod store;
 
@@ -15,11 +16,13 @@ use hankel_host::device::Device;
 use crate::error::Result;
 use crate::executor::{Clock, Quiet, Shaders, Timing};
 use crate::frame::{Frame, Show};
-use crate::scene::{Fit, Mesh, Scene, Shadow};
+use crate::scattering::{self, Scattering};
+use crate::scene::{Fit, Medium, Mesh, Scene, Shadow};
 use crate::techniques::{self, Map, Technique};
 #[cfg(doc)]
 use crate::truth;
 
+pub use pictures::Pictures;
 pub use session::{Ask, Measurement, Session, Status, Subject};
 pub use store::StoreError;
 
@@ -36,10 +39,31 @@ pub struct Configuration {
     pub filter: u32,
     /// What the map holds.
     pub fit: Fit,
+    /// How a medium's light is made; without one, the scene has no medium.
+    pub scattering: Option<Scattered>,
+}
+
+/// A way to make what a medium scatters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scattered {
+    /// How its light is computed.
+    pub technique: &'static Scattering,
+    /// Steps along each ray, of techniques that march along rays.
+    pub steps: u32,
+}
+
+impl fmt::Display for Scattered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.technique.name)?;
+        match self.technique.has_steps {
+            true => write!(f, ", {} steps", self.steps),
+            false => Ok(()),
+        }
+    }
 }
 
 impl Configuration {
-    /// The technique and its map, without sizes.
+    /// The technique and its map, without sizes; how a medium's light is made is another matter.
     #[must_use]
     pub fn method(&self) -> String {
         let (format, range) = (self.map.format.name(), self.map.depth_range.name());
@@ -55,17 +79,50 @@ impl Configuration {
         name
     }
 
-    /// Whether it is meant for a scene's light.
+    /// The technique and its map, and how a medium's light is made, without sizes.
+    #[must_use]
+    pub fn way(&self) -> String {
+        match &self.scattering {
+            Some(scattering) => format!("{}; {scattering}", self.method()),
+            None => self.method(),
+        }
+    }
+
+    /// Whether it is meant for a scene's lights and its medium.
     #[must_use]
     pub fn suits(&self, scene: &Scene) -> bool {
-        !self.technique.is_soft || scene.area.radius > 0.0
+        let has_medium = scene.medium.is_some();
+        let mut lights = scene.lights.iter();
+        let is_scattered = self.scattering.is_some();
+        let has_area = lights.any(|light| light.area.radius > 0.0);
+        let mut lights = scene.lights.iter();
+        let is_refused = lights.any(|l| l.refuses(has_medium, self.technique).is_some());
+        (!self.technique.is_soft || has_area) && !is_refused && is_scattered == has_medium
+    }
+
+    /// The same without what there is of a medium.
+    #[must_use]
+    pub const fn without_scattering(&self) -> Self {
+        Self {
+            scattering: None,
+            ..*self
+        }
     }
 
     /// A scene with these shadows. What else the scene says of them, biases for example, was for
     /// another technique: it is as the technique has it.
     #[must_use]
     pub fn on(&self, scene: &Scene) -> Scene {
+        let with = |medium: Medium| match self.scattering {
+            Some(Scattered { technique, steps }) => Medium {
+                technique,
+                steps,
+                ..medium
+            },
+            None => medium,
+        };
         Scene {
+            medium: scene.medium.map(with),
             shadow: Shadow {
                 size: self.size,
                 filter: self.filter,
@@ -89,6 +146,10 @@ impl fmt::Display for Configuration {
         match self.fit {
             Fit::Scene => Ok(()),
             Fit::Camera => f.write_str(", fitted"),
+        }?;
+        match &self.scattering {
+            Some(scattering) => write!(f, "; {scattering}"),
+            None => Ok(()),
         }
     }
 }
@@ -104,25 +165,62 @@ pub struct Choices {
     pub filters: Vec<u32>,
     /// What the map holds.
     pub fits: Vec<Fit>,
+    /// Techniques of scattering, for scenes with a medium.
+    pub scatterings: Vec<&'static Scattering>,
+    /// Steps along each ray, of those that march along rays.
+    pub steps: Vec<u32>,
 }
 
 impl Default for Choices {
     /// All techniques, from 256² to 2048² texels, up to 9 x 9 taps, maps of the whole scene and fitted
-    /// ones.
+    /// ones; of scattering all techniques, with 8, 32 and 128 steps.
     fn default() -> Self {
         Self {
             techniques: techniques::ALL.to_vec(),
             sizes: vec![256, 512, 1024, 2048],
             filters: vec![1, 3, 5, 9],
             fits: vec![Fit::Scene, Fit::Camera],
+            scatterings: scattering::ALL.to_vec(),
+            steps: vec![8, 32, 128],
         }
     }
 }
 
 impl Choices {
-    /// All of them. Soft shadows have no filter: each once, with the narrowest.
+    /// The ways to make what a medium scatters.
+    #[must_use]
+    pub fn scattered(&self) -> Vec<Scattered> {
+        let mut all = Vec::new();
+        for &technique in &self.scatterings {
+            let count = if technique.has_steps {
+                self.steps.len()
+            } else {
+                1
+            };
+            let steps = self.steps.iter().take(count);
+            all.extend(steps.map(|&steps| Scattered { technique, steps }));
+        }
+        all
+    }
+
+    /// All of them: those for scenes without a medium, and each of these with each way to make what a medium
+    /// scatters. [`Configuration::suits`] tells them apart.
     #[must_use]
     pub fn configurations(&self) -> Vec<Configuration> {
+        let shadows = self.shadows();
+        let mut all = shadows.clone();
+        for scattering in self.scattered() {
+            let with = |c: &Configuration| Configuration {
+                scattering: Some(scattering),
+                ..*c
+            };
+            all.extend(shadows.iter().map(with));
+        }
+        all
+    }
+
+    /// Those without a medium. Soft shadows have no filter: each once, with the narrowest.
+    fn shadows(&self) -> Vec<Configuration> {
         let mut all = Vec::new();
         let narrowest: Vec<u32> = self.filters.iter().copied().min().into_iter().collect();
         for &technique in &self.techniques {
@@ -141,6 +239,7 @@ impl Choices {
                                 size,
                                 filter,
                                 fit,
+                                scattering: None,
                             });
                         }
                     }
@@ -179,7 +278,7 @@ pub fn sample(
     scene: &Scene,
     mesh: &Mesh,
 ) -> Result<Sample> {
-    let mut frame = Frame::new(device, shaders, scene, mesh, Show::Picture)?;
+    let mut frame = Frame::still(device, shaders, scene, mesh, Show::Picture)?;
     frame.run(Clock::Frame, &mut Quiet)?;
     let passes = frame.executor().steady(1)?;
     Ok(Sample {
@@ -209,6 +308,8 @@ mod tests {
         assert_eq!(names.len(), all.len());
         assert!(names.contains("hamburger rgba16unorm symmetric, 512², 3 taps, fitted"));
         assert!(names.contains("pcf, 2048², no filter"));
+        assert!(names.contains("pcf, 2048², no filter; prefiltered"));
+        assert!(names.contains("esm, 256², 9 taps, fitted; ray-marching, 8 steps"));
     }
 
     #[test]

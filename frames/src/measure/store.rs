@@ -61,6 +61,9 @@ pub(super) enum Line {
         subject: String,
         configuration: String,
         errors: Errors,
+        /// Of what its medium scatters alone.
+        #[serde(skip_serializing_if = "Option::is_none", default)]
+        scattered: Option<Errors>,
         bytes: usize,
     },
     /// One round's times.

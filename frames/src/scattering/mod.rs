@@ -15,6 +15,8 @@ pub struct Scattering {
     pub name: &'static str,
     /// What it is, in a few words.
     pub summary: &'static str,
+    /// Whether it looks at so many places along each ray as the scene says.
+    pub has_steps: bool,
     /// Adds its passes: what the camera sees of a picture of surfaces through the medium.
     pub add: fn(&mut Graph, &Given, &Volume, Handle) -> Result<Handle>,
 }

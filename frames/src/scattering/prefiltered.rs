@@ -12,12 +12,14 @@ use crate::scene::Shadow;
 pub const FOUR: Scattering = Scattering {
     name: "prefiltered",
     summary: "prefiltered single scattering, four moments",
+    has_steps: false,
     add: add_four,
 };
 
 pub const SIX: Scattering = Scattering {
     name: "prefiltered-6",
     summary: "prefiltered single scattering, six moments",
+    has_steps: false,
     add: add_six,
 };
 

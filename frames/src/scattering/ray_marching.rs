@@ -7,6 +7,7 @@ use crate::passes::{Given, Volume, light_depth, scatter};
 pub const TECHNIQUE: Scattering = Scattering {
     name: "ray-marching",
     summary: "steps along each ray, each with a lookup in the shadow map",
+    has_steps: true,
     add,
 };
 

@@ -1,6 +1,6 @@
 //! Triangles with normals.
 
-use hankel_dsl::glam::{Affine3A, Mat3A, Vec3};
+use hankel_dsl::glam::{Affine3A, DVec3, Mat3A, Vec3};
 
 /// Indexed triangles in world space: metres or any other unit, y up, right-handed. Front faces
 /// wind counter-clockwise; both sides are seen and cast shadows.
@@ -94,16 +94,22 @@ impl Mesh {
     /// The translucent triangles from the farthest to the nearest as seen along a direction, by their middles.
     #[must_use]
     pub fn translucent_along(&self, direction: Vec3) -> Vec<[u32; 3]> {
+        self.translucent_by(|place| place.dot(direction.as_dvec3()))
+    }
+
+    /// The same for what is seen from a place, by its distance.
+    #[must_use]
+    pub fn translucent_from(&self, position: Vec3) -> Vec<[u32; 3]> {
+        self.translucent_by(|place| place.distance(position.as_dvec3()))
+    }
+
+    fn translucent_by(&self, depth: impl Fn(DVec3) -> f64) -> Vec<[u32; 3]> {
         let mut triangles = self.translucent();
-        let depth = |t: &[u32; 3]| -> f64 {
-            let along = |v: &u32| {
-                self.positions[*v as usize]
-                    .as_dvec3()
-                    .dot(direction.as_dvec3())
-            };
-            t.iter().map(along).sum()
+        let of = |t: &[u32; 3]| -> f64 {
+            let corner = |v: &u32| depth(self.positions[*v as usize].as_dvec3());
+            t.iter().map(corner).sum()
         };
-        triangles.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
+        triangles.sort_by(|a, b| of(b).total_cmp(&of(a)));
         triangles
     }
 

@@ -16,8 +16,18 @@
 //!
 //! [light]
 //! direction = [-0.5, -0.8, -0.3]  # the way the light goes
+//! strength = 1.0                  # default; irradiance of what faces the light, times 1.15
+//! colour = [1.0, 1.0, 1.0]        # default; linear, 0 to 1
 //! radius = 0.02                   # of the light, as seen: the tangent of the angle; 0: a point, default
 //! shape = "disc"                  # default; or "square"
+//!
+//! # A spot light: [light] with these; `strength` is that at a distance of 1.
+//! # position = [0.0, 3.0, 0.0]
+//! # direction = [0.0, -1.0, 0.0]
+//! # angle = 60.0                  # of its cone, from edge to edge, degrees
+//! # inner = 48.0                  # of what does not fade; 0.8 of the angle, default
+//!
+//! # Several lights: [[light]] for each.
 //!
 //! [shadow]
 //! technique = "hamburger"         # or another of `techniques::ALL`
@@ -47,6 +57,7 @@
 //! what it may be. The frame does not fail on a scene that was read.
 
 mod error;
+mod light;
 mod mesh;
 mod model;
 mod procedural;
@@ -63,6 +74,7 @@ use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
 
 pub use error::{Place, Result, SceneError};
+pub use light::{Area, AreaShape, Light, Source, Spot};
 pub use mesh::{Bounds, Mesh};
 pub use model::MAX_TRIANGLES;
 pub use procedural::Procedural;
@@ -78,10 +90,8 @@ pub struct Scene {
     pub geometry: Geometry,
     /// Who looks.
     pub camera: Camera,
-    /// The way the light goes; unit length.
-    pub light: Vec3,
-    /// How large the light is.
-    pub area: Area,
+    /// What shines: one light to [`Scene::MAX_LIGHTS`].
+    pub lights: Vec<Light>,
     /// What fills the space between surfaces, if anything does.
     pub medium: Option<Medium>,
     /// How shadows are made.
@@ -120,52 +130,6 @@ pub struct Camera {
     pub up: Vec3,
     /// Vertical field of view in degrees, 1 to 170.
     pub fov: f32,
-}
-
-/// What of the sky a light fills, around the direction that it comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Area {
-    /// Its half width: the tangent of the angle between its middle and the middle of its edge, 0 (a
-    /// point) to [`Area::MAX_RADIUS`]. The sun has 0.0047.
-    pub radius: f32,
-    /// Its outline.
-    pub shape: AreaShape,
-}
-
-/// The outline of a light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum AreaShape {
-    /// A disc.
-    #[default]
-    Disc,
-    /// A square whose edges are along those of the shadow map.
-    Square,
-}
-
-impl Area {
-    /// The largest half width: 45 degrees to each side.
-    pub const MAX_RADIUS: f32 = 1.0;
-
-    /// A point of the light, in units of its half width, for a point of the unit square: what is
-    /// uniform there is uniform on the light. A disc's is Shirley and Chiu's concentric map.
-    #[must_use]
-    pub fn point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (x, y) = (2.0 * x - 1.0, 2.0 * y - 1.0);
-        if self.shape == AreaShape::Square {
-            return [x, y];
-        }
-        let (radius, part, turn) = if x.abs() > y.abs() {
-            (x, y / x, 0.0)
-        } else if y == 0.0 {
-            (0.0, 0.0, 0.0)
-        } else {
-            // A quarter turn on, and backwards.
-            (y, -x / y, std::f64::consts::FRAC_PI_2)
-        };
-        let (sin, cos) = (part * std::f64::consts::FRAC_PI_4 + turn).sin_cos();
-        [radius * cos, radius * sin]
-    }
 }
 
 /// A homogeneous medium that a light shines through. It ends with what the camera sees, or at the far plane of
@@ -299,6 +263,8 @@ impl Shadow {
 }
 
 impl Scene {
+    /// Most lights.
+    pub const MAX_LIGHTS: usize = 16;
     /// Most bytes of a scene file.
     pub const MAX_BYTES: u64 = 1 << 20;
     /// Most pixels along an edge of the picture.

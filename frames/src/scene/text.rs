@@ -1,16 +1,19 @@
 //! From TOML to a checked scene.
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
-use serde::Deserialize;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
 use super::error::{Place, Result, SceneError};
 use super::{
-    Area, AreaShape, Camera, DepthRange, FAR_OFF, Fit, Geometry, Medium, Procedural, Scene, Shadow,
+    Area, AreaShape, Camera, DepthRange, FAR_OFF, Fit, Geometry, Light, Medium, Procedural, Scene,
+    Shadow, Source, Spot,
 };
 use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
@@ -20,7 +23,7 @@ use crate::techniques::{self, Map, Technique};
 struct File {
     geometry: Spanned<GeometryText>,
     camera: CameraText,
-    light: LightText,
+    light: Spanned<Lights>,
     medium: Option<MediumText>,
     #[serde(default)]
     shadow: ShadowText,
@@ -50,9 +53,51 @@ struct CameraText {
 #[serde(deny_unknown_fields)]
 struct LightText {
     direction: Spanned<[f32; 3]>,
+    position: Option<Spanned<[f32; 3]>>,
+    angle: Option<Spanned<f32>>,
+    inner: Option<Spanned<f32>>,
+    strength: Option<Spanned<f32>>,
+    colour: Option<Spanned<[f32; 3]>>,
     radius: Option<Spanned<f32>>,
-    #[serde(default)]
-    shape: AreaShape,
+    shape: Option<Spanned<AreaShape>>,
+}
+
+/// One table `[light]`, or several `[[light]]`.
+struct Lights(Vec<LightText>);
+
+impl<'de> Deserialize<'de> for Lights {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Tables;
+
+        impl<'de> Visitor<'de> for Tables {
+            type Value = Lights;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table `[light]`, or several `[[light]]`")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                map: A,
+            ) -> std::result::Result<Self::Value, A::Error> {
+                let light = LightText::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(Lights(vec![light]))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(
+                self,
+                mut seq: A,
+            ) -> std::result::Result<Self::Value, A::Error> {
+                let mut lights = Vec::new();
+                while let Some(light) = seq.next_element()? {
+                    lights.push(light);
+                }
+                Ok(Lights(lights))
+            }
+        }
+
+        deserializer.deserialize_any(Tables)
+    }
 }
 
 #[derive(Deserialize)]
@@ -138,7 +183,9 @@ impl Reader<'_> {
         let table = self.text[..line_start]
             .lines()
             .rev()
-            .find_map(|l| l.trim().strip_prefix('[')?.split(']').next());
+            .find_map(|l| l.trim().strip_prefix('[')?.split(']').next())
+            // Of several lights, each has a table `[[light]]`.
+            .map(|table| table.trim_start_matches('['));
         match (table, line.split_once('=')) {
             (Some(table), Some((key, _))) => format!("`{table}.{}`: {message}", key.trim()),
             (None, Some((key, _))) => format!("`{}`: {message}", key.trim()),
@@ -414,6 +461,98 @@ impl Reader<'_> {
         })
     }
 
+    fn light(&self, l: LightText) -> Result<Light> {
+        let direction = self.direction("light.direction", &l.direction)?;
+        let area = Area {
+            shape: l
+                .shape
+                .as_ref()
+                .map_or_else(AreaShape::default, |s| *s.get_ref()),
+            radius: self.number(
+                "light.radius",
+                l.radius.clone(),
+                0.0,
+                0.0..=Area::MAX_RADIUS,
+            )?,
+        };
+        let source = match &l.position {
+            None => {
+                for (field, given) in [("light.angle", &l.angle), ("light.inner", &l.inner)] {
+                    if let Some(given) = given {
+                        let allowed =
+                            "left out: only a spot light, which has a `position`, has a cone";
+                        return self.refuse(given.span(), field, given.get_ref(), allowed);
+                    }
+                }
+                Source::Directional { direction }
+            }
+            Some(position) => {
+                if let Some(radius) = l.radius.filter(|_| area.radius > 0.0) {
+                    let allowed = "left out, or 0: soft shadows are those of directional lights";
+                    return self.refuse(radius.span(), "light.radius", area.radius, allowed);
+                }
+                let angle = self.number("light.angle", l.angle, 60.0, 1.0..=Spot::MAX_ANGLE)?;
+                let place = l.inner.as_ref().map_or(0..0, Spanned::span);
+                let inner = self.number("light.inner", l.inner, 0.8 * angle, 0.0..=angle)?;
+                if inner > 0.999 * angle {
+                    let allowed = format!("less than 0.999 of `light.angle`, which is {angle}");
+                    return self.refuse(place, "light.inner", inner, allowed);
+                }
+                Source::Spot(Spot {
+                    position: self.point("light.position", position)?,
+                    direction,
+                    angle,
+                    inner,
+                })
+            }
+        };
+        let colour = match &l.colour {
+            Some(given) => {
+                let colour = Vec3::from_array(*given.get_ref());
+                if !(colour.min_element() >= 0.0 && colour.max_element() <= 1.0) {
+                    let allowed = "three numbers from 0 to 1: `light.strength` has no such limit";
+                    return self.refuse(given.span(), "light.colour", colour, allowed);
+                }
+                colour
+            }
+            None => Vec3::ONE,
+        };
+        Ok(Light {
+            source,
+            area,
+            strength: self.number("light.strength", l.strength, 1.0, 0.0..=Light::MAX_STRENGTH)?,
+            colour,
+        })
+    }
+
+    fn lights(
+        &self,
+        given: Spanned<Lights>,
+        has_medium: bool,
+        shadow: &Shadow,
+    ) -> Result<Vec<Light>> {
+        let span = given.span();
+        let Lights(tables) = given.into_inner();
+        if !(1..=Scene::MAX_LIGHTS).contains(&tables.len()) {
+            let allowed = format!("1 to {} tables `[[light]]`", Scene::MAX_LIGHTS);
+            return self.refuse(span, "light", tables.len(), allowed);
+        }
+        let mut lights = Vec::with_capacity(tables.len());
+        for table in tables {
+            let place = table
+                .position
+                .as_ref()
+                .map_or_else(|| span.clone(), Spanned::span);
+            let light = self.light(table)?;
+            if let Some(why) = light.refuses(has_medium, shadow.technique) {
+                let position = light.spot().map_or(Vec3::ZERO, |spot| spot.position);
+                return self.refuse(place, "light.position", position, why);
+            }
+            lights.push(light);
+        }
+        Ok(lights)
+    }
+
     fn medium(&self, m: MediumText) -> Result<Medium> {
         let d = Medium::default();
         let extinction = self.number("medium.extinction", Some(m.extinction), 0.0, 1e-6..=1e6)?;
@@ -455,16 +594,13 @@ impl Reader<'_> {
         let fov = f.camera.fov.take();
         let [width, height] = Scene::DEFAULT_OUTPUT;
         let pixels = 1..=Scene::MAX_OUTPUT;
+        let shadow = self.shadow(f.shadow)?;
         Ok(Scene {
             geometry: self.geometry(f.geometry)?,
             camera: self.camera(&f.camera, fov)?,
-            light: self.direction("light.direction", &f.light.direction)?,
-            area: Area {
-                radius: self.number("light.radius", f.light.radius, 0.0, 0.0..=Area::MAX_RADIUS)?,
-                shape: f.light.shape,
-            },
+            lights: self.lights(f.light, f.medium.is_some(), &shadow)?,
             medium: f.medium.map(|m| self.medium(m)).transpose()?,
-            shadow: self.shadow(f.shadow)?,
+            shadow,
             width: self.integer("output.width", f.output.width, width, pixels.clone())?,
             height: self.integer("output.height", f.output.height, height, pixels)?,
         })

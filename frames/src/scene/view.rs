@@ -2,10 +2,10 @@
 
 use hankel_dsl::glam::camera::rh::proj::directx::perspective;
 use hankel_dsl::glam::camera::rh::view::look_at_mat4;
-use hankel_dsl::glam::{DVec3, DVec4, Mat4, Vec3, Vec4};
+use hankel_dsl::glam::{DMat4, DVec3, DVec4, Mat4, Vec3, Vec4};
 
-use super::Camera;
 use super::mesh::Mesh;
+use super::{Camera, Spot};
 
 /// What the camera sees of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,17 +21,20 @@ pub struct CameraView {
     pub range: [f32; 2],
 }
 
-/// What a directional light sees of a mesh.
+/// What a light sees of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightView {
-    /// From the world to clip space, orthographic: depth is linear, and all of the mesh lies
-    /// strictly within.
+    /// From the world to clip space. Of a directional light it is orthographic: depth is linear, and all of the
+    /// mesh lies strictly within. Of a spot light it is perspective, and holds what lies within the cone.
     pub clip_from_world: Mat4,
     /// The way the light goes; unit length.
     pub direction: Vec3,
     /// What depth 0 to 1 is in world units.
     pub depth: f32,
-    /// Edge of a texel in world units, along the map's x and y.
+    /// By how much the depth changes from 0 to 1 where w is 1, as a multiple of how it changes on the mean: 1 of an
+    /// orthographic view. It falls with the square of w.
+    pub slope: f32,
+    /// Edge of a texel in world units, along the map's x and y; of a spot light at the far end of its depth.
     pub texel: [f32; 2],
 }
 
@@ -88,29 +91,35 @@ impl CameraView {
     }
 
     /// The corners of what is left of a triangle within the view: at least three, or none.
-    fn clipped(&self, corners: [Vec3; 3]) -> Vec<DVec3> {
-        let clip = self.clip_from_world.as_dmat4();
-        let mut polygon: Vec<(DVec3, DVec4)> = corners
-            .iter()
-            .map(|p| (p.as_dvec3(), clip * p.as_dvec3().extend(1.0)))
-            .collect();
-        for plane in CLIP {
-            let mut within = Vec::with_capacity(polygon.len() + 1);
-            for (i, b) in polygon.iter().enumerate() {
-                let a = &polygon[(i + polygon.len() - 1) % polygon.len()];
-                let (da, db) = (plane.dot(a.1), plane.dot(b.1));
-                if (da < 0.0) != (db < 0.0) {
-                    let t = da / (da - db);
-                    within.push((a.0.lerp(b.0, t), a.1.lerp(b.1, t)));
-                }
-                if db >= 0.0 {
-                    within.push(*b);
-                }
-            }
-            polygon = within;
-        }
-        polygon.into_iter().map(|(p, _)| p).collect()
+    #[must_use]
+    pub fn clipped(&self, corners: [Vec3; 3]) -> Vec<DVec3> {
+        let corners = corners.map(Vec3::as_dvec3);
+        clipped(&self.clip_from_world.as_dmat4(), corners.to_vec())
     }
+}
+
+/// The corners of what is left of a convex polygon within a view: at least three, or none.
+fn clipped(clip_from_world: &DMat4, corners: Vec<DVec3>) -> Vec<DVec3> {
+    let corners = corners.into_iter();
+    let mut polygon: Vec<(DVec3, DVec4)> = corners
+        .map(|p| (p, *clip_from_world * p.extend(1.0)))
+        .collect();
+    for plane in CLIP {
+        let mut within = Vec::with_capacity(polygon.len() + 1);
+        for (i, b) in polygon.iter().enumerate() {
+            let a = &polygon[(i + polygon.len() - 1) % polygon.len()];
+            let (da, db) = (plane.dot(a.1), plane.dot(b.1));
+            if (da < 0.0) != (db < 0.0) {
+                let t = da / (da - db);
+                within.push((a.0.lerp(b.0, t), a.1.lerp(b.1, t)));
+            }
+            if db >= 0.0 {
+                within.push(*b);
+            }
+        }
+        polygon = within;
+    }
+    polygon.into_iter().map(|(p, _)| p).collect()
 }
 
 /// A box along three axes, empty at first.
@@ -247,7 +256,137 @@ impl LightView {
             clip_from_world: Mat4::from_cols(rows[0], rows[1], rows[2], Vec4::W).transpose(),
             direction: axes[2].as_vec3(),
             depth: extent[2] as f32,
+            slope: 1.0,
             texel: [0, 1].map(|i| (extent[i] / f64::from(size)) as f32),
+        }
+    }
+}
+
+/// A spot light's near plane is no nearer than this share of the scene's size: what is nearer to it casts no shadow.
+const NEAREST: f64 = 1e-3;
+/// What lies within the map keeps off depths 0 and 1 by this much, as with a directional light: moments close to the
+/// ends are delicate, and rounding puts nothing beyond them.
+const SPARE: f64 = 0.005;
+
+/// A frustum of a spot light: tangents to the right and up, and distances along its axis.
+struct Frustum {
+    axes: [DVec3; 3],
+    position: DVec3,
+    within: Extent,
+}
+
+impl Frustum {
+    /// Coordinates as in `within`.
+    fn seen(&self, place: DVec3) -> [f64; 3] {
+        let [x, y, z] = self.axes.map(|axis| axis.dot(place - self.position));
+        [x / z, y / z, z]
+    }
+
+    fn clip_from_world(&self) -> DMat4 {
+        let Extent { low, high } = self.within;
+        let [right, up, along] = self.axes;
+        let row = |axis: DVec3, offset: f64| axis.extend(offset - axis.dot(self.position));
+        let across = |i: usize, axis: DVec3| {
+            let wide = high[i] - low[i];
+            row(
+                axis * (2.0 / wide) - along * ((high[i] + low[i]) / wide),
+                0.0,
+            )
+        };
+        let (near, far) = (low[2], high[2]);
+        let rows = [
+            across(0, right),
+            across(1, up),
+            row(along * (far / (far - near)), -far * near / (far - near)),
+            row(along, 0.0),
+        ];
+        DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
+    }
+
+    /// What of these polygons lies within.
+    fn extent(&self, polygons: impl Iterator<Item = Vec<DVec3>>) -> Extent {
+        let clip = self.clip_from_world();
+        let mut extent = Extent::NONE;
+        for place in polygons.flat_map(|polygon| clipped(&clip, polygon)) {
+            for (i, x) in self.seen(place).into_iter().enumerate() {
+                extent.low[i] = extent.low[i].min(x);
+                extent.high[i] = extent.high[i].max(x);
+            }
+        }
+        extent
+    }
+}
+
+impl LightView {
+    /// What a spot light sees of a mesh within its cone, with `margin` texels left free at each side for the filter;
+    /// only what `camera` sees of it, if there is one, and what may cast shadows on that. Its depths are those of
+    /// the projection, as a rasteriser has them, and reach from the first caster to the last receiver. Without
+    /// anything within the cone, depths do not matter.
+    #[must_use]
+    pub fn spot(
+        spot: &Spot,
+        mesh: &Mesh,
+        size: u32,
+        margin: u32,
+        camera: Option<&CameraView>,
+    ) -> Self {
+        let axes = axes(spot.direction);
+        let position = spot.position.as_dvec3();
+        let from = mesh.positions.iter().map(|p| p.as_dvec3() - position);
+        let reach = from.map(DVec3::length).fold(f64::MIN_POSITIVE, f64::max);
+        let tangent = (0.5 * f64::from(spot.angle).to_radians()).tan();
+        let mut frustum = Frustum {
+            axes,
+            position,
+            within: Extent {
+                low: [-tangent, -tangent, reach * NEAREST],
+                high: [tangent, tangent, reach * 1.01],
+            },
+        };
+        let all =
+            || (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(Vec3::as_dvec3).to_vec());
+        let receivers = match camera {
+            Some(camera) => {
+                let clip = camera.clip_from_world.as_dmat4();
+                frustum.extent(all().map(|corners| clipped(&clip, corners)))
+            }
+            None => frustum.extent(all()),
+        };
+        if receivers.low[2] < receivers.high[2] {
+            if camera.is_some() {
+                // A map without an extent has no texels.
+                let least = tangent * 1e-3;
+                for i in 0..2 {
+                    let middle = 0.5 * (receivers.low[i] + receivers.high[i]);
+                    let half = (0.5 * (receivers.high[i] - receivers.low[i])).max(least);
+                    frustum.within.low[i] = middle - half;
+                    frustum.within.high[i] = middle + half;
+                }
+            }
+            frustum.within.high[2] = receivers.high[2] * 1.001;
+        }
+        let free = f64::from(margin.min(size / 4)) / f64::from(size);
+        for i in 0..2 {
+            let [low, high] = [frustum.within.low[i], frustum.within.high[i]];
+            let widen = 0.5 * (high - low) * (1.0 / (1.0 - 2.0 * free) - 1.0);
+            frustum.within.low[i] = low - widen;
+            frustum.within.high[i] = high + widen;
+        }
+        // What lies between the light and the receivers. Depth is linear in the reciprocal of the distance.
+        let casters = frustum.extent(all());
+        let far = frustum.within.high[2];
+        let near = casters.low[2].max(frustum.within.low[2]).min(far * 0.5);
+        let spare = (1.0 / near - 1.0 / far) * SPARE / (1.0 - 2.0 * SPARE);
+        frustum.within.low[2] = 1.0 / (1.0 / near + spare);
+        frustum.within.high[2] = 1.0 / (1.0 / far - spare).max(0.5 / far);
+        let Extent { low, high } = frustum.within;
+        let depth = high[2] - low[2];
+        Self {
+            clip_from_world: frustum.clip_from_world().as_mat4(),
+            direction: spot.direction,
+            depth: depth as f32,
+            slope: (low[2] * high[2]) as f32,
+            texel: [0, 1].map(|i| ((high[i] - low[i]) * high[2] / f64::from(size)) as f32),
         }
     }
 }

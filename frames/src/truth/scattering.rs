@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Arriving, Errors, Pixels};
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
-use crate::visibility::cast::{Segment, in_bands};
+use crate::visibility::cast::{SAMPLES, Segment, in_bands};
 
 /// Rays through a pixel, along x and along y.
 const GRID: u32 = 4;
@@ -29,8 +29,10 @@ struct Ray {
     offset: f64,
     /// Places that are lit; those behind translucent casters count as what reaches them.
     lit: f64,
-    /// Towards the light.
-    toward: DVec3,
+    /// Its pixel, and by which number it goes on to the light: of an area, the rays of a pixel have different
+    /// points.
+    pixel: [u32; 2],
+    number: u32,
 }
 
 /// The scattered light of all pixels: the share of light that is scattered towards the camera and reaches it, but
@@ -70,8 +72,8 @@ impl Scattered {
                 taken: -f64::exp_m1(-extinction * length),
                 offset: offset(pixel, number),
                 lit: 0.0,
-                // Of an area, the rays of a pixel have different points.
-                toward: pixels.toward(at, number * GRID * GRID),
+                pixel: at,
+                number: number * GRID * GRID,
             }
         };
         let rays: Vec<Ray> = (0..scene.width * scene.height * count)
@@ -112,7 +114,8 @@ impl Scattered {
                 let light = |k: u32| {
                     let share = (f64::from(k) + ray.offset) / f64::from(steps);
                     let s = -f64::ln_1p(-share * ray.taken) / extinction;
-                    pixels.reaching(&ray.segment, (s / ray.length).min(1.0), ray.toward)
+                    let t = (s / ray.length).min(1.0);
+                    pixels.reaching(&ray.segment, t, ray.pixel, ray.number)
                 };
                 let wanted = (0..steps).filter(|k| parts.is_none_or(|parity| k % 2 == parity));
                 ray.lit += wanted.map(light).sum::<f64>();
@@ -173,6 +176,166 @@ fn offset(pixel: u32, number: u32) -> f64 {
     let part = f64::from(number.wrapping_mul(7) % (GRID * GRID)) / f64::from(GRID * GRID);
     let moved = part + f64::from(hash) / f64::from(u32::MAX);
     (moved.fract() * f64::from(1 << 24)).floor() / f64::from(1 << 24)
+}
+
+/// Of each pixel, the share of light that passes the medium before what it sees: the mean of its samples. 1 in a
+/// scene without a medium.
+#[must_use]
+pub fn transmittance(scene: &Scene, mesh: &Mesh) -> Arriving {
+    let pixels = Pixels::of(scene, mesh);
+    let extinction = scene.medium.map_or(0.0, |m| f64::from(m.extinction));
+    let eye = scene.camera.eye.as_dvec3();
+    let of = |i: u32| {
+        let at = [i % scene.width, i / scene.width];
+        let passing = SAMPLES.map(|inside| pixels.ray(eye, at, inside).passing(extinction));
+        (passing.iter().sum::<f64>() / SAMPLES.len() as f64) as f32
+    };
+    let all = (0..scene.width * scene.height).into_par_iter();
+    Arriving {
+        width: scene.width,
+        height: scene.height,
+        values: all.map(of).collect(),
+    }
+}
+
+/// Light as it is seen through a medium that passes `through` of it and scatters `scattered`, each pixel for itself.
+/// It is from 0 to 1, as these three are, and as what passes and what is scattered are at most 1 together.
+#[must_use]
+pub fn behind(light: &Arriving, through: &Arriving, scattered: &Arriving) -> Arriving {
+    let all = light.values.iter().zip(&through.values);
+    let all = all.zip(&scattered.values);
+    Arriving {
+        values: all.map(|((v, t), s)| v * t + s).collect(),
+        ..*light
+    }
+}
+
+/// What a ray from the camera meets, at a distance; the far plane where that is nothing.
+struct Met {
+    segment: Segment,
+    length: f64,
+    is_surface: bool,
+}
+
+impl Met {
+    /// The share of light that comes through.
+    fn passing(&self, extinction: f64) -> f64 {
+        (-extinction * self.length).exp()
+    }
+}
+
+impl Pixels {
+    /// The ray through a place in a pixel, (0, 0) its upper left corner and (1, 1) its lower right one.
+    fn ray(&self, eye: DVec3, pixel: [u32; 2], inside: [f64; 2]) -> Met {
+        let seen = self.lens.segment(pixel, inside);
+        let hit = self.caster.first(&seen);
+        let way = seen.at(hit.map_or(1.0, |hit| hit.t)) - eye;
+        Met {
+            segment: Segment::new(eye, way),
+            length: way.length(),
+            is_surface: hit.is_some(),
+        }
+    }
+}
+
+/// The light of single pixels as it is seen through a medium, with what that scatters: by 256 rays to the surfaces
+/// and on to the light, and by 16 rays and steps along them. Phase function and what is absorbed are left out, so
+/// that it is from 0 to 1, see [`behind`].
+pub struct Through {
+    pixels: Pixels,
+    eye: DVec3,
+    width: u32,
+    count: u32,
+    extinction: f64,
+    steps: u32,
+}
+
+/// Pixels by which the steps are chosen.
+const PROBED: u32 = 512;
+
+impl Through {
+    /// With as many steps that twice as many change some of the pixels by less than `change`, as the root of the
+    /// mean square. `None` for a scene without a medium.
+    #[must_use]
+    pub fn new(scene: &Scene, mesh: &Mesh, change: f64) -> Option<Self> {
+        let mut this = Self {
+            extinction: f64::from(scene.medium.as_ref()?.extinction),
+            pixels: Pixels::of(scene, mesh),
+            eye: scene.camera.eye.as_dvec3(),
+            width: scene.width,
+            count: scene.width * scene.height,
+            steps: FIRST,
+        };
+        let probed = this.count.min(PROBED);
+        let look = |this: &Self| -> Vec<f64> {
+            let pixels = (0..probed).into_par_iter();
+            // Spread over the picture.
+            let number = |i: u32| (u64::from(i) * u64::from(this.count) / u64::from(probed)) as u32;
+            pixels.map(|i| this.scattered(number(i))).collect()
+        };
+        let mut before = look(&this);
+        while this.steps < MOST {
+            this.steps *= 2;
+            let now = look(&this);
+            let pairs = before.iter().zip(&now);
+            let squares: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+            if (squares / f64::from(probed.max(1))).sqrt() < change {
+                break;
+            }
+            before = now;
+        }
+        Some(this)
+    }
+
+    /// Steps along each ray.
+    #[must_use]
+    pub const fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// What a pixel sees; pixels are counted from the upper left one, row by row.
+    #[must_use]
+    pub fn pixel(&self, number: u32) -> f32 {
+        (self.surfaces(number) + self.scattered(number)) as f32
+    }
+
+    /// What of that comes from surfaces.
+    #[must_use]
+    pub fn surfaces(&self, number: u32) -> f64 {
+        const RAYS: u32 = super::GRID * super::GRID;
+        let at = [number % self.width, number / self.width];
+        let ray = |i: u32| {
+            let inside = [i % super::GRID, i / super::GRID];
+            let inside = inside.map(|k| (f64::from(k) + 0.5) / f64::from(super::GRID));
+            let met = self.pixels.ray(self.eye, at, inside);
+            let arriving = match met.is_surface {
+                true => self.pixels.reaching(&met.segment, 1.0, at, i),
+                false => 1.0,
+            };
+            arriving * met.passing(self.extinction)
+        };
+        (0..RAYS).map(ray).sum::<f64>() / f64::from(RAYS)
+    }
+
+    /// What of that the medium scatters.
+    #[must_use]
+    pub fn scattered(&self, number: u32) -> f64 {
+        let at = [number % self.width, number / self.width];
+        let ray = |i: u32| {
+            let inside = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
+            let met = self.pixels.ray(self.eye, at, inside);
+            let taken = -f64::exp_m1(-self.extinction * met.length);
+            let offset = offset(number, i);
+            let lit = |k: u32| {
+                let share = (f64::from(k) + offset) / f64::from(self.steps);
+                let s = -f64::ln_1p(-share * taken) / self.extinction;
+                let t = (s / met.length).min(1.0);
+                self.pixels.reaching(&met.segment, t, at, i * GRID * GRID)
+            };
+            taken * (0..self.steps).map(lit).sum::<f64>() / f64::from(self.steps)
+        };
+        (0..GRID * GRID).map(ray).sum::<f64>() / f64::from(GRID * GRID)
+    }
 }
 
 /// How far pictures of scattered light are from the truth, and how sure that is.

@@ -20,6 +20,7 @@
 //! | geometry from the camera | [`surface`](shade::surface), [`surface_with_plane`](mips::surface_with_plane) |
 //! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
 //! | with mip levels | [`shade_hamburger_mips`](mips::shade_hamburger_mips), [`shade_hausdorff_mips`](mips::shade_hausdorff_mips), [`shade_variance_mips`](mips::shade_variance_mips), [`shade_hamburger_6_mips`](mips::shade_hamburger_6_mips), [`shade_trigonometric_mips`](mips::shade_trigonometric_mips), [`shade_esm_mips`](mips::shade_esm_mips), [`shade_evsm_mips`](mips::shade_evsm_mips) |
+//! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
 #![no_std]
@@ -77,6 +78,7 @@ hankel_dsl::kernels![
     shade::shade_variance,
     shade::shade_pcf,
     shade::shade_pcf_gaussian,
+    shade::sum_lights,
     six::shade_hamburger_6,
     trigonometric::shade_trigonometric,
     exponential::shade_esm,

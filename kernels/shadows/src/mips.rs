@@ -21,7 +21,7 @@ use crate::depth::{Transform, row_times_point};
 use crate::exponential::{Exponents, exponential_shadow, warped_shadow};
 use crate::grid::within;
 use crate::shade::{
-    Light, encoding, hamburger_shadow, hausdorff_shadow, shade_with, variance_shadow,
+    Light, dot, encoding, hamburger_shadow, hausdorff_shadow, shade_with, variance_shadow,
 };
 use crate::six::hamburger_6_shadow;
 use crate::trigonometric::{self, trigonometric_shadow};
@@ -174,12 +174,6 @@ fn cross(a: Vec3, b: Vec3) -> Vec3 {
     )
 }
 
-/// `row` times a vector.
-#[inline(always)]
-fn along(row: Vec4, v: Vec3) -> f32 {
-    row.x * v.x + row.y * v.y + row.z * v.z
-}
-
 impl Footprint {
     /// Of the pixel that sees the point `world` of a surface with the normal `plane`, whatever its length and
     /// sign, in a map of `size` texels.
@@ -210,18 +204,29 @@ impl Footprint {
         let (right, up) = (gradient(camera.row_x), gradient(camera.row_y));
         let (across, down) = (cross(up, plane), cross(plane, right));
         // Seen edge-on, a pixel sees all of a plane: the clamps below have a map's.
-        let volume = across.x * right.x + across.y * right.y + across.z * right.z;
+        let volume = dot(across, right);
         let scale = 2.0 * w / Real::max(Real::abs(volume), 1e-12);
         let (scale_x, scale_y) = (scale / raster.width, scale / raster.height);
         let (columns, rows) = (size.x as f32, size.y as f32);
         let texels = |t: f32| Real::clamp(t, -1e6, 1e6);
+        // Coordinates of a spot light's map are quotients, too.
+        let distance = Real::max(row_times_point(light.row_w, world), 1e-6);
+        let slope = |row: Vec4| {
+            let at = row_times_point(row, world) / distance;
+            Vec3::new(
+                (row.x - at * light.row_w.x) / distance,
+                (row.y - at * light.row_w.y) / distance,
+                (row.z - at * light.row_w.z) / distance,
+            )
+        };
+        let (u, v) = (slope(light.row_u), slope(light.row_v));
         let (xu, xv) = (
-            texels(along(light.row_u, across) * scale_x * columns),
-            texels(along(light.row_v, across) * scale_x * rows),
+            texels(dot(u, across) * scale_x * columns),
+            texels(dot(v, across) * scale_x * rows),
         );
         let (yu, yv) = (
-            texels(along(light.row_u, down) * scale_y * columns),
-            texels(along(light.row_v, down) * scale_y * rows),
+            texels(dot(u, down) * scale_y * columns),
+            texels(dot(v, down) * scale_y * rows),
         );
         // The squares of the axes are the eigenvalues of [[uu, uv], [uv, vv]].
         let (uu, uv, vv) = (xu * xu + yu * yu, xu * xv + yu * yv, xv * xv + yv * yv);

@@ -54,7 +54,7 @@ pub struct Medium {
     #[range(0.0..=2.0)]
     pub extinction: f32,
     /// The radiance that the medium would send to all sides, were it lit everywhere and so thick that nothing
-    /// else is seen, for a phase function of 1.
+    /// else is seen, for a phase function of 1 and a light of irradiance 1.
     #[range(0.0..=20.0)]
     pub source: f32,
     /// The mean cosine of what is scattered, from -0.99 to 0.99.
@@ -160,7 +160,7 @@ impl Ray {
     /// The cosine of the angle between the ray and the way the light goes.
     #[inline(always)]
     fn cosine(&self, light: &Light) -> f32 {
-        -dot(light.toward, self.direction) / self.length
+        -dot(light.position, self.direction) / self.length
     }
 
     /// What is seen of a surface's colour through the medium, which scatters this share of the light, from 0
@@ -170,8 +170,13 @@ impl Ray {
         let through = mean(self.passed);
         let phase = henyey_greenstein(medium.anisotropy, self.cosine(light));
         let added = medium.source * phase * share;
-        let seen = |c: f32| Real::clamp(c * through + added, 0.0, 65504.0);
-        Vec4::new(seen(picture.x), seen(picture.y), seen(picture.z), 1.0)
+        let seen = |c: f32, light: f32| Real::clamp(c * through + added * light, 0.0, 65504.0);
+        Vec4::new(
+            seen(picture.x, light.colour.x),
+            seen(picture.y, light.colour.y),
+            seen(picture.z, light.colour.z),
+            1.0,
+        )
     }
 }
 

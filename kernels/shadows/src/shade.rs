@@ -23,18 +23,30 @@ pub mod encoding {
     pub const SYMMETRIC: u32 = 2;
 }
 
-/// A directional light and how its shadow map is read.
+/// A directional light or a spot light, and how its shadow map is read.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
 pub struct Light {
-    /// Row that takes a world-space point to the map's horizontal coordinate, 0 to 1.
+    /// Row that takes a world-space point to the map's horizontal coordinate, 0 to 1, times that of `row_w`.
     pub row_u: Vec4,
-    /// Row that takes a world-space point to the map's vertical coordinate, 0 (first row) to 1.
+    /// Row that takes a world-space point to the map's vertical coordinate, 0 (first row) to 1, times that of
+    /// `row_w`.
     pub row_v: Vec4,
-    /// Row that takes a world-space point to its depth in the map, 0 to 1.
+    /// Row that takes a world-space point to its depth in the map, 0 to 1, times that of `row_w`.
     pub row_depth: Vec4,
-    /// Unit vector towards the light (x, y, z); w: the light's irradiance.
-    pub toward: Vec4,
+    /// Row that takes a world-space point to what the others are divided by: the distance along a spot light's
+    /// axis; 1 for a directional light.
+    pub row_w: Vec4,
+    /// Where the light is, in homogeneous coordinates: the unit vector towards it and 0 for a directional light,
+    /// its place and 1 for a spot light.
+    pub position: Vec4,
+    /// Of each channel the irradiance of a face that is turned to the light, at a distance of 1 from a spot
+    /// light; w: 1 if it falls off with the square of the distance, 0 if it does not.
+    pub colour: Vec4,
+    /// The axis of a spot light, the way it shines, times a scale (x, y, z), and an offset (w): scale times the
+    /// cosine of the angle from the axis, plus the offset, is 0 at the cone's edge and 1 where it begins to
+    /// fade. Zeros and 1 for a light without a cone.
+    pub cone: Vec4,
     /// Colour and strength of the ambient light.
     pub ambient: Vec4,
     /// The moment vector that the bias mixes in.
@@ -43,7 +55,8 @@ pub struct Light {
     /// variance shadow mapping the least one relative to the square of the receiver's warped depth.
     #[magnitude(1e-7..=1e-2)]
     pub moment_bias: f32,
-    /// What is taken off a receiver's depth, in the map's range of 0 to 1.
+    /// What is taken off a receiver's depth, in the map's range of 0 to 1; of a spot light's map, where the
+    /// distance along the axis is 1: it falls with the square of that, as the map's depth grows ever more slowly.
     #[magnitude(1e-7..=1e-2)]
     pub depth_bias: f32,
     /// A shadow of 1 minus this is full: from 0 to 0.5, 0.02 in the lecture.
@@ -73,29 +86,45 @@ pub fn surface(
 }
 
 #[inline(always)]
-fn dot(a: Vec3, b: Vec3) -> f32 {
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f32 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// The cosine of the angle between a normal and the light; 0 for a face that is turned from it.
+/// What of the light a face gets that nothing shades: the cosine of the angle between its normal and the light,
+/// times what the cone and the distance leave. 0 for a face that is turned from the light, and outside of its cone.
+///
+/// The cone fades as in glTF (KHR_lights_punctual, "Inner and Outer Cone Angles").
 #[inline(always)]
-fn cosine(light: &Light, normal: Vec3) -> f32 {
-    let toward = Vec3::new(light.toward.x, light.toward.y, light.toward.z);
-    // A normal interpolated to nothing has no direction; the floor keeps it finite.
+fn unshaded(light: &Light, world: Vec3, normal: Vec3) -> f32 {
+    let toward = Vec3::new(
+        light.position.x - light.position.w * world.x,
+        light.position.y - light.position.w * world.y,
+        light.position.z - light.position.w * world.z,
+    );
+    let square = dot(toward, toward);
+    // A normal interpolated to nothing has no direction, and a light shines from a point; the floors keep both
+    // finite.
+    let distance = Real::max(Real::sqrt(square), 1e-20);
     let length = Real::max(Real::sqrt(dot(normal, normal)), 1e-20);
-    Real::max(dot(normal, toward) / length, 0.0)
+    let cosine = Real::max(dot(normal, toward) / length / distance, 0.0);
+    let axis = Vec3::new(light.cone.x, light.cone.y, light.cone.z);
+    let within = Real::saturate(light.cone.w - dot(axis, toward) / distance);
+    let fall = Real::max(1.0 - light.colour.w + light.colour.w * square, 1e-20);
+    cosine * (within * within) / fall
 }
 
 /// Lambert's law with a shadow from 0 (lit) to 1, plus ambient light; each channel in [0, 65504].
 #[inline(always)]
-fn lit(light: &Light, cosine: f32, colour: Vec3, shadow: f32) -> Vec4 {
-    let direct = cosine * light.toward.w * (1.0 - shadow);
+fn lit(light: &Light, unshaded: f32, colour: Vec3, shadow: f32) -> Vec4 {
+    let direct = unshaded * (1.0 - shadow);
     // 65504 is the most that a 16-bit float target holds.
-    let shade = |colour: f32, ambient: f32| Real::clamp(colour * (direct + ambient), 0.0, 65504.0);
+    let shade = |colour: f32, light: f32, ambient: f32| {
+        Real::clamp(colour * (direct * light + ambient), 0.0, 65504.0)
+    };
     Vec4::new(
-        shade(colour.x, light.ambient.x),
-        shade(colour.y, light.ambient.y),
-        shade(colour.z, light.ambient.z),
+        shade(colour.x, light.colour.x, light.ambient.x),
+        shade(colour.y, light.colour.y, light.ambient.y),
+        shade(colour.z, light.colour.z, light.ambient.z),
         1.0,
     )
 }
@@ -105,18 +134,18 @@ fn lit(light: &Light, cosine: f32, colour: Vec3, shadow: f32) -> Vec4 {
 #[inline(always)]
 fn receiver(light: &Light, world: Vec3) -> (Vec2, f32) {
     let near = |x: f32| Real::clamp(x, -16.0, 16.0);
+    // Nothing behind a spot light is asked for; the floor keeps it finite.
+    let w = Real::max(row_times_point(light.row_w, world), 1e-6);
     let uv = Vec2::new(
-        near(row_times_point(light.row_u, world)),
-        near(row_times_point(light.row_v, world)),
+        near(row_times_point(light.row_u, world) / w),
+        near(row_times_point(light.row_v, world) / w),
     );
-    (
-        uv,
-        near(row_times_point(light.row_depth, world) - light.depth_bias),
-    )
+    let z = row_times_point(light.row_depth, world) / w;
+    (uv, near(z - light.depth_bias / (w * w)))
 }
 
 /// Lambert's law with what `shadow` gives for a receiver's coordinates in the map and its depth, both
-/// from 0 to 1 inside. It is not asked for a face that is turned from the light.
+/// from 0 to 1 inside. It is not asked for a face that is turned from the light, nor outside of its cone.
 #[inline(always)]
 pub(crate) fn shade_by(
     light: &Light,
@@ -125,13 +154,13 @@ pub(crate) fn shade_by(
     colour: Vec3,
     shadow: impl FnOnce(Vec2, f32) -> f32,
 ) -> Vec4 {
-    let cosine = cosine(light, normal);
+    let unshaded = unshaded(light, world, normal);
     let mut shadowed = 1.0;
-    if cosine > 0.0 {
+    if unshaded > 0.0 {
         let (uv, z) = receiver(light, world);
         shadowed = shadow(uv, z);
     }
-    lit(light, cosine, colour, shadowed)
+    lit(light, unshaded, colour, shadowed)
 }
 
 /// The same after the cut against light leaking.
@@ -448,4 +477,26 @@ pub fn shade_pcf_gaussian(
     shade_by(light, world, normal, colour, |uv, z| {
         weighted(depth, weights, samples, uv, z)
     })
+}
+
+/// The sum of two pictures, which two lights make of the same surfaces; each channel in [0, 65504].
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16float, rgba32float),
+    parity(
+        ulp = 1,
+        exact(rgba32float),
+        why = "one sum, then rounding to 16 bits, up or down: one step"
+    )
+)]
+pub fn sum_lights(
+    #[index] at: UVec2,
+    #[texture] first: Texture2d<'_>,
+    #[texture] second: Texture2d<'_>,
+) -> Vec4 {
+    let (a, b) = (first.load(at), second.load(at));
+    // 65504 is the most that 16 bits hold.
+    let channel = |a: f32, b: f32| Real::clamp(a + b, 0.0, 65504.0);
+    Vec4::new(channel(a.x, b.x), channel(a.y, b.y), channel(a.z, b.z), 1.0)
 }

@@ -30,10 +30,17 @@ pub fn translucent(
     #[range(0.0..=1.0)]
     opacity: f32,
     #[uniform] view: &Transform,
-) -> (Vec4, Vec4, Vec3) {
+) -> (Vec4, Vec4, Vec4) {
     let clip = view.apply(position);
     let surface = Vec4::new(colour.x, colour.y, colour.z, opacity);
-    (clip, surface, Vec3::new(clip.x, clip.y, clip.z))
+    (clip, surface, clip)
+}
+
+/// A place in clip space by what its w divides; nothing that is drawn lies nearer than the floor.
+#[inline(always)]
+fn divided(place: Vec4) -> Vec3 {
+    let w = Real::max(place.w, 1e-6);
+    Vec3::new(place.x / w, place.y / w, place.z / w)
 }
 
 /// A depth's four moments in the optimised basis.
@@ -50,6 +57,7 @@ fn quantized(z: f32, how: u32) -> Quantized4<f32> {
 /// the first two channels with `part` 0, the other two with 1. Alpha is the opacity.
 #[kernel(
     fragment,
+    inputs = crate::inputs::translucent::places,
     parity(
         ulp = 0,
         absolute = 7.7e-6,
@@ -60,9 +68,7 @@ pub fn translucent_moments(
     #[varying]
     #[range(0.0..=1.0)]
     surface: Vec4,
-    #[varying]
-    #[range(-1.0..=1.0)]
-    place: Vec3,
+    #[varying] place: Vec4,
     #[constant(id = 0, default = 2)]
     #[values(encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
@@ -70,7 +76,7 @@ pub fn translucent_moments(
     #[values(0, 1)]
     part: u32,
 ) -> Vec4 {
-    let q = quantized(Real::saturate(place.z), encoding);
+    let q = quantized(Real::saturate(divided(place).z), encoding);
     let half = if part == 0 {
         Vec2::new(q.r, q.g)
     } else {
@@ -189,11 +195,10 @@ pub fn stochastic_depths(
     #[varying]
     #[range(0.0..=1.0)]
     surface: Vec4,
-    #[varying]
-    #[range(-1.0..=1.0)]
-    place: Vec3,
+    #[varying] place: Vec4,
     #[uniform] size: &UVec2,
 ) -> Vec4 {
+    let place = divided(place);
     let z = Real::saturate(place.z);
     let texel = |x: f32, size: u32| {
         let at = Real::saturate(0.5 * x + 0.5) * size as f32;

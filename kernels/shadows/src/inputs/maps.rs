@@ -166,13 +166,32 @@ pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32)
         row_u: Vec4::new(1.0, 0.0, 0.0, 0.0),
         row_v: Vec4::new(0.0, 0.0, 1.0, 0.0),
         row_depth: Vec4::new(0.0, 1.0, 0.0, 0.0),
-        toward: Vec4::new(0.36, -0.8, 0.48, 2.5),
+        row_w: Vec4::W,
+        position: Vec4::new(0.36, -0.8, 0.48, 0.0),
+        colour: Vec4::new(2.5, 2.0, 1.5, 0.0),
+        cone: Vec4::W,
         ambient: Vec4::new(0.1, 0.12, 0.15, 0.0),
         bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
         moment_bias,
         depth_bias,
         light_leak: 0.02,
         filter_radius: radius,
+    }
+}
+
+/// The same map as a spot light has one: above its middle, with a cone that fades within it, and everything divided
+/// by 2, which is exact.
+fn spot(light: &Light) -> Light {
+    Light {
+        row_u: light.row_u * 2.0,
+        row_v: light.row_v * 2.0,
+        row_depth: light.row_depth * 2.0,
+        row_w: Vec4::W * 2.0,
+        position: Vec4::new(0.5, -1.0, 0.5, 1.0),
+        colour: light.colour.truncate().extend(1.0),
+        cone: Vec4::new(0.0, 8.0, 0.0, -7.0),
+        depth_bias: light.depth_bias * 4.0,
+        ..*light
     }
 }
 
@@ -230,17 +249,20 @@ pub(super) fn with_map(given: Given, name: &str, map: &[Vec4]) -> Given {
     given.texture(name, SIZE, 1, TexelFormat::Rgba32Float, texels)
 }
 
-/// The same with the published bias and a depth bias, and with ten times that strength and none.
+/// The same with the published bias and a depth bias, with ten times that strength and none, and with the
+/// published bias and a spot light.
 pub(super) fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>)]) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     let strength = bias.strength as f32;
     [
-        ("a map's bias as published", strength, 1e-3),
-        ("ten times the published bias", 10.0 * strength, 0.0),
+        ("a map's bias as published", strength, 1e-3, false),
+        ("ten times the published bias", 10.0 * strength, 0.0, false),
+        ("a spot light", strength, 1e-3, true),
     ]
     .into_iter()
-    .map(|(what, moment_bias, depth_bias)| {
+    .map(|(what, moment_bias, depth_bias, is_spot)| {
         let light = light(bias, moment_bias, depth_bias, 1);
+        let light = if is_spot { spot(&light) } else { light };
         let given = fragments_and_light(&mut s, what, &light);
         maps.iter()
             .fold(given, |given, (name, map)| with_map(given, name, map))
@@ -481,15 +503,17 @@ pub fn shaded_warps(request: &Request) -> Vec<Given> {
 pub fn shaded_depths(request: &Request) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     let map = samples();
-    [0, 1, 3]
+    [(0, false), (1, false), (3, false), (1, true)]
         .into_iter()
-        .map(|radius| {
+        .map(|(radius, is_spot)| {
             let [world, normals, colours] = fragments(&mut s);
+            let light = light(&SYMMETRIC_4_32, 0.0, 1e-3, radius);
+            let light = if is_spot { spot(&light) } else { light };
             Given::new("a map of depths")
                 .buffer("world", &world)
                 .buffer("normal", &normals)
                 .buffer("colour", &colours)
-                .uniform("light", &light(&SYMMETRIC_4_32, 0.0, 1e-3, radius))
+                .uniform("light", &light)
                 .texture(
                     "depth",
                     SIZE,
@@ -504,7 +528,12 @@ pub fn shaded_depths(request: &Request) -> Vec<Given> {
 /// What shading with a map of depths and a filter reads.
 #[must_use]
 pub fn weighted_depths(request: &Request) -> Vec<Given> {
-    let all = [&[1.0_f32][..], &[0.5, 0.25], &[0.32, 0.24, 0.1]];
+    let all = [
+        &[1.0_f32][..],
+        &[0.5, 0.25],
+        &[0.32, 0.24, 0.1],
+        &[0.5, 0.25],
+    ];
     let given = shaded_depths(request).into_iter().zip(all);
     given
         .map(|(given, weights)| given.buffer("weights", weights))

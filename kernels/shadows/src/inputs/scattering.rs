@@ -207,7 +207,7 @@ impl Camera {
 /// The light that goes along y.
 fn light() -> Light {
     Light {
-        toward: Vec4::new(0.0, -1.0, 0.0, 2.5),
+        position: Vec4::new(0.0, -1.0, 0.0, 0.0),
         ..maps::light(&SYMMETRIC_4_16, 6e-5, 0.0, 1)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::vec::Vec;
 
-use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
 use hankel_moments::{Moments4, quantize_symmetric_4, quantize_unit_4};
@@ -57,9 +57,9 @@ pub fn blended(request: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// Fragments in the middle of a map's texels, as a rasteriser has them.
-#[must_use]
-pub fn fragments(request: &Request) -> Vec<Given> {
+/// Fragments in the middle of a map's texels, as a rasteriser has them: surfaces, and places in clip space, of
+/// which every other one has a w of 2, by which division is exact.
+fn drawn(request: &Request) -> Given {
     let mut s = Source::new(request.seed);
     let (mut surfaces, mut places) = (Vec::new(), Vec::new());
     for _ in 0..1009 {
@@ -73,14 +73,25 @@ pub fn fragments(request: &Request) -> Vec<Given> {
             (2.0 * (texel + 0.5) / f64::from(size) - 1.0) as f32
         };
         let (x, y) = (middle(SIZE[0]), middle(SIZE[1]));
-        places.push(Vec3::new(x, y, s.between(0.0, 1.0) as f32));
+        let place = Vec4::new(x, y, s.between(0.0, 1.0) as f32, 1.0);
+        places.push(place * s.pick(&[1.0, 2.0]));
         surfaces.push(Vec4::new(0.2, 0.4, 0.6, opacity as f32));
     }
-    [Given::new("fragments of translucent surfaces")
+    Given::new("fragments of translucent surfaces")
         .buffer("surface", &surfaces)
         .buffer("place", &places)
-        .uniform("size", &UVec2::from_array(SIZE))]
-    .into()
+}
+
+/// Fragments whose moments are blended.
+#[must_use]
+pub fn places(request: &Request) -> Vec<Given> {
+    [drawn(request)].into()
+}
+
+/// Fragments whose depths are hashed.
+#[must_use]
+pub fn fragments(request: &Request) -> Vec<Given> {
+    [drawn(request).uniform("size", &UVec2::from_array(SIZE))].into()
 }
 
 /// What shading with hashed depths reads.

@@ -1,0 +1,240 @@
+//! From a scene's lights to what kernels take of each, and which of them a picture can do without.
+
+use hankel_dsl::glam::{DVec3, Vec3, Vec4};
+use hankel_moments::FixedPoint;
+use hankel_shadows::shade::Light as Uniform;
+use hankel_shadows::soft::{Area, MOST_REACH};
+
+use crate::frame::{Show, camera_view};
+use crate::graph::Omission;
+use crate::scene::{CameraView, Fit, Light, LightView, Mesh, Scene, Source, Spot};
+
+/// Light from the sky.
+const AMBIENT: Vec4 = Vec4::new(0.24, 0.28, 0.33, 0.0);
+/// What a light of strength 1 adds on a surface that faces it.
+const IRRADIANCE: f32 = 1.15;
+
+/// What a light's map holds.
+pub fn light_view(scene: &Scene, light: &Light, mesh: &Mesh) -> LightView {
+    let shadow = &scene.shadow;
+    // The filter and the sampler's interpolation stay inside of the map.
+    let (size, margin) = (shadow.size, shadow.filter / 2 + 1);
+    let camera = match shadow.fit {
+        Fit::Scene => None,
+        Fit::Camera => Some(camera_view(scene, &scene.camera, mesh)),
+    };
+    match (light.source, camera) {
+        (Source::Spot(spot), camera) => LightView::spot(&spot, mesh, size, margin, camera.as_ref()),
+        (Source::Directional { direction }, None) => LightView::new(direction, mesh, size, margin),
+        (Source::Directional { direction }, Some(camera)) => {
+            let fitted = match scene.medium {
+                Some(_) => LightView::fitted_to_space,
+                None => LightView::fitted,
+            };
+            fitted(direction, mesh, size, margin, &camera)
+        }
+    }
+}
+
+/// One of the lights that a frame has.
+#[derive(Clone, Copy, Debug)]
+pub struct Lit<'a> {
+    pub light: &'a Light,
+    /// What its map holds.
+    pub view: &'a LightView,
+    /// Whether it comes with the light from the sky, which is there once.
+    pub is_first: bool,
+    /// How many lights there are. What is told of several is their mean.
+    pub count: usize,
+}
+
+/// The light as the shading kernels take it.
+pub fn uniform(scene: &Scene, lit: &Lit<'_>, show: Show) -> Uniform {
+    let Lit {
+        light,
+        view,
+        is_first,
+        count,
+    } = *lit;
+    let shadow = &scene.shadow;
+    let clip = view.clip_from_world;
+    let share = 1.0 / count as f32;
+    let (colour, ambient) = match show {
+        Show::Picture if is_first => (light.colour * light.strength * IRRADIANCE, AMBIENT),
+        Show::Picture => (light.colour * light.strength * IRRADIANCE, Vec4::ZERO),
+        Show::Light | Show::Scattered => (Vec3::splat(share), Vec4::ZERO),
+    };
+    let (position, cone, falls) = match light.source {
+        Source::Directional { direction } => ((-direction).extend(0.0), Vec4::W, false),
+        Source::Spot(spot) => {
+            let [scale, offset] = spot.fade();
+            let axis = spot.direction.as_dvec3() * scale;
+            let cone = axis.extend(offset).as_vec4();
+            (spot.position.extend(1.0), cone, show == Show::Picture)
+        }
+    };
+    Uniform {
+        row_u: (clip.row(0) + clip.row(3)) * 0.5,
+        // Rows of the map count from the top.
+        row_v: (clip.row(3) - clip.row(1)) * 0.5,
+        row_depth: clip.row(2),
+        row_w: clip.row(3),
+        position,
+        colour: colour.extend(if falls { 1.0 } else { 0.0 }),
+        cone,
+        ambient,
+        bias_target: Vec4::from_array(shadow.map.bias_target),
+        moment_bias: shadow.moment_bias,
+        depth_bias: shadow.depth_bias * view.slope,
+        light_leak: shadow.leak_cut,
+        filter_radius: shadow.filter / 2,
+    }
+}
+
+/// Steepness, depth over width, of the steepest surface that must not shade itself in a soft shadow.
+const STEEPEST: f32 = 2.0;
+/// The same for a region that is compared as a whole: of a steeper one, less than half is in front of its
+/// own middle, and moments bound little of that. More would lose what is in contact.
+const MARGIN: f32 = 0.5;
+
+/// The light's area as the kernels of soft shadows take it.
+pub fn area(light: &Light, view: &LightView) -> Area {
+    let radius = light.area.radius;
+    let spread = view.texel.map(|texel| radius * view.depth / texel);
+    // Texels of the largest rectangle that is read of a table, which is a texel wide at least.
+    let [x, y] = spread.map(|s| 2 * s.clamp(0.5, MOST_REACH).ceil() as u32);
+    Area {
+        spread: spread.into(),
+        slack: (STEEPEST * radius).min(0.5),
+        margin: (MARGIN * radius).min(0.5),
+        one: FixedPoint::for_kernel(x * y).one,
+        padding: 0,
+    }
+}
+
+/// Unit normals that face a light, for pictures of what arrives of it. Those of a spot light are not of unit
+/// length: interpolated, they face it everywhere.
+pub fn facing(light: &Light, mesh: &Mesh) -> Vec<Vec3> {
+    match light.source {
+        Source::Directional { direction } => vec![-direction; mesh.positions.len()],
+        Source::Spot(spot) => {
+            let places = mesh.positions.iter();
+            places.map(|place| spot.position - *place).collect()
+        }
+    }
+}
+
+/// Translucent triangles, the farthest from the light first.
+pub fn translucent(light: &Light, mesh: &Mesh) -> Vec<[u32; 3]> {
+    match light.source {
+        Source::Directional { direction } => mesh.translucent_along(direction),
+        Source::Spot(spot) => mesh.translucent_from(spot.position),
+    }
+}
+
+/// The numbers of the lights that a picture needs, and why it does not need the others. Where none reaches
+/// anything, the first one stays, as the picture needs a light.
+pub fn reaching(scene: &Scene, mesh: &Mesh) -> (Vec<usize>, Vec<Omission>) {
+    let mut kept = Vec::new();
+    let mut omitted = Vec::new();
+    if let [_] = scene.lights[..] {
+        return (vec![0], omitted);
+    }
+    let seen = Seen::of(&camera_view(scene, &scene.camera, mesh), mesh);
+    for (number, light) in scene.lights.iter().enumerate() {
+        match unreached(scene, light, &seen) {
+            Some(why) => omitted.push(Omission {
+                what: format!("light {}", number + 1).into(),
+                why: why.into(),
+            }),
+            None => kept.push(number),
+        }
+    }
+    if kept.is_empty() {
+        kept.push(0);
+        omitted.remove(0);
+    }
+    (kept, omitted)
+}
+
+/// Why a light reaches nothing; `None` if it may.
+fn unreached(scene: &Scene, light: &Light, seen: &Seen<'_>) -> Option<&'static str> {
+    if light.strength == 0.0 {
+        return Some("its strength is 0");
+    }
+    if light.colour == Vec3::ZERO {
+        return Some("its colour is black");
+    }
+    if scene.medium.is_some() {
+        // It shines through what is between surfaces.
+        return None;
+    }
+    match light.source {
+        Source::Directional { direction } => (!seen.faces(|normal, _| normal.dot(-direction)))
+            .then_some("all that the camera sees is turned from it"),
+        Source::Spot(spot) => {
+            if !seen.faces(|normal, place| normal.dot(spot.position - place)) {
+                return Some("all that the camera sees is turned from it");
+            }
+            (!seen.is_within(&spot)).then_some("nothing that the camera sees is within its cone")
+        }
+    }
+}
+
+/// Surfaces within a camera's view, hidden or not.
+struct Seen<'a> {
+    mesh: &'a Mesh,
+    triangles: Vec<[u32; 3]>,
+    /// What of each lies within the view.
+    polygons: Vec<Vec<DVec3>>,
+}
+
+impl<'a> Seen<'a> {
+    fn of(camera: &CameraView, mesh: &'a Mesh) -> Self {
+        let (mut triangles, mut polygons) = (Vec::new(), Vec::new());
+        for triangle in mesh.opaque() {
+            let corners = triangle.map(|v| mesh.positions[v as usize]);
+            let polygon = camera.clipped(corners);
+            if !polygon.is_empty() {
+                triangles.push(triangle);
+                polygons.push(polygon);
+            }
+        }
+        Self {
+            mesh,
+            triangles,
+            polygons,
+        }
+    }
+
+    /// Whether `cosine`, by a normal and a place, may be above 0 anywhere. It is linear in both, so that corners
+    /// bound it.
+    fn faces(&self, cosine: impl Fn(Vec3, Vec3) -> f32) -> bool {
+        let of = |v: u32| {
+            (
+                self.mesh.normals[v as usize],
+                self.mesh.positions[v as usize],
+            )
+        };
+        self.triangles.iter().any(|triangle| {
+            let corners = triangle.map(of);
+            let places = corners.map(|(_, place)| place);
+            corners
+                .iter()
+                .any(|(normal, _)| places.iter().any(|place| cosine(*normal, *place) > 0.0))
+        })
+    }
+
+    /// Whether something may lie within a cone: within the pyramid around it.
+    fn is_within(&self, spot: &Spot) -> bool {
+        let pyramid = spot.pyramid();
+        // All corners of a polygon beyond one of its sides.
+        self.polygons.iter().any(|polygon| {
+            let is_beyond = |side: &DVec3| {
+                let from = spot.position.as_dvec3();
+                polygon.iter().all(|place| side.dot(*place - from) < 0.0)
+            };
+            !pyramid.iter().any(is_beyond)
+        })
+    }
+}
