@@ -3,10 +3,10 @@
 
 use hankel_dsl::glam::{DVec3, Mat4, Vec3};
 
-use crate::frame::light_view;
+use crate::lights::light_view;
 use crate::passes::gaussian;
 use crate::scene::{Mesh, Scene};
-use crate::visibility::cast::{Caster, Lens};
+use crate::visibility::cast::{Caster, Hit, Lens, Segment};
 
 /// A filter kernel around a surface in the light's view, which need not be the foremost one.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +52,7 @@ impl Slope {
     }
 }
 
-/// At least `count` regions of the shadow map that a scene asks for, with its size and its Gaussian, and one depth for
+/// At least `count` regions of the shadow map of a scene's first light, with its size and its Gaussian, and one depth for
 /// each texel. Texels are taken evenly (the R2 sequence of M. Roberts, 2018), and of each one every surface behind it,
 /// as in a stack of maps; those that the light sees edge-on are left out. The bias is the least with which a plane does
 /// not shade itself within the kernel. Opaque triangles alone count.
@@ -63,11 +63,12 @@ pub fn regions(scene: &Scene, mesh: &Mesh, count: usize) -> Regions {
         layers: 0.0,
     };
     let triangles = mesh.opaque();
-    if triangles.is_empty() {
+    let Some(light) = scene.lights.first().filter(|_| !triangles.is_empty()) else {
         return found;
-    }
+    };
     let size = scene.shadow.size;
-    let view = light_view(scene, scene.light, mesh);
+    let view = light_view(scene, light, mesh);
+    let clip_from_world = view.clip_from_world.as_dmat4();
     let lens = Lens::new(view.clip_from_world, size, size);
     let foremost = Caster::new(&mesh.positions, &triangles);
     let layers = Caster::of_layers(&mesh.positions, &triangles);
@@ -76,10 +77,11 @@ pub fn regions(scene: &Scene, mesh: &Mesh, count: usize) -> Regions {
     let weight = |i: i64| f64::from(half[i.unsigned_abs() as usize]);
     let total: f64 = (-radius..=radius).map(weight).sum();
     let segment = |x: u32, y: u32| lens.segment([x, y], [0.5; 2]);
+    let depth_of = |ray: &Segment, hit: Hit| clip_from_world.project_point3(ray.at(hit.t)).z;
     let depth = |x: i64, y: i64| {
         let within = |i: i64| i.clamp(0, i64::from(size) - 1) as u32;
-        let hit = foremost.first(&segment(within(x), within(y)));
-        hit.map_or(1.0, |hit| hit.t)
+        let ray = segment(within(x), within(y));
+        foremost.first(&ray).map_or(1.0, |hit| depth_of(&ray, hit))
     };
     // Enough texels for a map of which a hundredth is covered.
     let most = count.saturating_mul(100);
@@ -88,7 +90,8 @@ pub fn regions(scene: &Scene, mesh: &Mesh, count: usize) -> Regions {
         texels += 1;
         let place = [0.754_877_666_246_693, 0.569_840_290_998_053]
             .map(|step| ((step * texels as f64).fract() * f64::from(size)) as u32);
-        let surfaces = layers.all(&segment(place[0], place[1]));
+        let ray = segment(place[0], place[1]);
+        let surfaces = layers.all(&ray);
         if surfaces.is_empty() {
             continue;
         }
@@ -105,7 +108,7 @@ pub fn regions(scene: &Scene, mesh: &Mesh, count: usize) -> Regions {
             if let Some(slope) = Slope::of(view.clip_from_world, corners, size) {
                 found.regions.push(Region {
                     depths: depths.clone(),
-                    receiver: (hit.t - slope.rise(radius as f64)).max(0.0),
+                    receiver: (depth_of(&ray, hit) - slope.rise(radius as f64)).max(0.0),
                 });
             }
         }
