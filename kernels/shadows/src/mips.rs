@@ -203,12 +203,13 @@ impl Footprint {
         };
         let (right, up) = (gradient(camera.row_x), gradient(camera.row_y));
         let (across, down) = (cross(up, plane), cross(plane, right));
-        // Seen edge-on, a pixel sees all of a plane: the clamps below have a map's.
+        // Seen edge-on, a pixel sees all of a plane; below it is cut to some maps' widths.
         let volume = dot(across, right);
         let scale = 2.0 * w / Real::max(Real::abs(volume), 1e-12);
         let (scale_x, scale_y) = (scale / raster.width, scale / raster.height);
         let (columns, rows) = (size.x as f32, size.y as f32);
-        let texels = |t: f32| Real::clamp(t, -1e6, 1e6);
+        // As far as receivers are moved: places that are farther off would be rounded to other texels.
+        let near = |t: f32| Real::clamp(t, -16.0, 16.0);
         // Coordinates of a spot light's map are quotients, too.
         let distance = Real::max(row_times_point(light.row_w, world), 1e-6);
         let slope = |row: Vec4| {
@@ -221,12 +222,12 @@ impl Footprint {
         };
         let (u, v) = (slope(light.row_u), slope(light.row_v));
         let (xu, xv) = (
-            texels(dot(u, across) * scale_x * columns),
-            texels(dot(v, across) * scale_x * rows),
+            near(dot(u, across) * scale_x) * columns,
+            near(dot(v, across) * scale_x) * rows,
         );
         let (yu, yv) = (
-            texels(dot(u, down) * scale_y * columns),
-            texels(dot(v, down) * scale_y * rows),
+            near(dot(u, down) * scale_y) * columns,
+            near(dot(v, down) * scale_y) * rows,
         );
         // The squares of the axes are the eigenvalues of [[uu, uv], [uv, vv]].
         let (uu, uv, vv) = (xu * xu + yu * yu, xu * xv + yu * yv, xv * xv + yv * yv);
