@@ -12,7 +12,7 @@ use spirv_tools::val::Validator;
 use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::Memory;
-use crate::spirv::{self, exact, libm, names, order, refused, split, trim, uniform};
+use crate::spirv::{self, bounds, exact, libm, names, order, refused, split, trim, uniform};
 use crate::translate::reading;
 
 /// What the modules are for.
@@ -143,7 +143,8 @@ fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
                 .register_pass(Passes::AggressiveDCE);
         })?;
         module = spirv::load(&words, name)?;
-        if !exact::fold(&mut module) {
+        let (folded, bounded) = (exact::fold(&mut module), bounds::fold(&mut module));
+        if !folded && !bounded {
             break;
         }
     }

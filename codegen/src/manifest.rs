@@ -198,6 +198,9 @@ pub struct KernelEntry {
     /// What compilers and drivers may do with its floating-point arithmetic.
     #[serde(default)]
     pub rounding: Rounding,
+    /// What it does with subgroups; absent if nothing.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub subgroups: Option<Subgroups>,
     /// The text in each language.
     pub languages: BTreeMap<Language, LanguageEntry>,
     /// Languages that cannot express it, and why.
@@ -217,6 +220,17 @@ pub enum Rounding {
     /// Neither, which all files ask for: otherwise the result is wrong. Hand SPIR-V to the driver
     /// as it is; naga, and so wgpu, would drop what forbids it.
     Exact,
+}
+
+/// What a kernel does with subgroups. The device must have them (WebGPU's feature `subgroups`; SPIR-V's
+/// capabilities; HLSL's waves; Metal's SIMD-groups).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Subgroups {
+    /// It uses them, and its result is the same for every size.
+    AnySize,
+    /// Its result depends on their size, which differs from device to device.
+    Sized,
 }
 
 /// A pipeline stage.
@@ -274,6 +288,9 @@ pub struct Binding {
 pub enum BindingKind {
     /// A uniform buffer.
     Uniform,
+    /// Push constants in SPIR-V, `var<immediate>` in WGSL, neither of which is bound; a uniform buffer,
+    /// root constants or `setBytes` in HLSL, MSL and GLSL, where [`Binding::places`] says.
+    PushConstants,
     /// A storage buffer.
     Storage,
     /// A storage buffer of integers on which only atomic operations work.
@@ -564,6 +581,11 @@ pub(crate) fn entry(
             describe::Rounding::Pinned => Rounding::Pinned,
             describe::Rounding::Exact => Rounding::Exact,
         },
+        subgroups: match kernel.subgroups {
+            describe::Subgroups::Unused => None,
+            describe::Subgroups::AnySize => Some(Subgroups::AnySize),
+            describe::Subgroups::Sized => Some(Subgroups::Sized),
+        },
         languages: BTreeMap::new(),
         unsupported: BTreeMap::new(),
     }
@@ -663,8 +685,17 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
     let params = kernel.params.iter().filter_map(|param| {
         let name = param.name.as_str();
         Some(match &param.role {
-            Role::Uniform { binding, layout } => {
-                buffer(*binding, name, BindingKind::Uniform, layout)
+            Role::Uniform {
+                binding,
+                layout,
+                push,
+            } => {
+                let kind = if *push {
+                    BindingKind::PushConstants
+                } else {
+                    BindingKind::Uniform
+                };
+                buffer(*binding, name, kind, layout)
             }
             Role::Element { binding, layout } => Binding {
                 element_for_each: Some("invocation".into()),

@@ -29,9 +29,23 @@ pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
     rules
 }
 
-/// What a column's compiler is known to lack that `kernel` needs.
+/// What a column's compiler is known to lack that `kernel`, whose text is `code`, needs.
 #[must_use]
-pub fn lacking(kernel: &Kernel, column: Column) -> Option<String> {
+pub fn lacking(kernel: &Kernel, column: Column, code: &[u8]) -> Option<String> {
+    if column != Column::HlslGlslang {
+        return None;
+    }
+    // `tests/upstream/glslang-wave-prefix`.
+    let scans = [&b"WavePrefixSum("[..], b"WavePrefixProduct("]
+        .iter()
+        .any(|name| code.windows(name.len()).any(|it| it == *name));
+    if scans {
+        return Some(
+            "scans of waves (glslang's HLSL includes the own value in `WavePrefixSum` and \
+             `WavePrefixProduct`)"
+                .into(),
+        );
+    }
     let wide = slots::slots(kernel).iter().any(|slot| match slot.role {
         Use::Uniform(l)
         | Use::Element(l)
@@ -44,7 +58,7 @@ pub fn lacking(kernel: &Kernel, column: Column) -> Option<String> {
         _ => false,
     });
     // `tests/upstream/glslang-templated-load`.
-    (column == Column::HlslGlslang && wide).then(|| {
+    wide.then(|| {
         "64-bit numbers in buffers (glslang's HLSL has no `Load<double>`, nor `Load<uint64_t>`)"
             .into()
     })

@@ -88,7 +88,12 @@ fn bindings(kernel: &Kernel) {
     }
     for p in &kernel.params {
         let what = match &p.role {
-            Role::Uniform { binding, layout } => {
+            Role::Uniform {
+                layout, push: true, ..
+            } => format!("push constants: {}", shape(&layout.name, layout)),
+            Role::Uniform {
+                binding, layout, ..
+            } => {
                 format!("binding {binding}: uniform {}", shape(&layout.name, layout))
             }
             Role::Element { binding, layout } => {

@@ -72,7 +72,7 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
 
 const FAULTS: &str = r#"//! Test.
 #![no_std]
-use hankel_dsl::{Atomics, Buffer, Shared, StorageMut, barrier, kernel};
+use hankel_dsl::{Atomics, Buffer, Shared, StorageMut, barrier, kernel, subgroup_add};
 /// Right: its numbers do not meet.
 #[kernel(compute, threads(64))]
 pub fn fine(#[element] x: u32, #[storage(unordered)] all: StorageMut<'_, u32>, #[atomic] n: Atomics<'_>) {
@@ -132,7 +132,23 @@ pub fn endless(#[element] x: u32) -> u32 {
     }
     x
 }
-hankel_dsl::kernels![fine, race, branch, unwritten, order, wraps, shift, divides, beyond, endless];
+/// Differs where subgroups have another size.
+#[kernel(compute, threads(64))]
+pub fn sized(#[element] x: Option<u32>) -> u32 {
+    subgroup_add(x.unwrap_or(0) | 1)
+}
+/// Adds in a part of the subgroup.
+#[kernel(compute, threads(64))]
+pub fn parted(#[element] x: Option<u32>) -> u32 {
+    if x.unwrap_or(0) & 1 == 0 {
+        subgroup_add(1)
+    } else {
+        0
+    }
+}
+hankel_dsl::kernels![
+    fine, race, branch, unwritten, order, wraps, shift, divides, beyond, endless, sized, parted
+];
 "#;
 
 #[test]
@@ -169,6 +185,10 @@ fn what_no_shader_may_do_is_named_with_its_line() {
         ),
         ("7 / x", ["divides", "attempt to divide by zero", "src/"]),
         ("table.get(i", ["beyond", "out of", "src/"]),
+        (
+            "        subgroup_add(1)",
+            ["parted", "not the same for the subgroup", "has ended"],
+        ),
     ] {
         says(&words);
         says(&[words[0], &line(source)]);
@@ -178,6 +198,11 @@ fn what_no_shader_may_do_is_named_with_its_line() {
         "depends on the order of the invocations",
         "unordered",
     ]);
+    says(&[
+        "sized",
+        "depends on the size of subgroups",
+        "depends(subgroup_size)",
+    ]);
     says(&["endless", "was ended after 2 s"]);
-    assert!(said.contains("10 kernels: 9 with faults"), "{said}");
+    assert!(said.contains("12 kernels: 11 with faults"), "{said}");
 }

@@ -56,7 +56,10 @@ pub fn module(
             json!({ "entries": entries })
         };
         let of_bindings = |number: &dyn Fn(&Binding) -> u32| {
-            let bindings = kernel.bindings.iter();
+            let bindings = kernel
+                .bindings
+                .iter()
+                .filter(|b| b.kind != BindingKind::PushConstants);
             let numbers = bindings.map(|b| (b.name.clone(), number(b)));
             numbers.collect::<BTreeMap<_, _>>()
         };
@@ -241,7 +244,9 @@ fn layout_entry(number: u32, binding: &Binding, stage: u32, filters: bool) -> se
     };
     let sample_type = binding.integers().unwrap_or(sample_type);
     let (key, value) = match binding.kind {
-        BindingKind::Uniform => ("buffer", json!({ "type": "uniform" })),
+        BindingKind::Uniform | BindingKind::PushConstants => {
+            ("buffer", json!({ "type": "uniform" }))
+        }
         BindingKind::Storage if !binding.written => {
             ("buffer", json!({ "type": "read-only-storage" }))
         }

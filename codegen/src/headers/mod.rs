@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use hankel_dsl::native::describe::{Kernel, Layout, Output, Role, Scalar, Type};
 
-use crate::manifest::{Binding, KernelEntry};
+use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::spirv::names::camel_case;
 
 /// The structures that kernels use, each under a name of its own.
@@ -123,7 +123,10 @@ impl<'a> Groups<'a> {
     /// is one group that is empty.
     fn all<'b>(&self, bindings: &'b [Binding]) -> BTreeMap<u32, Vec<(u32, &'b Binding)>> {
         let mut groups: BTreeMap<u32, Vec<(u32, &Binding)>> = BTreeMap::new();
-        for binding in bindings {
+        let bound = bindings
+            .iter()
+            .filter(|it| it.kind != BindingKind::PushConstants);
+        for binding in bound {
             let (group, number) = self.place(binding);
             groups.entry(group).or_default().push((number, binding));
         }

@@ -8,7 +8,7 @@ use hankel_dsl::native::describe::{Layout, Type};
 use super::{
     Groups, InWgsl, Layouts, Part, one_line, padded, parts, scalar_name, scalar_size, size,
 };
-use crate::manifest::{Binding, KernelEntry};
+use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::{Language, VERSION};
 
 /// The module.
@@ -166,7 +166,10 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry, groups: &Group
         );
     }
     let of_bindings = |number: &dyn Fn(&Binding) -> u32| {
-        let bindings = kernel.bindings.iter();
+        let bindings = kernel
+            .bindings
+            .iter()
+            .filter(|b| b.kind != BindingKind::PushConstants);
         let numbers = bindings.map(|b| (described(b), b.name.as_str(), number(b)));
         numbers.collect::<Vec<_>>()
     };

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use super::rust::identifier;
 use super::{Groups, InWgsl};
 use crate::manifest::{Binding, BindingKind, KernelEntry, StageName};
+use crate::translate::ENABLE_SUBGROUPS;
 use crate::{Language, VERSION};
 
 /// The module; it is included in the module that includes `hankel.rs`.
@@ -69,24 +70,44 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry, groups: &Group
                  }})\n        }}\n"
         );
     }
+    // naga 30 refuses the line that WGSL asks for.
+    let enabled = kernel.subgroups.is_some();
+    let (wgsl, note) = if enabled {
+        (
+            format!("kernel::WGSL.replace({ENABLE_SUBGROUPS:?}, \"\")"),
+            " wgpu 30 has the operations of subgroups, and refuses the line that enables them.",
+        )
+    } else {
+        ("kernel::WGSL".into(), "")
+    };
     let _ = write!(
         text,
-        "\n        /// The shader.\n        \
+        "\n        /// The shader.{note}\n        \
          pub fn shader(device: &wgpu::Device) -> wgpu::ShaderModule {{\n            \
              device.create_shader_module(wgpu::ShaderModuleDescriptor {{\n                \
                  label: Some(kernel::WGSL_ENTRY_POINT),\n                \
-                 source: wgpu::ShaderSource::Wgsl(kernel::WGSL.into()),\n            \
+                 source: wgpu::ShaderSource::Wgsl({wgsl}.into()),\n            \
              }})\n        }}\n"
     );
     if kernel.stage == StageName::Compute {
         let (made, used) = pipeline_groups(&groups);
+        let pushed = kernel
+            .bindings
+            .iter()
+            .find(|b| b.kind == BindingKind::PushConstants);
+        let immediates = pushed.map_or_else(String::new, |b| {
+            format!(
+                "immediate_size: {},\n                ",
+                b.stride.unwrap_or(0)
+            )
+        });
         let _ = write!(
             text,
             "\n        /// The pipeline, with every constant at its default.\n        \
              pub fn pipeline(device: &wgpu::Device) -> wgpu::ComputePipeline {{\n{made}            \
                  let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {{\n                \
                      label: Some(kernel::WGSL_ENTRY_POINT),\n                \
-                     bind_group_layouts: &[{used}],\n                ..Default::default()\n            \
+                     bind_group_layouts: &[{used}],\n                {immediates}..Default::default()\n            \
                  }});\n            \
                  device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {{\n                \
                      label: Some(kernel::WGSL_ENTRY_POINT),\n                layout: Some(&layout),\n                \
@@ -157,7 +178,7 @@ fn ty(binding: &Binding, filters: bool) -> String {
         _ => "D2",
     };
     match binding.kind {
-        BindingKind::Uniform => buffer("Uniform"),
+        BindingKind::Uniform | BindingKind::PushConstants => buffer("Uniform"),
         BindingKind::Storage => buffer(match binding.written {
             true => "Storage { read_only: false }",
             false => "Storage { read_only: true }",

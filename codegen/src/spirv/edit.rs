@@ -77,6 +77,11 @@ impl<'a> Editor<'a> {
         self.once(Op::Constant, Some(ty), vec![Operand::LiteralBit32(value)])
     }
 
+    /// The constant `true` of type `ty`.
+    pub fn truth(&mut self, ty: Word) -> Word {
+        self.once(Op::ConstantTrue, Some(ty), Vec::new())
+    }
+
     /// A 32-bit integer of type `ty`.
     pub fn integer(&mut self, ty: Word, value: u32) -> Word {
         self.once(Op::Constant, Some(ty), vec![Operand::LiteralBit32(value)])

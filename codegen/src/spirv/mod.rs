@@ -1,5 +1,6 @@
 //! SPIR-V binaries: reading, writing, and the small edits that spirv-opt has no pass for.
 
+pub mod bounds;
 pub(crate) mod edit;
 pub mod exact;
 pub mod libm;

@@ -24,8 +24,17 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
     };
     for param in &kernel.params {
         match &param.role {
-            Role::Uniform { binding, layout } => {
-                names.buffer(module, *binding, &param.name, layout, "Uniform", "value")?;
+            Role::Uniform {
+                binding,
+                layout,
+                push,
+            } => {
+                let variable = if *push {
+                    in_class(module, StorageClass::PushConstant).next()
+                } else {
+                    bound(module, *binding)
+                };
+                names.block(module, variable, &param.name, layout, "Uniform", "value")?;
             }
             Role::Element { binding, layout }
             | Role::ElementMut { binding, layout }
@@ -118,11 +127,15 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
 }
 
 /// Input variables that every stage names alike: SPIR-V's number, name.
-const INPUTS: [(u32, &str); 9] = [
+const INPUTS: [(u32, &str); 13] = [
     (28, "id"),
     (27, "local_id"),
     (26, "group_id"),
     (29, "local_index"),
+    (36, "subgroup_size"),
+    (38, "subgroup_count"),
+    (40, "subgroup_id"),
+    (41, "subgroup_invocation_id"),
     (42, "vertex_index"),
     (43, "instance_index"),
     (15, "frag_coord"),
@@ -308,7 +321,21 @@ impl Names<'_> {
         suffix: &str,
         member: &str,
     ) -> Result<(), Failure> {
-        let Some(variable) = bound(module, binding) else {
+        let variable = bound(module, binding);
+        self.block(module, variable, name, layout, suffix, member)
+    }
+
+    /// The same of a variable; none if the kernel does not use it.
+    fn block(
+        &mut self,
+        module: &Module,
+        variable: Option<Word>,
+        name: &str,
+        layout: &Layout,
+        suffix: &str,
+        member: &str,
+    ) -> Result<(), Failure> {
+        let Some(variable) = variable else {
             return Ok(());
         };
         self.set(variable, name);

@@ -28,7 +28,7 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 8] = [
+pub const ENABLED: [Capability; 15] = [
     Capability::Float64,
     Capability::Int64,
     Capability::ImageQuery,
@@ -37,6 +37,13 @@ pub const ENABLED: [Capability; 8] = [
     Capability::SampleRateShading,
     Capability::Sampled1D,
     Capability::SampledCubeArray,
+    Capability::GroupNonUniform,
+    Capability::GroupNonUniformVote,
+    Capability::GroupNonUniformArithmetic,
+    Capability::GroupNonUniformBallot,
+    Capability::GroupNonUniformShuffle,
+    Capability::GroupNonUniformShuffleRelative,
+    Capability::GroupNonUniformQuad,
 ];
 
 fn needs(instruction: &Instruction) -> Option<Capability> {
@@ -70,10 +77,36 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
         | Op::FwidthCoarse => Some(Capability::DerivativeControl),
         Op::Decorate => match instruction.operands.get(2) {
             Some(Operand::BuiltIn(BuiltIn::SampleId)) => Some(Capability::SampleRateShading),
+            Some(Operand::BuiltIn(
+                BuiltIn::SubgroupSize
+                | BuiltIn::SubgroupLocalInvocationId
+                | BuiltIn::SubgroupId
+                | BuiltIn::NumSubgroups,
+            )) => Some(Capability::GroupNonUniform),
             _ => None,
         },
+        // Each of these brings `GroupNonUniform` with it.
+        Op::GroupNonUniformAll | Op::GroupNonUniformAny => Some(Capability::GroupNonUniformVote),
+        Op::GroupNonUniformBallot
+        | Op::GroupNonUniformBroadcast
+        | Op::GroupNonUniformBroadcastFirst => Some(Capability::GroupNonUniformBallot),
+        Op::GroupNonUniformShuffle | Op::GroupNonUniformShuffleXor => {
+            Some(Capability::GroupNonUniformShuffle)
+        }
+        Op::GroupNonUniformShuffleUp | Op::GroupNonUniformShuffleDown => {
+            Some(Capability::GroupNonUniformShuffleRelative)
+        }
+        Op::GroupNonUniformQuadBroadcast | Op::GroupNonUniformQuadSwap => {
+            Some(Capability::GroupNonUniformQuad)
+        }
+        other if is_arithmetic(other) => Some(Capability::GroupNonUniformArithmetic),
         _ => None,
     }
+}
+
+/// Whether it is a reduction or a scan of a subgroup, which SPIR-V numbers in a row.
+fn is_arithmetic(op: Op) -> bool {
+    (Op::GroupNonUniformIAdd as u32..=Op::GroupNonUniformLogicalXor as u32).contains(&(op as u32))
 }
 
 /// Formats that every device with storage images has.

@@ -105,6 +105,20 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         job.precise(source, &types)?
     };
     let mut requires = Vec::new();
+    if !job.kernel.subgroups.is_unused() {
+        requires = subgroup_extensions(&source);
+        let lines: String = requires
+            .iter()
+            .map(|name| format!("#extension {name} : require\n"))
+            .collect();
+        // naga asks for all of them if there is an operation, and for none if there is not.
+        source = source
+            .split_inclusive('\n')
+            .filter(|line| !line.starts_with("#extension GL_KHR_shader_subgroup"))
+            .collect();
+        // After the first line, the version.
+        source = source.replacen('\n', &format!("\n{lines}"), 1);
+    }
     if job.language == Language::Essl310 && job.kernel.rounding != Rounding::Free {
         let lines = if job.kernel.rounding == Rounding::Exact {
             requires.push(ES_PRECISE.to_owned());
@@ -170,6 +184,59 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     }))
 }
 
+/// The extensions of GLSL for the operations of subgroups that a text has.
+fn subgroup_extensions(source: &str) -> Vec<String> {
+    let has = |name: &&str| source.contains(&format!("{name}("));
+    let groups: [(&str, &[&str]); 6] = [
+        ("vote", &["subgroupAny", "subgroupAll"]),
+        (
+            "arithmetic",
+            &[
+                "subgroupAdd",
+                "subgroupMul",
+                "subgroupMin",
+                "subgroupMax",
+                "subgroupAnd",
+                "subgroupOr",
+                "subgroupXor",
+                "subgroupInclusiveAdd",
+                "subgroupInclusiveMul",
+                "subgroupExclusiveAdd",
+                "subgroupExclusiveMul",
+            ],
+        ),
+        (
+            "ballot",
+            &[
+                "subgroupBallot",
+                "subgroupBroadcast",
+                "subgroupBroadcastFirst",
+            ],
+        ),
+        ("shuffle", &["subgroupShuffle", "subgroupShuffleXor"]),
+        (
+            "shuffle_relative",
+            &["subgroupShuffleUp", "subgroupShuffleDown"],
+        ),
+        (
+            "quad",
+            &[
+                "subgroupQuadBroadcast",
+                "subgroupQuadSwapHorizontal",
+                "subgroupQuadSwapVertical",
+                "subgroupQuadSwapDiagonal",
+            ],
+        ),
+    ];
+    let used = groups
+        .iter()
+        .filter(|(_, names)| names.iter().any(|name| has(name)));
+    std::iter::once("basic")
+        .chain(used.map(|(name, _)| *name))
+        .map(|name| format!("GL_KHR_shader_subgroup_{name}"))
+        .collect()
+}
+
 fn class(kind: Kind) -> &'static str {
     match kind {
         Kind::Uniform => "uniform",
@@ -218,4 +285,27 @@ fn replace(source: &mut String, given: String, wanted: String) -> String {
     }
     *source = text::rename(source, &given, &wanted);
     wanted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::subgroup_extensions;
+
+    #[test]
+    fn a_text_asks_for_the_extensions_that_it_needs() {
+        let of = |text: &str| subgroup_extensions(text).join(" ");
+        assert_eq!(
+            of("uint a = gl_SubgroupSize;"),
+            "GL_KHR_shader_subgroup_basic"
+        );
+        assert_eq!(
+            of("uint a = subgroupAdd(b); uint c = subgroupShuffleUp(a, 1u);"),
+            "GL_KHR_shader_subgroup_basic GL_KHR_shader_subgroup_arithmetic \
+             GL_KHR_shader_subgroup_shuffle_relative"
+        );
+        assert_eq!(
+            of("uint a = subgroupBroadcastFirst(b);"),
+            "GL_KHR_shader_subgroup_basic GL_KHR_shader_subgroup_ballot"
+        );
+    }
 }

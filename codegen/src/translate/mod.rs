@@ -29,6 +29,7 @@ pub(crate) mod text;
 mod wgsl;
 
 pub(crate) use cleanup::{each_statement, each_within};
+pub(crate) use wgsl::ENABLE_SUBGROUPS;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -348,6 +349,14 @@ impl Ir {
         } else {
             Cow::Borrowed(self)
         };
+        if language != Language::Wgsl
+            && let Some(binding) = pushed(kernel)
+        {
+            let ir = ir.to_mut();
+            if push_constants_to_uniform(&mut ir.module, binding) {
+                ir.info = validate(&ir.module, &ir.kernel)?;
+            }
+        }
         if matches!(language, Language::Essl310 | Language::Essl300)
             && cleanup::has_bit_counts(&ir.module)
         {
@@ -505,6 +514,11 @@ impl Ir {
                  at its own level: use `compare`"
                     .into(),
             );
+        }
+        if !kernel.subgroups.is_unused()
+            && let Some(reason) = without_subgroups(language, options)
+        {
+            return Some(reason);
         }
         let old = options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_2;
         let wide = [ScalarKind::Float, ScalarKind::Uint, ScalarKind::Sint];
@@ -812,6 +826,55 @@ fn inexact(language: Language, options: &Options) -> Option<String> {
         "{lacks}; the kernel is right only if it is computed as it is written"
     ))
 }
+
+/// The binding that push constants have where a language has none.
+fn pushed(kernel: &Kernel) -> Option<u32> {
+    kernel.params.iter().find_map(|param| match param.role {
+        Role::Uniform {
+            binding,
+            push: true,
+            ..
+        } => Some(binding),
+        _ => None,
+    })
+}
+
+/// Makes push constants a uniform buffer: HLSL, MSL and GLSL for OpenGL have one form for both. Tells
+/// whether there are any.
+fn push_constants_to_uniform(module: &mut Module, binding: u32) -> bool {
+    let mut found = false;
+    for (_, global) in module.global_variables.iter_mut() {
+        if global.space == AddressSpace::Immediate {
+            global.space = AddressSpace::Uniform;
+            global.binding = Some(naga::ResourceBinding { group: 0, binding });
+            found = true;
+        }
+    }
+    found
+}
+
+/// Why a language has no operations of subgroups.
+fn without_subgroups(language: Language, options: &Options) -> Option<String> {
+    match language {
+        Language::Essl310 | Language::Essl300 => Some(format!(
+            "{language} has no operations of subgroups: exchange values through workgroup memory"
+        )),
+        Language::Hlsl if options.shader_model.0 < naga::back::hlsl::ShaderModel::V6_0 => {
+            Some(format!(
+                "HLSL has operations of waves from shader model 6.0 on, not in {}",
+                options.shader_model
+            ))
+        }
+        Language::Msl if options.msl_version < SUBGROUPS_MSL => Some(format!(
+            "MSL {} has no sums over SIMD-groups on every device: they came with {SUBGROUPS_MSL}",
+            options.msl_version
+        )),
+        _ => None,
+    }
+}
+
+/// The first version of MSL with all operations of SIMD-groups on every device that has it.
+const SUBGROUPS_MSL: MslVersion = MslVersion { major: 2, minor: 3 };
 
 /// The role of a parameter that is the sample's number.
 const SAMPLE_INDEX: Role = Role::BuiltIn {

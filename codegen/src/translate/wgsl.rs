@@ -8,7 +8,7 @@ use naga::back::{PipelineConstants, wgsl};
 use naga::valid::ModuleInfo;
 use naga::{ImageClass, Module, StorageAccess, StorageFormat, TypeInner};
 
-use super::{Job, Place, Text, Written, text, validate};
+use super::{Job, Place, Text, Written, pushed, text, validate};
 use crate::Language;
 use crate::error::{Failure, Step};
 
@@ -17,6 +17,19 @@ const MORE_FORMATS: &str = "texture-formats-tier1";
 
 /// WGSL's language feature for storage textures that are read.
 const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
+
+/// WebGPU's feature for operations of subgroups, and WGSL's extension.
+const SUBGROUPS: &str = "subgroups";
+
+/// WGSL's language feature for push constants.
+const IMMEDIATES: &str = "immediate_address_space";
+
+/// How they are declared.
+const IMMEDIATE: &str = "var<immediate> ";
+
+/// What begins a text with operations of subgroups, as WGSL demands. naga 30 has the operations, and
+/// refuses this line: whoever hands the text to wgpu 30 takes it out.
+pub(crate) const ENABLE_SUBGROUPS: &str = "enable subgroups;\n";
 
 /// The largest f32, as naga writes it.
 const LARGEST_AS_WRITTEN: &str = "340282350000000000000000000000000000000";
@@ -45,7 +58,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     if !can_be_set(&read) {
         return Ok(Written::Unsettable);
     }
-    let places = job
+    let mut places = job
         .bound()
         .iter()
         .map(|bound| {
@@ -62,6 +75,18 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         })
         .collect::<BTreeMap<_, _>>();
     let mut requires = Vec::new();
+    if let (Some(binding), Some((_, after))) = (pushed(job.kernel), source.split_once(IMMEDIATE)) {
+        let place = Place {
+            name: text::name_before(after, ":"),
+            class: "immediate".into(),
+            index: None,
+            space: None,
+            block: None,
+            combined_with: Vec::new(),
+        };
+        places.insert(binding, place);
+        requires.push(IMMEDIATES.to_owned());
+    }
     if ir.globals().any(|(_, inner)| needs_more_formats(inner)) {
         requires.push(MORE_FORMATS.to_owned());
     }
@@ -70,6 +95,12 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     }
     let entry_point = text::name_before(&source_after_stage(&source), "(")
         .unwrap_or_else(|| job.kernel.name.clone());
+    let source = if job.kernel.subgroups.is_unused() {
+        source
+    } else {
+        requires.push(SUBGROUPS.to_owned());
+        format!("{ENABLE_SUBGROUPS}\n{source}")
+    };
     Ok(Written::Text(Text {
         source,
         entry_point,

@@ -149,6 +149,7 @@ pub fn bound() -> Kernel {
                 Role::Uniform {
                     binding: 0,
                     layout: settings,
+                    push: false,
                 },
             ),
             param(

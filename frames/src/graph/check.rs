@@ -302,6 +302,10 @@ impl Graph {
         let Argument::Value(handle) = argument else {
             return Ok(());
         };
+        if slot.push {
+            let problem = "a frame's values are in buffers: take a `#[uniform]`, not a `#[push]`";
+            return Err(place.argument(&slot.name, problem));
+        }
         let value = &self.values[handle.at()];
         let Shape::Buffer { layout, .. } = &value.shape else {
             return Ok(());

@@ -1,6 +1,8 @@
 //! How a kernel's SPIR-V reaches a Vulkan driver. What the kernel's description says of rounding
 //! decides, here and nowhere else: whoever runs a kernel on Vulkan asks [`Arithmetic::of`].
 
+use std::borrow::Cow;
+
 use hankel_dsl::native::describe::{Kernel, Rounding};
 
 use super::Shader;
@@ -34,5 +36,28 @@ impl Arithmetic {
             Self::Free => Shader::SpirvThroughNaga(spirv),
             Self::Pinned => Shader::SpirvPassthrough(spirv),
         }
+    }
+}
+
+/// WGSL as naga 30 reads it, which has the operations of subgroups and refuses the line that WGSL asks
+/// for before them.
+#[must_use]
+pub fn for_naga(wgsl: &str) -> Cow<'_, str> {
+    const LINE: &str = "enable subgroups;";
+    match wgsl.split_once(LINE) {
+        Some((before, after)) => Cow::Owned([before, after].concat()),
+        None => Cow::Borrowed(wgsl),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::for_naga;
+
+    #[test]
+    fn one_line_is_taken_out() {
+        let text = "// Generated.\nenable subgroups;\n\nfn main() {}\n";
+        assert_eq!(for_naga(text), "// Generated.\n\n\nfn main() {}\n");
+        assert_eq!(for_naga("fn main() {}"), "fn main() {}");
     }
 }

@@ -71,6 +71,8 @@ pub struct Slot<'a> {
     pub binding: Option<u32>,
     /// What it is for.
     pub role: Use<'a>,
+    /// Push constants: bytes, not a buffer.
+    pub push: bool,
 }
 
 impl fmt::Display for Slot<'_> {
@@ -174,7 +176,9 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
     let mut all = Vec::new();
     for param in &kernel.params {
         let (binding, role) = match &param.role {
-            Role::Uniform { binding, layout } => (Some(*binding), Use::Uniform(layout)),
+            Role::Uniform {
+                binding, layout, ..
+            } => (Some(*binding), Use::Uniform(layout)),
             Role::Element { binding, layout } => (Some(*binding), Use::Element(layout)),
             Role::Storage { binding, layout } => (Some(*binding), Use::Storage(layout)),
             Role::ElementMut { binding, layout } => (Some(*binding), Use::ElementMut(layout)),
@@ -233,6 +237,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
             name: param.name.clone(),
             binding,
             role,
+            push: matches!(param.role, Role::Uniform { push: true, .. }),
         });
     }
     for (i, output) in kernel.outputs.iter().enumerate() {
@@ -263,6 +268,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
             name,
             binding,
             role,
+            push: false,
         });
     }
     all
@@ -393,6 +399,9 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
     if let Some(size) = slot.role.element_bytes() {
         let Some(bytes) = bytes else { return wanted() };
         if let Use::Uniform(layout) = slot.role {
+            if slot.push && matches!(given, Given::Buffer { .. }) {
+                return Err("it must be bytes: push constants are in no buffer".into());
+            }
             return if bytes == size {
                 Ok(())
             } else {

@@ -3,9 +3,9 @@
 
 use std::fmt;
 
-use hankel_dsl::native::Mode;
-use hankel_dsl::native::describe::{Kernel, Param, Role, Stage, Tolerance};
+use hankel_dsl::native::describe::{Kernel, Param, Role, Stage, Subgroups, Tolerance};
 use hankel_dsl::native::sanitize::Order;
+use hankel_dsl::native::{Mode, SUBGROUP_SIZE, SUBGROUP_SIZES};
 
 use super::execute::Written;
 use super::numbers::{Difference, Found, Numbers, Rules};
@@ -25,6 +25,15 @@ pub enum Fault {
     Order {
         /// The one that differs from ascending order.
         order: Order,
+        /// How many numbers differ.
+        numbers: u64,
+        /// The first of them; none if another number of bytes was written.
+        first: Option<Box<Difference>>,
+    },
+    /// Subgroups of another size give another result.
+    SubgroupSize {
+        /// The size.
+        size: u32,
         /// How many numbers differ.
         numbers: u64,
         /// The first of them; none if another number of bytes was written.
@@ -63,6 +72,24 @@ impl fmt::Display for Fault {
                     ". If only the places of the elements depend on it, mark that parameter as `unordered`"
                 )
             }
+            Self::SubgroupSize {
+                size,
+                numbers,
+                first,
+            } => {
+                write!(
+                    f,
+                    "the result depends on the size of subgroups: {numbers} numbers are others with subgroups of {size}"
+                )?;
+                if let Some(d) = first {
+                    write!(
+                        f,
+                        "; the first is `{}` of element {}: {} with subgroups of {SUBGROUP_SIZE}, then {}",
+                        d.value, d.invocation, d.expected, d.got
+                    )?;
+                }
+                write!(f, ". If it is meant to, write `depends(subgroup_size)`")
+            }
         }
     }
 }
@@ -85,21 +112,26 @@ pub fn meets(kernel: &Kernel) -> bool {
     cooperative || kernel.params.iter().any(shared)
 }
 
-/// Runs a case in every order of [`Order::ALL`], each access looked at. `run` runs a case natively.
+/// Runs a case in every order of [`Order::ALL`], and with subgroups of every size, each access looked at. `run` runs a case natively.
 /// A kernel in which invocations do not [meet](meets) is run in ascending order alone.
 pub fn check<E: fmt::Display>(
     kernel: &Kernel,
     case: &Case,
     mut run: impl FnMut(Mode, &Case) -> Result<Written, E>,
 ) -> Result<Written, Fault> {
-    let mut in_order = |order: Order| {
-        run(Mode::sanitized(order), case).map_err(|e| Fault::Ended {
+    let mut in_order = |order: Order, subgroup_size: u32| {
+        let mode = Mode::sanitized(order).in_subgroups_of(subgroup_size);
+        run(mode, case).map_err(|e| Fault::Ended {
             order,
-            message: e.to_string(),
+            message: if subgroup_size == SUBGROUP_SIZE {
+                e.to_string()
+            } else {
+                format!("{e} (with subgroups of {subgroup_size})")
+            },
         })
     };
     let [first, others @ ..] = Order::ALL;
-    let reference = in_order(first)?;
+    let reference = in_order(first, SUBGROUP_SIZE)?;
     if !meets(kernel) {
         return Ok(reference);
     }
@@ -114,12 +146,31 @@ pub fn check<E: fmt::Display>(
         hostile: true,
     };
     for order in others {
-        let written = in_order(order)?;
+        let written = in_order(order, SUBGROUP_SIZE)?;
         let mut found = Found::default();
         numbers.compare(case, &exact, None, &reference, &written, &mut found);
         if found.beyond > 0 {
             return Err(Fault::Order {
                 order,
+                numbers: found.beyond,
+                first: found.first.map(Box::new),
+            });
+        }
+    }
+    // Of every size nothing is wrong, and if the kernel does not say otherwise, nothing other.
+    let sizes = SUBGROUP_SIZES
+        .into_iter()
+        .filter(|size| *size != SUBGROUP_SIZE && !kernel.subgroups.is_unused());
+    for size in sizes {
+        let written = in_order(first, size)?;
+        if kernel.subgroups == Subgroups::Sized {
+            continue;
+        }
+        let mut found = Found::default();
+        numbers.compare(case, &exact, None, &reference, &written, &mut found);
+        if found.beyond > 0 {
+            return Err(Fault::SubgroupSize {
+                size,
                 numbers: found.beyond,
                 first: found.first.map(Box::new),
             });

@@ -9,8 +9,8 @@ use naga::back::pipeline_constants::process_overrides;
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::device::Arithmetic;
 use crate::device::vulkan::words;
+use crate::device::{Arithmetic, route};
 
 /// SPIR-V read and written anew by naga, with the specialisation constants of `constants`, by their
 /// numbers, set to these values, and the others to their defaults.
@@ -51,8 +51,9 @@ pub fn wgsl_to_spirv(
     arithmetic: Arithmetic,
 ) -> Result<Vec<u32>, String> {
     guarded(|| {
-        let mut module = naga::front::wgsl::parse_str(text)
-            .map_err(|e| format!("naga cannot read its WGSL: {}", e.emit_to_string(text)))?;
+        let text = route::for_naga(text);
+        let mut module = naga::front::wgsl::parse_str(&text)
+            .map_err(|e| format!("naga cannot read its WGSL: {}", e.emit_to_string(&text)))?;
         for entry in &mut module.entry_points {
             if entry.name == entry_point {
                 entry.name = name.into();
@@ -68,6 +69,8 @@ fn write(
     arithmetic: Arithmetic,
 ) -> Result<Vec<u32>, String> {
     let info = Validator::new(ValidationFlags::all(), Capabilities::all())
+        .subgroup_stages(naga::valid::ShaderStages::all())
+        .subgroup_operations(naga::valid::SubgroupOperationSet::all())
         .validate(module)
         .map_err(|e| format!("naga finds it invalid: {}", e.into_inner()))?;
     let (module, info) = process_overrides(module, &info, None, constants)

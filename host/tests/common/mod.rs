@@ -194,6 +194,7 @@ pub fn affine() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: settings,
+                    push: false,
                 },
             ),
             param(
@@ -526,6 +527,7 @@ pub fn place() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: plain("f32", f),
+                    push: false,
                 },
             ),
             param(
@@ -607,6 +609,7 @@ pub fn tint() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: plain("f32", f),
+                    push: false,
                 },
             ),
             param(
@@ -677,6 +680,7 @@ pub fn mixed() -> Sample {
                 Role::Uniform {
                     binding: 0,
                     layout: settings,
+                    push: false,
                 },
             ),
             param(

@@ -55,7 +55,12 @@ fn shuffles(#[subgroup_invocation_id] lane: u32, #[element] x: Option<u32>) -> U
 fn broadcasts(#[element] x: Option<u32>) -> UVec4 {
     let x = x.unwrap_or(0);
     let third = subgroup_broadcast::<_, 2>(UVec4::new(x, 1, 2, x + 1));
-    UVec4::new(third.x, third.w, subgroup_broadcast_first(x), quad_broadcast::<u32, 1>(x))
+    UVec4::new(
+        third.x,
+        third.w,
+        subgroup_broadcast_first(x),
+        quad_broadcast::<u32, 1>(x),
+    )
 }
 
 /// Values of the quad.
@@ -161,7 +166,10 @@ fn run(name: &str, mode: Mode, words: usize) -> Result<Vec<Vec<u32>>, CallError>
         mode,
     })?;
     let out: &[u32] = bytemuck::cast_slice(&out);
-    Ok(out[..THREADS * words].chunks(words).map(<[u32]>::to_vec).collect())
+    Ok(out[..THREADS * words]
+        .chunks(words)
+        .map(<[u32]>::to_vec)
+        .collect())
 }
 
 /// What stands in the subgroup of `i`, and which of it `i` is.
@@ -212,7 +220,11 @@ fn invocations_know_their_subgroup() {
 fn each_operation_gives_what_its_text_says() {
     let some = |values: [u32; 4]| values.map(Some);
     agrees("votes", |all, _| {
-        let bits: u64 = all.iter().zip(0..).map(|(x, i)| u64::from(x & 1) << i).sum();
+        let bits: u64 = all
+            .iter()
+            .zip(0..)
+            .map(|(x, i)| u64::from(x & 1) << i)
+            .sum();
         let odd = |x: &u32| x & 1 == 1;
         some([
             all.iter().any(odd).into(),
@@ -230,7 +242,12 @@ fn each_operation_gives_what_its_text_says() {
         ]
     });
     agrees("broadcasts", |all, own| {
-        some([all[2], all[2] + 1, all[0], *all.get(own & !3 | 1).unwrap_or(&0xa5a5_a5a5)])
+        some([
+            all[2],
+            all[2] + 1,
+            all[0],
+            *all.get(own & !3 | 1).unwrap_or(&0xa5a5_a5a5),
+        ])
     });
     agrees("quads", |all, own| {
         let at = |i: usize| all.get(i).copied();
@@ -261,7 +278,10 @@ fn each_operation_gives_what_its_text_says() {
 fn a_helper_exchanges_and_subgroups_go_their_own_ways() {
     for size in SUBGROUP_SIZES {
         let mode = Mode::REFERENCE.in_subgroups_of(size);
-        let (helped, ways) = (run("helped", mode, 1).unwrap(), run("ways", mode, 1).unwrap());
+        let (helped, ways) = (
+            run("helped", mode, 1).unwrap(),
+            run("ways", mode, 1).unwrap(),
+        );
         for i in 0..THREADS {
             let (all, _) = subgroup_of(i, size as usize);
             assert_eq!(helped[i], [2 * all.iter().sum::<u32>()]);
@@ -269,7 +289,12 @@ fn a_helper_exchanges_and_subgroups_go_their_own_ways() {
         }
     }
     for entry in entries() {
-        assert_eq!(entry.kernel.subgroups, Subgroups::Sized, "{}", entry.kernel.name);
+        assert_eq!(
+            entry.kernel.subgroups,
+            Subgroups::Sized,
+            "{}",
+            entry.kernel.name
+        );
     }
 }
 
@@ -300,5 +325,8 @@ fn what_is_wrong_is_reported() {
     assert!(run("beyond", Mode::REFERENCE.in_subgroups_of(8), 1).is_ok());
     let alone = std::panic::catch_unwind(|| subgroup_any(true)).unwrap_err();
     let words = alone.downcast_ref::<String>().unwrap();
-    assert!(words.contains("subgroup_any() was called outside"), "{words}");
+    assert!(
+        words.contains("subgroup_any() was called outside"),
+        "{words}"
+    );
 }

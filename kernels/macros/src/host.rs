@@ -80,17 +80,28 @@ impl Kernel {
         self.params
             .iter()
             .filter_map(|p| match &p.role {
-                Role::Uniform(ty) => Some((&p.name, ty)),
+                Role::Uniform(ty) => Some((p, ty)),
                 _ => None,
             })
-            .flat_map(|(name, ty)| self.variants.iter().map(move |v| (name, ty, v)))
-            .map(|(name, ty, v)| {
+            .flat_map(|(p, ty)| self.variants.iter().map(move |v| (p, ty, v)))
+            .map(|(p, ty, v)| {
+                let name = &p.name;
                 let concrete = self.concrete(ty, v);
                 let message = format!(
                     "uniform `{name}`: an array in a uniform buffer needs elements of a multiple of 16 bytes, such as Vec4"
                 );
+                let few = p.push.then(|| {
+                    let message = format!(
+                        "`{name}`: push constants have at most 128 bytes on many devices: take a #[uniform]"
+                    );
+                    quote_spanned! {ty.span()=>
+                        const _: () =
+                            assert!(size_of::<#concrete>() <= native::PUSH_CONSTANT_BYTES, #message);
+                    }
+                });
                 quote_spanned! {ty.span()=>
                     const _: () = assert!(<#concrete as layout::Element>::UNIFORM, #message);
+                    #few
                 }
             })
             .collect()
@@ -175,7 +186,8 @@ impl Kernel {
                 let role = match &p.role {
                     Role::Uniform(ty) => {
                         let layout = layout(ty);
-                        quote!(Uniform { binding: #b, layout: #layout })
+                        let push = p.push;
+                        quote!(Uniform { binding: #b, layout: #layout, push: #push })
                     }
                     Role::Element(ty) => {
                         let layout = layout(ty);

@@ -155,6 +155,8 @@ pub struct Param {
     pub name: Ident,
     pub role: Role,
     pub inputs: Inputs,
+    /// A uniform that is push constants.
+    pub push: bool,
 }
 
 /// What a parameter is bound to; types are the values', without `&`, `Option` or `Buffer`.
@@ -384,7 +386,7 @@ impl Role {
 /// Variables of the generated code.
 const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
 
-const ROLES: &str = "uniform, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
+const ROLES: &str = "uniform, push, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
 
 impl Kernel {
     pub fn parse(args: TokenStream, mut item: ItemFn) -> syn::Result<Self> {
@@ -558,6 +560,12 @@ impl Kernel {
                 }
                 _ => {}
             }
+        }
+        if let Some(second) = self.params.iter().filter(|p| p.push).nth(1) {
+            return error(
+                second.name.span(),
+                "a kernel has one block of push constants: put all of them into one structure",
+            );
         }
         let span = self.name.span();
         if compute.is_some_and(|c| c.cooperative) {
@@ -751,8 +759,11 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
     let word = role.path().require_ident()?.to_string();
     let ty = &*arg.ty;
     let role = match word.as_str() {
-        "uniform" => match ty {
+        "uniform" | "push" => match ty {
             Type::Reference(r) if r.mutability.is_none() => Role::Uniform((*r.elem).clone()),
+            _ if word == "push" => {
+                return Err(syn::Error::new(ty.span(), "push constants are `&T`"));
+            }
             _ => return Err(syn::Error::new(ty.span(), "a uniform is `&T`")),
         },
         "element" => match ty {
@@ -868,7 +879,13 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
             None => return Err(syn::Error::new(role.span(), "this role is not known")),
         },
     };
-    Ok(Param { name, role, inputs })
+    let push = word == "push";
+    Ok(Param {
+        name,
+        role,
+        inputs,
+        push,
+    })
 }
 
 /// Whether a role's attribute says `unordered`.

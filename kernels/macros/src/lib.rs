@@ -28,6 +28,7 @@ use syn::parse_macro_input;
 /// | `texture(FORMAT, …)` | the result is a texel; one entry point for each format |
 /// | `outputs(FORMAT or buffer, …)` | what each of several results is; without it, all are elements of buffers |
 /// | `cooperative(name, …)` | functions marked [`#[cooperative]`](macro@cooperative) that the kernel calls |
+/// | `depends(subgroup_size)` | the result depends on how many invocations a subgroup has, which differs from device to device; without it, it may not |
 /// | `inputs = path::to::function` | makes inputs for parity, see below |
 /// | `exact` | the result is right only if sums and products are computed as they are written: the error of a rounding, for example. Languages that cannot forbid contraction and reordering do not get the kernel; the manifest says which |
 /// | `pinned` | SPIR-V asks for arithmetic as it is written, so that the bits are the same everywhere even where the result is ill-conditioned; languages that cannot ask for it get the kernel all the same |
@@ -38,6 +39,7 @@ use syn::parse_macro_input;
 /// | parameter | what |
 /// | --- | --- |
 /// | `#[uniform] x: &T` | a uniform buffer |
+/// | `#[push] x: &T` | push constants: a value of at most 128 bytes that is part of the commands; one in a kernel. A uniform buffer in languages that have none |
 /// | `#[element] x: T` | the invocation's element of a read-only buffer (`Option<T>` where invocations work together: the last workgroup may have fewer) |
 /// | `#[element] x: &mut T` | the same, changed in place |
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |
@@ -50,6 +52,7 @@ use syn::parse_macro_input;
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
 /// | `#[local_id]`, `#[group_id]`, `#[group_count]` | the invocation's place in its workgroup, its workgroup, how many workgroups the range needs: types as of the index |
 /// | `#[local_index] x: u32` | the invocation's number in its workgroup |
+/// | `#[subgroup_size]`, `#[subgroup_invocation_id]`, `#[subgroup_id]`, `#[subgroup_count] x: u32` | how many invocations the subgroup has, the invocation's number in it, its number in the workgroup, how many the workgroup has |
 /// | `#[shared] x: Shared<'_, T, N>` | memory of the workgroup; `SharedAtomics<'_, u32, N>` (or `i32`) for atomic operations |
 /// | `#[attribute] x: Vec3` | a vertex attribute |
 /// | `#[varying] x: Vec3` | an interpolated value; integers and `Flat<f32>` are that of one vertex |
@@ -102,7 +105,7 @@ pub fn kernel(args: TokenStream, item: TokenStream) -> TokenStream {
         .into()
 }
 
-/// Marks a function that waits at a `barrier` and is called by kernels, which name it
+/// Marks a function that waits at a `barrier`, or exchanges values in its subgroup, and is called by kernels, which name it
 /// in `cooperative(…)`. One that calls others names those: `#[cooperative(other)]`. Such a function
 /// is called by its name or path, not from a closure.
 #[proc_macro_attribute]

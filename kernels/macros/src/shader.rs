@@ -129,6 +129,9 @@ impl Kernel {
             match &p.role {
                 Role::Uniform(ty) => {
                     let ty = self.concrete(ty, variant);
+                    if p.push {
+                        return quote!(#[spirv(push_constant)] #name: &#ty,);
+                    }
                     quote!(#[spirv(uniform, descriptor_set = 0, binding = #here)] #name: &#ty,)
                 }
                 Role::Element(ty) | Role::Storage(ty) => {

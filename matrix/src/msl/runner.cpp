@@ -595,6 +595,11 @@ struct Fiber {
     msl_call call;
     // The barrier that it waits at; 0 for none.
     unsigned waits_at;
+    // The operation of its SIMD-group that it waits at; 0 for none.
+    unsigned waits_in_simd;
+    // What it brings to an operation, and to the one before: others may still read that.
+    unsigned char simd_values[2][16];
+    unsigned simd_turn;
     bool done;
     bool discarded;
     float value[4];
@@ -605,6 +610,7 @@ Fiber *running = nullptr;
 unsigned char *stacks = nullptr;
 constexpr size_t stack_bytes = size_t(1) << 18;
 unsigned fiber_capacity = 0;
+unsigned threads_of_workgroup = 0;
 
 void fiber_main() {
     msl_invoke(&running->call);
@@ -628,6 +634,31 @@ void make_fibers(unsigned count) {
     fiber_capacity = count;
 }
 
+// The threads of a SIMD-group from operation to operation, until they wait at a barrier or are done.
+void run_simdgroup(const unsigned *order, unsigned count, unsigned start) {
+    unsigned end = count - start < msl_simd_width ? count : start + msl_simd_width;
+    for (;;) {
+        for (unsigned i = start; i < end; i++)
+            if (fibers[i].waits_in_simd != fibers[start].waits_in_simd) {
+                fprintf(stderr,
+                        "an operation of a SIMD-group that not all of its threads reach: thread %u "
+                        "waits at line %u, thread %u at %u\n",
+                        start, fibers[start].waits_in_simd, i, fibers[i].waits_in_simd);
+                exit(1);
+            }
+        if (fibers[start].waits_in_simd == 0)
+            return;
+        for (unsigned i = 0; i < count; i++) {
+            if (order[i] < start || order[i] >= end)
+                continue;
+            running = &fibers[order[i]];
+            running->waits_in_simd = 0;
+            current = &running->call;
+            swapcontext(&scheduler, &running->context);
+        }
+    }
+}
+
 // The threads of a workgroup up to each barrier in turn, every time in another order: a result that
 // needs a barrier that is not there is then a wrong one.
 void run_workgroup(unsigned count) {
@@ -640,11 +671,14 @@ void run_workgroup(unsigned count) {
             msl_fail("no memory for the threads of a workgroup");
         ordered = count;
     }
+    threads_of_workgroup = count;
     for (unsigned i = 0; i < count; i++) {
         Fiber &f = fibers[i];
         f.done = false;
         f.discarded = false;
         f.waits_at = 0;
+        f.waits_in_simd = 0;
+        f.simd_turn = 0;
         getcontext(&f.context);
         f.context.uc_stack.ss_sp = stacks + i * stack_bytes + page;
         f.context.uc_stack.ss_size = stack_bytes - page;
@@ -664,6 +698,8 @@ void run_workgroup(unsigned count) {
             current = &running->call;
             swapcontext(&scheduler, &running->context);
         }
+        for (unsigned start = 0; start < count; start += msl_simd_width)
+            run_simdgroup(order, count, start);
         current = nullptr;
         unsigned done = 0;
         for (unsigned i = 0; i < count; i++) {
@@ -690,6 +726,22 @@ void msl_barrier(unsigned line) {
     Fiber *me = running;
     me->waits_at = line;
     swapcontext(&me->context, &scheduler);
+}
+void msl_simd_exchange(unsigned line, const void *value, unsigned bytes, msl_simd *all) {
+    if (running == nullptr)
+        msl_fail("an operation of a SIMD-group outside of a workgroup");
+    Fiber *me = running;
+    auto index = unsigned(me - fibers);
+    unsigned start = index / msl_simd_width * msl_simd_width;
+    unsigned turn = me->simd_turn++ & 1;
+    memcpy(me->simd_values[turn], value, bytes);
+    me->waits_in_simd = line;
+    swapcontext(&me->context, &scheduler);
+    all->lane = index - start;
+    all->count = threads_of_workgroup - start < msl_simd_width ? threads_of_workgroup - start
+                                                               : msl_simd_width;
+    for (unsigned i = 0; i < all->count; i++)
+        memcpy(all->values[i], fibers[start + i].simd_values[turn], 16);
 }
 bool msl_in_quad() { return in_quads; }
 unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (*all)[4]) {
@@ -888,6 +940,11 @@ void run_compute(msl_call call, const unsigned *threads, const unsigned *groups)
                                 call.thread_position_in_grid[d] = g[d] * threads[d] + t[d];
                             }
                             call.thread_index_in_threadgroup[0] = index;
+                            call.thread_index_in_simdgroup[0] = index % msl_simd_width;
+                            call.simdgroup_index_in_threadgroup[0] = index / msl_simd_width;
+                            call.threads_per_simdgroup[0] = msl_simd_width;
+                            call.simdgroups_per_threadgroup[0] =
+                                (count + msl_simd_width - 1) / msl_simd_width;
                             if (msl_has_barriers) {
                                 fibers[index].call = call;
                             } else {

@@ -16,6 +16,10 @@ struct msl_call {
     unsigned threadgroups_per_grid[3];
     unsigned threads_per_grid[3];
     unsigned thread_index_in_threadgroup[3];
+    unsigned thread_index_in_simdgroup[3];
+    unsigned simdgroup_index_in_threadgroup[3];
+    unsigned threads_per_simdgroup[3];
+    unsigned simdgroups_per_threadgroup[3];
     // Of a vertex or fragment.
     unsigned invocation[3];
     unsigned zero[3];
@@ -53,6 +57,16 @@ struct msl_place {
     int offset[3];
 };
 
+// Threads of a SIMD-group: Apple's number.
+enum { msl_simd_width = 32 };
+// What the threads of a SIMD-group bring to an operation: up to 16 bytes each.
+struct msl_simd {
+    unsigned char values[msl_simd_width][16];
+    // Threads that there are, and which of them this one is.
+    unsigned count;
+    unsigned lane;
+};
+
 struct msl_texture;
 
 extern "C" {
@@ -88,6 +102,9 @@ void msl_gather_float(const msl_texture *texture, unsigned flags, const msl_plac
 float msl_lod(const msl_texture *texture, const msl_place *place, const float *dx, const float *dy);
 // Waits for the workgroup's other threads. `line` tells one barrier from another.
 __attribute__((convergent)) void msl_barrier(unsigned line);
+// Waits for the other threads of the SIMD-group, and gives the values of all of them.
+__attribute__((convergent)) void msl_simd_exchange(unsigned line, const void *value, unsigned bytes,
+                                                   msl_simd *all);
 // Whether it runs in a quad: what samples without a level elsewhere takes level 0.
 bool msl_in_quad();
 // The value of each fragment of a quad, of up to four components; gives which of them this one is.

@@ -10,7 +10,7 @@ pub struct Signature {
     pub params: Vec<Param>,
     /// What is returned; none for `void`.
     pub returns: Option<Structure>,
-    /// Whether the text has barriers.
+    /// Whether the text has barriers, or operations of SIMD-groups: threads wait for one another.
     pub barriers: bool,
     /// Whether the text has derivatives, or samples, which may take them.
     pub derivatives: bool,
@@ -80,10 +80,14 @@ pub enum Part {
 }
 
 /// Positions and indices that an invocation can ask for.
-const POSITIONS: [&str; 13] = [
+const POSITIONS: [&str; 17] = [
     "thread_position_in_grid",
     "thread_position_in_threadgroup",
     "thread_index_in_threadgroup",
+    "thread_index_in_simdgroup",
+    "simdgroup_index_in_threadgroup",
+    "threads_per_simdgroup",
+    "simdgroups_per_threadgroup",
     "threadgroup_position_in_grid",
     "threads_per_threadgroup",
     "threadgroups_per_grid",
@@ -128,7 +132,9 @@ pub fn parse(text: &str, entry_point: &str) -> Result<Signature, String> {
         stage: at.stage.clone(),
         params,
         returns,
-        barriers: tokens.iter().any(|t| t.ends_with("_barrier")),
+        barriers: tokens
+            .iter()
+            .any(|t| t.ends_with("_barrier") || t.starts_with("simd_") || t.starts_with("quad_")),
         derivatives: ["dfdx", "dfdy", "fwidth", "sample", "sample_compare"]
             .iter()
             .any(|name| tokens.iter().any(|t| t == name)),

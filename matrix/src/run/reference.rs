@@ -3,10 +3,11 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use hankel_codegen::files::sha256;
-use hankel_dsl::native::Mode;
-use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::describe::{Kernel, Subgroups};
+use hankel_dsl::native::{Mode, SUBGROUP_SIZES};
 use hankel_host::device::{DeviceError, NativeDevice};
 use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 
 use super::Request;
 use crate::column::Column;
-use crate::flush::flushed;
+use crate::flush::flushed as flushed_run;
 use crate::prepare::Prepared;
 use crate::subject::Subject;
 
@@ -30,6 +31,9 @@ pub(super) struct Ready<'a> {
     pub(super) reference: Result<Vec<Written>, String>,
     /// The same as on a device that flushes subnormal numbers; none where that cannot be had.
     pub(super) flushed: Option<Result<Vec<Written>, String>>,
+    /// The references for each size that subgroups may have on a device, for a kernel whose result
+    /// depends on it: what does not flush, and what does.
+    by_size: [Vec<Result<Vec<Written>, String>>; 2],
     pub(super) simd: Result<Vec<Written>, String>,
     /// For each case what samplers may do to its numbers; none for kernels without samplers.
     pub(super) intervals: Vec<Option<Intervals>>,
@@ -40,11 +44,15 @@ impl Ready<'_> {
         &self.subject.entry.kernel
     }
 
-    /// What a column is compared with.
-    pub(super) fn reference_for(&self, column: Column) -> &Result<Vec<Written>, String> {
+    /// What a column is compared with: it agrees if it agrees with one of them.
+    pub(super) fn references_for(&self, column: Column) -> &[Result<Vec<Written>, String>] {
+        let flushes = column.flushes() && self.flushed.is_some();
+        let by_size = &self.by_size[usize::from(flushes)];
         match &self.flushed {
-            Some(flushed) if column.flushes() => flushed,
-            _ => &self.reference,
+            // Natively the size is known.
+            _ if !by_size.is_empty() && column.language().is_some() => by_size,
+            Some(flushed) if flushes => slice::from_ref(flushed),
+            _ => slice::from_ref(&self.reference),
         }
     }
 }
@@ -102,8 +110,19 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         .columns
         .iter()
         .any(|c| c.flushes())
-        .then(|| flushed(|| natively(Mode::REFERENCE)))
+        .then(|| flushed_run(|| natively(Mode::REFERENCE)))
         .flatten();
+    let sizes = SUBGROUP_SIZES.map(|size| Mode::REFERENCE.in_subgroups_of(size));
+    let by_size = if kernel.subgroups == Subgroups::Sized {
+        let plain = sizes.map(natively).into();
+        let flush = flushed.is_some().then(|| {
+            let runs = sizes.map(|mode| flushed_run(|| natively(mode)));
+            runs.into_iter().flatten().collect()
+        });
+        [plain, flush.unwrap_or_default()]
+    } else {
+        [Vec::new(), Vec::new()]
+    };
     let simd = natively(Mode::default());
     let intervals = reference.and_then(|reference| {
         let intervals = prepared
@@ -123,7 +142,10 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         Err(problem) => (Err(problem), Vec::new()),
     };
     let mut all = fs::read(&inputs)?;
-    let references = reference.iter().chain(flushed.iter().flatten());
+    let references = reference
+        .iter()
+        .chain(flushed.iter().flatten())
+        .chain(by_size.iter().flatten().flatten());
     for written in references.flatten().flatten() {
         all.extend_from_slice(written);
     }
@@ -137,6 +159,7 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         hash: sha256(&all),
         reference,
         flushed,
+        by_size,
         simd,
         intervals,
     })

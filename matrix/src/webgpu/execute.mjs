@@ -26,7 +26,10 @@ const ALIGNMENT = 256;
 /** The feature that adds formats of 16-bit normalised numbers, and storage of small ones. */
 const TIER = "texture-formats-tier1";
 
-const FEATURES = ["float32-filterable", TIER];
+/** The feature of operations of subgroups. */
+const SUBGROUPS = "subgroups";
+
+const FEATURES = ["float32-filterable", TIER, SUBGROUPS];
 
 const FILTERS = ["validation", "out-of-memory", "internal"];
 
@@ -76,6 +79,9 @@ export async function execute(device, job, code, inputs) {
 }
 
 async function run(device, job, code, inputs, held) {
+    if (code.includes("\nenable subgroups;") && !device.features.has(SUBGROUPS)) {
+        throw new Error(`the device lacks ${SUBGROUPS}`);
+    }
     const maker = new Maker(device, job, code, inputs, held);
     const cases = [];
     for (const one of job.cases) cases.push(await maker.prepare(one));
@@ -258,6 +264,18 @@ class Maker {
         });
     }
 
+    /** The bytes of push constants; none without. */
+    immediates(one) {
+        const i = this.job.slots.findIndex((slot) => slot.place?.class === "immediate");
+        if (i < 0) return null;
+        const bytes = this.bytes(one.args[i]);
+        // WebGPU's name of the limit, and of how much a pipeline takes of it.
+        if (!(this.device.limits.maxImmediateSize >= bytes.length)) {
+            throw new Error("the device lacks immediates");
+        }
+        return bytes;
+    }
+
     /** Slots of some role, each with its argument. */
     having(kind, one) {
         return this.job.slots.flatMap(({ role }, i) =>
@@ -322,10 +340,11 @@ class Maker {
                     throw new Error(`slot \`${name}\` is bound, and a ${role.kind}`);
             }
         });
+        const immediateSize = this.immediates(one)?.length ?? 0;
         const key = JSON.stringify(entries);
         return this.once(key, () => scoped(this.device, () => {
             const group = this.device.createBindGroupLayout({ entries });
-            const pipeline = this.device.createPipelineLayout({ bindGroupLayouts: [group] });
+            const pipeline = this.device.createPipelineLayout({ bindGroupLayouts: [group], immediateSize });
             return { key, group, pipeline };
         }));
     }
@@ -474,6 +493,8 @@ class Maker {
             const pass = encoder.beginComputePass();
             pass.setPipeline(pipeline);
             pass.setBindGroup(0, group);
+            const immediates = this.immediates(one);
+            if (immediates) pass.setImmediates(0, immediates);
             pass.dispatchWorkgroups(...one.groups);
             pass.end();
             return this.inOrder(reads, one);
@@ -564,6 +585,8 @@ class Maker {
                 });
                 pass.setPipeline(pipelines[g]);
                 pass.setBindGroup(0, binds);
+                const immediates = this.immediates(one);
+                if (immediates) pass.setImmediates(0, immediates);
                 if (values) pass.setVertexBuffer(0, values);
                 pass.draw(one.invocations);
                 pass.end();

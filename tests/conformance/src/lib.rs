@@ -13,6 +13,7 @@ use hankel_dsl::{
 pub mod data;
 pub mod general;
 pub mod layers;
+mod masked;
 pub mod math;
 pub mod sampling;
 pub mod shadow;
@@ -41,6 +42,7 @@ hankel_dsl::kernels![
     subgroup::reduced,
     subgroup::reduced_floats,
     subgroup::quads,
+    masked::looked_up,
     checker,
     gradient,
     downsample,
@@ -78,6 +80,8 @@ hankel_dsl::kernels![
     data::wide,
     data::signed_wide,
     data::packed,
+    data::pushed,
+    data::pushed_colour,
     texels::whole,
     texels::counted_texels,
     texels::signed_texels,

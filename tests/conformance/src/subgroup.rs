@@ -41,7 +41,13 @@ pub fn quick_sum(
 
 /// The sum over the invocations of the workgroup before this one.
 #[cooperative]
-pub fn sum_before(subgroup: u32, lane: u32, size: u32, sums: Shared<'_, u32, 16>, mine: u32) -> u32 {
+pub fn sum_before(
+    subgroup: u32,
+    lane: u32,
+    size: u32,
+    sums: Shared<'_, u32, 16>,
+    mine: u32,
+) -> u32 {
     let before = subgroup_exclusive_add(mine);
     if lane == size - 1 {
         sums.set(subgroup, before.wrapping_add(mine));
@@ -82,7 +88,12 @@ pub fn votes(#[subgroup_invocation_id] lane: u32, #[element] x: Option<u32>) -> 
         (which.x, which.y & ((1 << (lane & 31)) - 1))
     };
     let votes = u32::from(subgroup_any(x & 7 == 7)) + 2 * u32::from(subgroup_all(x & 7 != 3));
-    UVec4::new(votes, which.x, which.y, low.count_ones() + high.count_ones())
+    UVec4::new(
+        votes,
+        which.x,
+        which.y,
+        low.count_ones() + high.count_ones(),
+    )
 }
 
 /// Values of other invocations of the subgroup; of the neighbours where there are some.
@@ -110,7 +121,8 @@ pub fn reduced(#[element] x: Option<u32>) -> UVec4 {
     let bits = subgroup_and(x | 0xff) ^ subgroup_or(x & 0xff00) ^ subgroup_xor(x);
     let extremes = subgroup_min(IVec2::new(signed, -(signed >> 1)));
     let greatest = subgroup_max(x) ^ subgroup_max(signed) as u32 ^ subgroup_min(x);
-    let products = subgroup_mul(x | 1) ^ subgroup_inclusive_mul(x | 1) ^ subgroup_exclusive_mul(x | 1);
+    let products =
+        subgroup_mul(x | 1) ^ subgroup_inclusive_mul(x | 1) ^ subgroup_exclusive_mul(x | 1);
     let sums = subgroup_inclusive_add(x) ^ subgroup_exclusive_add(x >> 1);
     UVec4::new(
         bits ^ extremes.x as u32 ^ extremes.y as u32,

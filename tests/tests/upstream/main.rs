@@ -20,7 +20,7 @@ use naga::back::{glsl, hlsl, msl, spv};
 use naga::proc::BoundsCheckPolicies;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use rspirv::dr::{self, Instruction, Operand};
-use rspirv::spirv::{Decoration, ImageFormat, Op};
+use rspirv::spirv::{Decoration, GroupOperation, ImageFormat, Op};
 use spirv_tools::TargetEnv;
 use spirv_tools::assembler::{Assembler, AssemblerOptions};
 use spirv_tools::opt::compiled::CompiledOptimizer;
@@ -436,6 +436,24 @@ fn glslang_refuses_templated_loads() {
     assert!(words.contains("'Load' : no such field"), "{words}");
     // DXC takes it.
     dxc(&text("glslang-templated-load", "case.hlsl"));
+}
+
+#[test]
+fn glslang_includes_the_own_value_in_prefix_sums() {
+    let scan = |spirv: &[u8]| -> Vec<Operand> {
+        let made = module(spirv);
+        let sums = all(&made, Op::GroupNonUniformIAdd);
+        assert_eq!(sums.len(), 1);
+        sums[0].operands.clone()
+    };
+    let exclusive = Operand::GroupOperation(GroupOperation::ExclusiveScan);
+    let file = case("glslang-wave-prefix", "case.hlsl");
+    assert!(
+        !scan(&compiled(&file, &["-D", "-e", "main"])).contains(&exclusive),
+        "mended: drop `lacking` of matrix/src/rules.rs"
+    );
+    // DXC takes the invocations before this one.
+    assert!(scan(&dxc(&text("glslang-wave-prefix", "case.hlsl"))).contains(&exclusive));
 }
 
 /// What spirv-opt makes of a module.

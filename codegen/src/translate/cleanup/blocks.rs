@@ -12,7 +12,7 @@ pub fn unwrap_blocks(module: &mut Module) {
         .filter(|(_, global)| {
             matches!(
                 global.space,
-                AddressSpace::Uniform | AddressSpace::Storage { .. }
+                AddressSpace::Uniform | AddressSpace::Immediate | AddressSpace::Storage { .. }
             )
         })
         .filter_map(|(handle, global)| match &module.types[global.ty] {

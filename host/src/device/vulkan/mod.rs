@@ -24,6 +24,8 @@ fn wanted_features() -> wgpu::Features {
     wgpu::Features::PASSTHROUGH_SHADERS
         | wgpu::Features::SHADER_F64
         | wgpu::Features::SHADER_INT64
+        | wgpu::Features::SUBGROUP
+        | wgpu::Features::IMMEDIATES
         | wgpu::Features::FLOAT32_FILTERABLE
         | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM
         | wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES
@@ -445,7 +447,7 @@ impl Device for VulkanDevice {
         };
         let during = || format!("running kernel `{}`", kernel.name);
         let bound = self.bind(program, &slots, args, wgpu::ShaderStages::COMPUTE)?;
-        let pipeline = self.compute_pipeline(program, &slots, &bound.layout)?;
+        let pipeline = self.compute_pipeline(program, &slots, &bound)?;
         self.guarded(&during, |device| {
             let mut encoder = device.create_command_encoder(&Default::default());
             {
@@ -455,6 +457,9 @@ impl Device for VulkanDevice {
                 });
                 pass.set_pipeline(&pipeline);
                 pass.set_bind_group(0, &bound.group, &[]);
+                if !bound.pushed.is_empty() {
+                    pass.set_immediates(0, &bound.pushed);
+                }
                 match &groups {
                     Groups::Known([x, y, z]) => pass.dispatch_workgroups(*x, *y, *z),
                     Groups::InBuffer(groups) => pass.dispatch_workgroups_indirect(groups, 0),

@@ -9,6 +9,7 @@ use hankel_dsl::native::describe::{
 };
 
 use super::super::error::{DeviceError, Result};
+use super::super::route;
 use super::super::slots::{self, Given, Slot, Use};
 use super::super::{
     Bind, Blend, BufferId, Colour, Cull, Depth, DepthTest, Draw, Format, Pass, Program, Shader,
@@ -49,12 +50,25 @@ struct RenderKey {
     samples: u32,
     topology: Topology,
     cull: Cull,
+    immediate_size: u32,
 }
 
 /// A kernel's arguments, bound.
 pub struct Bound {
     pub layout: wgpu::BindGroupLayout,
     pub group: wgpu::BindGroup,
+    /// Push constants.
+    pub pushed: Vec<u8>,
+}
+
+/// Whether code has push constants, not a uniform buffer in their place.
+fn has_push_constants(shader: Shader<'_>) -> bool {
+    match shader {
+        Shader::SpirvPassthrough(code) | Shader::SpirvThroughNaga(code) => {
+            words::has_push_constants(code)
+        }
+        Shader::Wgsl { text, .. } => text.contains("var<immediate>"),
+    }
 }
 
 /// A stage of a pipeline.
@@ -124,6 +138,11 @@ impl VulkanDevice {
                  ask of a driver"
                     .into(),
             ));
+        }
+        if !kernel.subgroups.is_unused()
+            && !self.device.features().contains(wgpu::Features::SUBGROUP)
+        {
+            return Err(self.missing("subgroups", kernel));
         }
         let constants = slots::constants(kernel, program.constants)?;
         let numbered: Vec<(u32, u32)> = kernel
@@ -195,6 +214,7 @@ impl VulkanDevice {
                 } else {
                     text.replace("@group(0)", &format!("@group({set})"))
                 };
+                let text = route::for_naga(&text).into_owned();
                 (ModuleKey::Wgsl(text), entry_point.to_string())
             }
         };
@@ -323,10 +343,28 @@ impl VulkanDevice {
         let kernel = program.kernel;
         let mut entries = Vec::new();
         let mut resources: Vec<(u32, Resource)> = Vec::new();
+        let mut pushed = Vec::new();
         for (slot, bind) in slots.iter().zip(args) {
             let Some(binding) = slot.binding else {
                 continue;
             };
+            // A text of another language has them in a uniform buffer.
+            if slot.push && program.shader.is_some_and(has_push_constants) {
+                let Bind::Bytes(bytes) = bind else {
+                    return Err(slots::refuse(kernel, slot, "it must be bytes".into()));
+                };
+                if !self.device.features().contains(wgpu::Features::IMMEDIATES) {
+                    return Err(self.missing("push constants", kernel));
+                }
+                self.limit(
+                    format!("kernel `{}`, {slot}: its size in bytes", kernel.name),
+                    bytes.len() as u64,
+                    self.limits.max_immediate_size.into(),
+                )?;
+                pushed = bytes.to_vec();
+                // Bound all the same: wgpu closes gaps in the numbers of bindings, and SPIR-V that goes
+                // to the driver as it is keeps its own.
+            }
             let (ty, resource) = self.resource(kernel, slot, bind)?;
             entries.push(wgpu::BindGroupLayoutEntry {
                 binding,
@@ -364,7 +402,11 @@ impl VulkanDevice {
                 entries: &entries,
             })
         })?;
-        Ok(Bound { layout, group })
+        Ok(Bound {
+            layout,
+            group,
+            pushed,
+        })
     }
 
     /// One argument: its type in the layout, and what is bound.
@@ -526,8 +568,10 @@ impl VulkanDevice {
         &mut self,
         program: &Program<'_>,
         slots: &[Slot<'_>],
-        layout: &wgpu::BindGroupLayout,
+        bound: &Bound,
     ) -> Result<wgpu::ComputePipeline> {
+        let layout = &bound.layout;
+        let immediate_size = bound.pushed.len() as u32;
         let kernel = program.kernel;
         if let Stage::Compute {
             threads,
@@ -565,7 +609,7 @@ impl VulkanDevice {
                     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                         label: Some(&kernel.name),
                         bind_group_layouts: &layouts,
-                        immediate_size: 0,
+                        immediate_size,
                     });
                     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                         label: Some(&kernel.name),
@@ -611,6 +655,7 @@ impl Resource {
 struct Ready {
     pipeline: wgpu::RenderPipeline,
     groups: Vec<wgpu::BindGroup>,
+    pushed: Vec<u8>,
     attributes: Vec<wgpu::Buffer>,
     indices: Option<wgpu::Buffer>,
     count: u32,
@@ -680,6 +725,9 @@ impl VulkanDevice {
                     encoded.set_pipeline(&draw.pipeline);
                     for (i, group) in (0..).zip(&draw.groups) {
                         encoded.set_bind_group(i, group, &[]);
+                    }
+                    if !draw.pushed.is_empty() {
+                        encoded.set_immediates(0, &draw.pushed);
                     }
                     for (i, buffer) in (0..).zip(&draw.attributes) {
                         encoded.set_vertex_buffer(i, buffer.slice(..));
@@ -827,6 +875,7 @@ impl VulkanDevice {
         let linked = self.link(&draw.vertex, &slots, VERTEX_SET)?;
         let vertex_stage = (linked.module, linked.entry_point, bound.layout.clone());
         let mut groups = vec![bound.group];
+        let mut pushed = bound.pushed;
         let mut fragment_stage = None;
         if let Some(fragment) = &draw.fragment {
             let slots = slots::drawn_slots(fragment.kernel);
@@ -836,6 +885,16 @@ impl VulkanDevice {
             let linked = self.link(fragment, &slots, FRAGMENT_SET)?;
             fragment_stage = Some((linked.module, linked.entry_point, bound.layout));
             groups.push(bound.group);
+            // The stages have one block of them.
+            if !pushed.is_empty() && !bound.pushed.is_empty() && pushed != bound.pushed {
+                return Err(bad(
+                    "both stages have push constants, and other ones: give them the same bytes, or make one of them a uniform"
+                        .into(),
+                ));
+            }
+            if pushed.is_empty() {
+                pushed = bound.pushed;
+            }
         } else if !draw.fragment_args.is_empty() {
             return Err(bad(
                 "fragment arguments were given without a fragment kernel".into(),
@@ -858,11 +917,13 @@ impl VulkanDevice {
             samples,
             topology: draw.topology,
             cull: draw.cull,
+            immediate_size: pushed.len() as u32,
         };
         let pipeline = self.render_pipeline(pass, draw, key)?;
         Ok(Ready {
             pipeline,
             groups,
+            pushed,
             attributes,
             indices,
             count: draw.count,
@@ -1031,7 +1092,7 @@ impl VulkanDevice {
                     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                         label: Some(pass.label),
                         bind_group_layouts: &layouts,
-                        immediate_size: 0,
+                        immediate_size: key.immediate_size,
                     });
                     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                         label: Some(pass.label),

@@ -36,6 +36,9 @@ const BINDING: u32 = 33;
 /// Decoration `DescriptorSet`.
 const DESCRIPTOR_SET: u32 = 34;
 
+/// Storage class `PushConstant`.
+const PUSH_CONSTANT: u32 = 9;
+
 /// Words before the first instruction.
 const HEADER: usize = 5;
 
@@ -78,6 +81,13 @@ fn string(words: &[u32]) -> String {
         .take_while(|&b| b != 0)
         .collect();
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Whether a module has push constants.
+pub fn has_push_constants(words: &[u32]) -> bool {
+    let all = instructions(words).unwrap_or_default();
+    all.iter()
+        .any(|i| i.opcode == VARIABLE && i.operands.get(2) == Some(&PUSH_CONSTANT))
 }
 
 /// What is known of a module.

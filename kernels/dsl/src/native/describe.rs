@@ -291,10 +291,13 @@ pub enum Length {
 pub enum Role {
     /// A uniform buffer with one value.
     Uniform {
-        /// Number in set 0.
+        /// Number in set 0; of push constants only where a language has none.
         binding: u32,
         /// Layout of the value.
         layout: Layout,
+        /// Push constants: a value that is part of the commands, not in a buffer.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        push: bool,
     },
     /// A read-only storage buffer of which the invocation gets its own element.
     Element {

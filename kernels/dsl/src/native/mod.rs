@@ -38,6 +38,9 @@ pub struct Entry {
     pub inputs: Option<inputs::Make>,
 }
 
+/// Bytes of push constants that every device with Vulkan has.
+pub const PUSH_CONSTANT_BYTES: usize = 128;
+
 #[doc(hidden)]
 pub use std::vec::Vec;
 

@@ -262,10 +262,7 @@ functions! {
 #[allow(missing_docs, reason = "as the function that it stands for")]
 #[inline]
 #[track_caller]
-pub fn subgroup_shuffle<T: SubgroupValue>(
-    value: T,
-    invocation: u32,
-) -> impl Future<Output = T> {
+pub fn subgroup_shuffle<T: SubgroupValue>(value: T, invocation: u32) -> impl Future<Output = T> {
     with(value, 0, Location::caller(), move |it| {
         it.value(invocation as usize)
     })
