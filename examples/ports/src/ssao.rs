@@ -63,9 +63,9 @@ pub fn ssao(
     let here = place(at.x, at.y);
     // The normal from the neighbours that are nearer in depth.
     let east = place(if at.x < last.x { at.x + 1 } else { at.x }, at.y) - here;
-    let west = here - place(if at.x > 0 { at.x - 1 } else { 0 }, at.y);
+    let west = here - place(at.x - u32::from(at.x > 0), at.y);
     let south = place(at.x, if at.y < last.y { at.y + 1 } else { at.y }) - here;
-    let north = here - place(at.x, if at.y > 0 { at.y - 1 } else { 0 });
+    let north = here - place(at.x, at.y - u32::from(at.y > 0));
     let nearer = |a: Vec3, b: Vec3, has_a: bool, has_b: bool| {
         if has_a && (!has_b || Real::abs(a.z) < Real::abs(b.z)) {
             a
@@ -145,8 +145,8 @@ pub fn ssao_blur(
         while column < 5 {
             let (x, y) = (at.x + column, at.y + row);
             // Two to the left and above, within the picture.
-            let x = if x < 2 { 0 } else { x - 2 };
-            let y = if y < 2 { 0 } else { y - 2 };
+            let x = (if x < 2 { 2 } else { x }) - 2;
+            let y = (if y < 2 { 2 } else { y }) - 2;
             let tap = UVec2::new(
                 if x > last.x { last.x } else { x },
                 if y > last.y { last.y } else { y },
