@@ -141,8 +141,11 @@ fn every_technique_of_hard_shadows_shades_from_a_lamp() {
                 // Against all rounding, see `frames/tests/truth.rs`.
                 let is_small = is_float && map.moment_bias < 1e-5;
                 let bias = map.moment_bias * if is_small { 4.0 } else { 1.0 };
+                // Depths within a texel of so coarse a map differ by more than the bias of those that compare them.
+                let compares = t.depth_bias >= 2e-3;
+                let depth_bias = if compares { 0.01 } else { t.depth_bias };
                 let shadow = format!(
-                    "[shadow]\nmoment_bias = {bias}\ntechnique = '{}'\nformat = '{}'\ndepth_range = '{}'\nsize = 256\n\
+                    "[shadow]\nmoment_bias = {bias}\ndepth_bias = {depth_bias}\ntechnique = '{}'\nformat = '{}'\ndepth_range = '{}'\nsize = 256\n\
                      filter = 3\nleak_cut = 0.0\nfit = '{fit}'",
                     t.name,
                     map.format.name(),
