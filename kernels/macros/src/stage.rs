@@ -223,7 +223,7 @@ impl BuiltIn {
     /// What the host gives for it in the executors of vertices and fragments.
     pub fn on_host(self) -> TokenStream {
         match self {
-            Self::VertexIndex => quote!(i as u32),
+            Self::VertexIndex => quote!(__i as u32),
             // One instance is run.
             Self::InstanceIndex => quote!(0_u32),
             Self::FragCoord => quote!(__fragment.coord),
