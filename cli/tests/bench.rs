@@ -196,9 +196,6 @@ fn frames_are_measured_once() {
     );
 }
 
-const SCENE: &str = "[geometry]\nprocedural = 'box'\n[camera]\neye = [2, 6, 4]\ntarget = [0, 0, 0]\n\
-    [light]\ndirection = [1, -1, 0.4]\n[shadow]\nsize = 64\nfilter = 3\n[output]\nwidth = 32\nheight = 24\n";
-
 #[test]
 fn candidates_are_ranked_on_shadow_maps() {
     let folder = tempfile::tempdir().expect("a temporary folder");
