@@ -229,18 +229,22 @@ pub(super) fn fragments(s: &mut Source) -> [Vec<Vec3>; 3] {
     [world, normals, colours]
 }
 
-/// What shading reads beside a map: fragments, light and sampler.
-pub(super) fn fragments_and_light(s: &mut Source, what: &str, light: &Light) -> Given {
+/// Fragments and a light.
+fn fragments_in_light(s: &mut Source, what: &str, light: &Light) -> Given {
     let [world, normals, colours] = fragments(s);
     Given::new(what)
         .buffer("world", &world)
         .buffer("normal", &normals)
         .buffer("colour", &colours)
         .uniform("light", light)
-        .sampler(
-            "sampler",
-            Sampler::new(Filter::Linear, Address::ClampToEdge),
-        )
+}
+
+/// What shading reads beside a map: fragments, light and sampler.
+pub(super) fn fragments_and_light(s: &mut Source, what: &str, light: &Light) -> Given {
+    fragments_in_light(s, what, light).sampler(
+        "sampler",
+        Sampler::new(Filter::Linear, Address::ClampToEdge),
+    )
 }
 
 /// A map of floats.
@@ -250,7 +254,7 @@ pub(super) fn with_map(given: Given, name: &str, map: &[Vec4]) -> Given {
 }
 
 /// The same with the published bias and a depth bias, with ten times that strength and none, and with the
-/// published bias and a spot light.
+/// published bias and a spot light. With a sampler, if there are `maps` for it.
 pub(super) fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>)]) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     let strength = bias.strength as f32;
@@ -263,7 +267,11 @@ pub(super) fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>
     .map(|(what, moment_bias, depth_bias, is_spot)| {
         let light = light(bias, moment_bias, depth_bias, 1);
         let light = if is_spot { spot(&light) } else { light };
-        let given = fragments_and_light(&mut s, what, &light);
+        let given = if maps.is_empty() {
+            fragments_in_light(&mut s, what, &light)
+        } else {
+            fragments_and_light(&mut s, what, &light)
+        };
         maps.iter()
             .fold(given, |given, (name, map)| with_map(given, name, map))
     })
