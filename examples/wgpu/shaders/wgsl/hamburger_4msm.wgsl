@@ -7,15 +7,6 @@ struct Moments4 {
     b4: f32,
 }
 
-struct Shadow {
-    shadow: f32,
-}
-
-struct Receiver4 {
-    moments: Moments4,
-    depth: f32,
-}
-
 struct Settings {
     bias_target: Moments4,
     moment_bias: f32,
@@ -24,12 +15,21 @@ struct Settings {
     least_variance: f32,
 }
 
-@group(0) @binding(2) 
-var<storage, read_write> out: array<Shadow>;
-@group(0) @binding(1) 
-var<storage> receiver: array<Receiver4>;
+struct Receiver4 {
+    moments: Moments4,
+    depth: f32,
+}
+
+struct Shadow {
+    shadow: f32,
+}
+
 @group(0) @binding(0) 
 var<uniform> settings: Settings;
+@group(0) @binding(1) 
+var<storage> receiver: array<Receiver4>;
+@group(0) @binding(2) 
+var<storage, read_write> out: array<Shadow>;
 
 @compute @workgroup_size(64, 1, 1) 
 fn hamburger_4msm(@builtin(global_invocation_id) id: vec3<u32>) {
