@@ -132,8 +132,8 @@ fn a_fault_in_a_bound_for_nearly_degenerate_moments_is_found() {
 #[test]
 fn a_fault_in_a_shading_kernel_for_the_moments_of_real_maps_is_found() {
     let subject = subject_of_shadows("shade_hamburger");
-    let square = "let product_2 = (difference_3 * difference_3);";
-    let fault = "let product_2 = (difference_3 * difference_3) * select(1f, 4f, 1.5e-14f < most_2 && most_2 < 1e-6f && 1e-3f < most_1);";
+    let square = "let product_2 = (difference_6 * difference_6);";
+    let fault = "let product_2 = (difference_6 * difference_6) * select(1f, 4f, 1.5e-14f < most_3 && most_3 < 1e-6f && 1e-3f < most_2);";
     assert!(!found_in_wgsl(without_own_inputs(&subject), square, fault));
     assert!(found_in_wgsl(subject, square, fault));
 }

@@ -46,7 +46,7 @@ fn committed_spirv_follows_from_its_sources() {
         let kernels: Vec<_> = one.entries.iter().map(|e| e.kernel.clone()).collect();
         let names: Vec<&str> = kernels.iter().map(|k| k.name.as_str()).collect();
         let target = root().join("target");
-        let mut compile = |wanted| {
+        let compile = |wanted| {
             compile(&one.manifest, &compiler, &target, wanted, &mut |_| {})
                 .unwrap_or_else(|e| panic!("{e}"))
         };

@@ -304,7 +304,7 @@ mod tests {
             let used = this
                 .result_id
                 .is_some_and(|it| ids(next).any(|id| id == it));
-            if !used && (i as u32 + seed) % 2 == 0 {
+            if !used && (i as u32 + seed).is_multiple_of(2) {
                 module.types_global_values.swap(i - 1, i);
             }
         }
@@ -340,7 +340,6 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         assert_eq!(of(Decoration::Binding), [0, 1, 2]);
-        crate::finish::validate(&store(&module), "test").unwrap();
     }
 
     #[test]
