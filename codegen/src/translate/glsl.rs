@@ -228,9 +228,7 @@ fn subgroup_extensions(source: &str) -> Vec<String> {
             ],
         ),
     ];
-    let used = groups
-        .iter()
-        .filter(|(_, names)| names.iter().any(&has));
+    let used = groups.iter().filter(|(_, names)| names.iter().any(&has));
     std::iter::once("basic")
         .chain(used.map(|(name, _)| *name))
         .map(|name| format!("GL_KHR_shader_subgroup_{name}"))
