@@ -62,6 +62,7 @@ impl Texel {
             "rgba16unorm" => (RGBA16_EXT, glow::RGBA, glow::UNSIGNED_SHORT, 8),
             "rgba8unorm" => (glow::RGBA8, glow::RGBA, glow::UNSIGNED_BYTE, 4),
             "r32uint" => (glow::R32UI, glow::RED_INTEGER, glow::UNSIGNED_INT, 4),
+            "rg32uint" => (glow::RG32UI, glow::RG_INTEGER, glow::UNSIGNED_INT, 8),
             "rgba32uint" => (glow::RGBA32UI, glow::RGBA_INTEGER, glow::UNSIGNED_INT, 16),
             "rgba32sint" => (glow::RGBA32I, glow::RGBA_INTEGER, glow::INT, 16),
             "r32sint" => (glow::R32I, glow::RED_INTEGER, glow::INT, 4),
