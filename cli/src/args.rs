@@ -275,6 +275,7 @@ Examples:
   hankel diff old/shaders shaders
   hankel diff old/shaders shaders --deny interface --format json
   hankel diff old/shaders shaders --run
+  hankel diff old/shaders shaders --scene scenes/hard.toml --out hard.png
 
 A change is of the interface where code that binds or calls a shader may have to change, too: bindings,
 layouts, workgroup sizes, entry points, signatures. Everything else is a change of the text, of what it
@@ -295,6 +296,15 @@ pub struct Diff {
     /// Seed of the generated inputs.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "run")]
     pub seed: u64,
+    /// Render this scene (TOML) on Vulkan with the shaders of either build, and compare the pictures.
+    #[cfg(feature = "frames")]
+    #[arg(long, value_name = "SCENE", requires = "out")]
+    pub scene: Option<PathBuf>,
+    /// With --scene: the picture (PNG) by the new shaders; OUT-old and OUT-difference are written beside
+    /// it.
+    #[cfg(feature = "frames")]
+    #[arg(long, value_name = "FILE", requires = "scene")]
+    pub out: Option<PathBuf>,
     /// Exit with 1 if there is such a change.
     #[arg(long, value_enum)]
     pub deny: Option<Deny>,

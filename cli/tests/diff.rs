@@ -69,6 +69,57 @@ fn numbers_of_two_builds_are_compared() {
 }
 
 #[test]
+#[cfg(feature = "frames")]
+fn a_scene_by_both_builds_is_compared() {
+    let desk = Desk::new();
+    let scene = "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\ntarget = [0.0, 0.5, 0.0]\n\
+                 [light]\ndirection = [-1.0, -2.0, -0.5]\n[shadow]\nsize = 128\nfilter = 5\n\
+                 [output]\nwidth = 96\nheight = 64\n";
+    desk.write("s.toml", scene);
+    says(&desk, "build --out one --kernel shade_hamburger");
+    // As if the map held depths in [0, 1].
+    says(
+        &desk,
+        "build --out two --kernel shade_hamburger --set encoding=1",
+    );
+    let share = |old: &str, new: &str| {
+        let line = format!("diff {old} {new} --scene s.toml --out p.png --format json");
+        let json: Value = serde_json::from_str(&says(&desk, &line)).expect("JSON");
+        let pictures = &json["pictures"];
+        assert_eq!(pictures["kernels"][0], "shade_hamburger", "{json}");
+        for file in pictures["files"].as_array().expect("files") {
+            let file = desk.path(file.as_str().expect("a path"));
+            assert!(file.is_file(), "{}", file.display());
+        }
+        pictures["difference"]["over_8"].as_f64().expect("a share")
+    };
+    assert_eq!(share("one", "one").to_bits(), 0.0_f64.to_bits());
+    let changed = share("one", "two");
+    assert!(changed > 0.01, "{changed}");
+
+    // Where another text is bound does not matter to SPIR-V.
+    says(
+        &desk,
+        "build --out moved --kernel shade_hamburger --hlsl-space 3",
+    );
+    assert_eq!(share("one", "moved").to_bits(), 0.0_f64.to_bits());
+
+    says(&desk, "build --out other --kernel vsm");
+    desk.hankel("diff other other --scene s.toml --out p.png")
+        .fails(2, &["no kernel", "shade_hamburger"]);
+    desk.hankel("diff one two --scene s.toml --out s.toml")
+        .fails(2, &["s.toml", "overwritten"]);
+    assert_eq!(desk.read("s.toml"), scene);
+    let manifest = desk.read("one/manifest.json");
+    desk.write(
+        "one/manifest.json",
+        &manifest.replacen("\"binding\": 0", "\"binding\": 9", 1),
+    );
+    desk.hankel("diff one two --scene s.toml --out p.png")
+        .fails(2, &["one", "shade_hamburger", "binding: 9 -> 0"]);
+}
+
+#[test]
 fn libraries_are_compared() {
     let desk = Desk::new();
     says(&desk, "build --form functions --out one");

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::files::sha256;
 use crate::folder::{Folder, Found};
 use crate::functions::api;
-use crate::manifest::Manifest;
+use crate::manifest::{KernelEntry, Manifest};
 
 /// What changed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -144,6 +144,36 @@ impl Build {
     }
 }
 
+/// The manifest of a folder of shaders.
+///
+/// # Errors
+///
+/// As for [`compare`]; the folder has functions.
+pub fn shaders(path: &Path) -> Result<Manifest> {
+    match Build::read(path)? {
+        Build::Shaders(manifest) => Ok(*manifest),
+        Build::Functions(_) => Err(Error::Compared {
+            path: path.to_owned(),
+            problem: "it has functions, no shaders".into(),
+        }),
+    }
+}
+
+/// The first thing that whoever binds the SPIR-V of `old` would have to change to bind that of `new`.
+#[must_use]
+pub fn bound_otherwise(old: &KernelEntry, new: &KernelEntry) -> Option<Change> {
+    // Where other languages bind it, and constants that are frozen, do not matter to SPIR-V.
+    let is_of_spirv = |path: &str| {
+        is_interface(path)
+            && !path.contains(".places.")
+            && !path.starts_with("languages.")
+            && !path.starts_with("constants.")
+            && !path.ends_with(".summary")
+    };
+    let mut all = changes("", old, new, is_of_spirv).into_iter();
+    all.find(|change| change.interface)
+}
+
 /// The SPIR-V of a kernel in a folder of shaders.
 ///
 /// # Errors
@@ -154,9 +184,7 @@ pub fn spirv(path: &Path, kernel: &str) -> Result<Vec<u8>> {
         path: path.to_owned(),
         problem,
     };
-    let Build::Shaders(manifest) = Build::read(path)? else {
-        return Err(fail("it has functions, no shaders".into()));
-    };
+    let manifest = shaders(path)?;
     let file = manifest
         .kernels
         .get(kernel)

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use hankel_codegen::build::{Generated, MANIFEST_FILE, check_output, write};
 use hankel_codegen::frame::{self, Draft, FRAME_FILE, Frame};
-use hankel_frames::scene::{Geometry, Scene};
+use hankel_frames::scene::Scene;
 use hankel_frames::{FrameError, export, recorded, recorded_medium};
 use hankel_system::input;
 
 use super::build::{depend, tell};
-use super::scene::{AUTO, Asked, with_technique};
+use super::scene::{AUTO, Asked, files, with_technique};
 use crate::args::{Build, Check, Form, Format, Generate};
 use crate::failure::{Failure, Outcome, Result, blame_of_input};
 use crate::print::say;
@@ -169,10 +169,7 @@ fn generate(args: &Generate, draft: &Draft, quiet: bool) -> Result<Generated> {
 
 /// The files that a frame follows from beside this program, as absolute paths.
 fn inputs(args: &Build, file: &Path, scene: &Scene) -> Result<Vec<PathBuf>> {
-    let mut files = vec![file];
-    if let Geometry::Model { file, .. } = &scene.geometry {
-        files.push(file);
-    }
+    let mut files = files(file, scene);
     files.extend(args.generate.placement.bindings.as_deref());
     let absolute = |file: &Path| {
         std::path::absolute(file)

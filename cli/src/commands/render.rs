@@ -2,15 +2,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hankel_frames::graph::Summary;
-use hankel_frames::scene::{Geometry, Scene};
+use hankel_frames::scene::Scene;
 use hankel_frames::truth::{Measured, measure};
-use hankel_frames::{Difference, Memory, Picture, Rendering, Timing, compare, render};
+use hankel_frames::{Difference, Memory, Rendering, Timing, compare, render};
 use hankel_host::device::Backend;
-use hankel_system::output::{self, Output};
+use hankel_system::output;
 use serde::Serialize;
 
 use crate::args::{Format, Render};
-use crate::commands::scene::Asked;
+use crate::commands::scene::{Asked, beside, files, is_exr, save};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
@@ -54,10 +54,7 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
     } else {
         vec![args.out.clone()]
     };
-    let mut inputs = vec![args.scene.as_path()];
-    if let Geometry::Model { file, .. } = &scene.geometry {
-        inputs.push(file);
-    }
+    let inputs = files(&args.scene, &scene);
     let places: Vec<&Path> = pictures.iter().map(PathBuf::as_path).collect();
     // Whether they can be written shows before the long work starts.
     let outputs = output::create_all(&places, &inputs)?;
@@ -127,27 +124,6 @@ fn errors(args: &Render, scene: &Scene, progress: &mut Progress) -> Result<Optio
         return Ok(None);
     }
     Ok(Some(measure(scene, &scene.mesh()?, progress)?))
-}
-
-fn save<const N: usize>(pictures: [&Picture; N], outputs: Vec<Output>) -> Result<()> {
-    for (picture, output) in pictures.into_iter().zip(outputs) {
-        picture.save(output)?;
-    }
-    Ok(())
-}
-
-/// Whether a file is to hold linear light.
-fn is_exr(out: &Path) -> bool {
-    out.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
-}
-
-/// `scan.png` and `vulkan` to `scan-vulkan.png`.
-fn beside(out: &Path, what: &str) -> PathBuf {
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = out.extension().unwrap_or_default().to_string_lossy();
-    let dot = if extension.is_empty() { "" } else { "." };
-    out.with_file_name(format!("{stem}-{what}{dot}{extension}"))
 }
 
 /// What there is to tell.

@@ -1,9 +1,11 @@
 //! A scene, and how its shadows are to be made: what `render` and `build` are asked alike.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use hankel_frames::Picture;
 use hankel_frames::plan::Wanted;
-use hankel_frames::scene::{Scene, Shadow};
+use hankel_frames::scene::{Geometry, Scene, Shadow};
+use hankel_system::output::Output;
 
 use crate::args::{Backend, Maps};
 use crate::commands::plan::{of_maps, of_scene, technique};
@@ -81,4 +83,35 @@ pub fn with_technique(shadow: Shadow, name: &str) -> Result<Shadow> {
         anisotropy: shadow.anisotropy,
         ..Shadow::of(technique, technique.maps[0])
     })
+}
+
+/// The files that a scene is read from.
+pub fn files<'a>(file: &'a Path, scene: &'a Scene) -> Vec<&'a Path> {
+    let mut files = vec![file];
+    if let Geometry::Model { file, .. } = &scene.geometry {
+        files.push(file);
+    }
+    files
+}
+
+/// Writes pictures to the places made for them.
+pub fn save<const N: usize>(pictures: [&Picture; N], outputs: Vec<Output>) -> Result<()> {
+    for (picture, output) in pictures.into_iter().zip(outputs) {
+        picture.save(output)?;
+    }
+    Ok(())
+}
+
+/// Whether a file is to hold linear light.
+pub fn is_exr(out: &Path) -> bool {
+    out.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+}
+
+/// `scan.png` and `vulkan` to `scan-vulkan.png`.
+pub fn beside(out: &Path, what: &str) -> PathBuf {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = out.extension().unwrap_or_default().to_string_lossy();
+    let dot = if extension.is_empty() { "" } else { "." };
+    out.with_file_name(format!("{stem}-{what}{dot}{extension}"))
 }
