@@ -72,3 +72,23 @@ fn passes_of_scattering_have_their_times() {
         assert_eq!(text.iter().filter(|p| p.starts_with("scatter ")).count(), 1);
     }
 }
+
+/// A pass's time does not include what the processor does before it, and no pass is without.
+#[test]
+fn times_of_passes_add_up() {
+    let shaders = shaders();
+    let (scene, mesh) = file("shafts", "prefiltered", 1, [960, 540], 512);
+    let mut device = device::open(Backend::Vulkan).unwrap_or_else(|e| panic!("{e}"));
+    let mut frame = Frame::new(&mut *device, &shaders, &scene, &mesh, Show::Picture).unwrap();
+    // The driver compiles.
+    frame.run(Clock::Frame, &mut Quiet).unwrap();
+    for _ in 0..3 {
+        frame.executor().forget();
+        let run = frame.run(Clock::Passes, &mut Quiet).unwrap();
+        let sum: f64 = run.ran.iter().map(|pass| pass.seconds).sum();
+        println!("{sum} of {}: {:?}", run.seconds, run.ran);
+        assert!(sum <= run.seconds, "{sum} of {}", run.seconds);
+        assert!(sum > 0.2 * run.seconds, "{sum} of {}", run.seconds);
+        assert!(run.ran.iter().all(|pass| pass.seconds > 0.0));
+    }
+}

@@ -42,6 +42,54 @@ fn affine_on(device: &mut dyn Device, program: &Program<'_>, pairs: &[f32]) -> V
     result
 }
 
+/// Draws are what lavapipe's timestamps are right for.
+#[test]
+fn draws_are_timed_by_timestamps() {
+    let mut gpu = vulkan();
+    let shape = TextureShape::d2(512, 512, TexelFormat::Rgba8Unorm);
+    let target = gpu.texture("target", &shape).unwrap();
+    let colours = [Colour {
+        texture: target,
+        resolve: None,
+        clear: Some([1.0; 4]),
+        blend: Blend::Off,
+    }];
+    let pass = Pass {
+        label: "clear",
+        colours: &colours,
+        depth: None,
+        draws: &[],
+    };
+    assert!(!NativeDevice::new().begin_clock().unwrap());
+    gpu.time_by_timestamps();
+    if !gpu.has_timestamps() {
+        assert!(!gpu.begin_clock().unwrap());
+        return;
+    }
+    gpu.draw(&pass).unwrap();
+    assert_eq!(gpu.laps(), 0, "no clock runs");
+    for passes in [0, 1, 3] {
+        let start = std::time::Instant::now();
+        assert!(gpu.begin_clock().unwrap());
+        for _ in 0..passes {
+            gpu.draw(&pass).unwrap();
+        }
+        assert_eq!(gpu.laps(), passes);
+        let times = gpu.end_clock().unwrap();
+        let wall = start.elapsed().as_secs_f64();
+        assert_eq!(times.len(), passes);
+        assert!(times.iter().all(|it| *it > 0.0), "{times:?}");
+        assert!(times.iter().sum::<f64>() <= wall, "{times:?} in {wall} s");
+    }
+    // More than there is room for: the rest has no time, and nothing fails.
+    assert!(gpu.begin_clock().unwrap());
+    for _ in 0..3000 {
+        gpu.draw(&pass).unwrap();
+    }
+    assert!((1000..3000).contains(&gpu.laps()));
+    assert_eq!(gpu.laps(), gpu.end_clock().unwrap().len());
+}
+
 #[test]
 fn a_map_gives_the_same_bits_every_way() {
     let kernel = affine();

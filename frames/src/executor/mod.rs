@@ -68,7 +68,8 @@ impl Progress for Quiet {
 /// When a run waits for the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// After each pass: each has its time, and the whole takes a little longer.
+    /// After each pass: each has its time, by the device's own clock if it has one, and the whole takes a
+    /// little longer.
     Passes,
     /// At the end: only the whole has a time.
     Frame,
@@ -79,8 +80,8 @@ pub enum Clock {
 pub struct Timing {
     /// Name of the part: a pass's label, `set-up`, or `read back`.
     pub name: String,
-    /// Wall time. The first time that a pass runs, this includes the driver's compilation of its
-    /// shaders.
+    /// By the GPU's timestamps where the device has them, else wall time. The first time that a pass runs,
+    /// wall time includes the driver's compilation of its shaders.
     pub seconds: f64,
 }
 
@@ -428,6 +429,11 @@ impl<'d> Executor<'d> {
         let due = self.state.due(&self.graph, &self.needed, &self.blocks);
         let steps = due.iter().filter(|d| **d).count();
         let mut run = Run::default();
+        let during_clock = during("timing the passes");
+        let has_clock =
+            clock == Clock::Passes && self.device.begin_clock().map_err(during_clock)?;
+        // Which of the device's times are of a pass.
+        let mut laps = Vec::new();
         for (pass, is_due) in due.iter().enumerate() {
             let label = self.graph.passes()[pass].label.to_string();
             if !is_due {
@@ -438,6 +444,7 @@ impl<'d> Executor<'d> {
             }
             progress.begin(&label, run.ran.len() + 1, steps);
             let start = Instant::now();
+            let first = self.device.laps();
             self.state.begin(&self.graph, &self.blocks, pass);
             let edges = self.run_pass(pass, &mut |share| progress.advance(share))?;
             if let Some(edges) = edges {
@@ -447,6 +454,7 @@ impl<'d> Executor<'d> {
             if clock == Clock::Passes {
                 self.device.wait().map_err(during(&label))?;
                 time = start.elapsed();
+                laps.push(first..self.device.laps());
             }
             self.state.end(&self.graph, &self.blocks, pass);
             progress.advance(1.0);
@@ -456,6 +464,18 @@ impl<'d> Executor<'d> {
             self.device
                 .wait()
                 .map_err(during("waiting for the frame"))?;
+        }
+        if has_clock {
+            let times = self
+                .device
+                .end_clock()
+                .map_err(during("timing the passes"))?;
+            for (timing, laps) in run.ran.iter_mut().zip(laps) {
+                // A pass that the device did not time keeps its wall time.
+                if let Some(times) = times.get(laps).filter(|it| !it.is_empty()) {
+                    timing.seconds = times.iter().sum();
+                }
+            }
         }
         run.seconds = whole.elapsed().as_secs_f64();
         Ok(run)

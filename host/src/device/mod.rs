@@ -657,6 +657,29 @@ pub trait Device {
     /// [`DeviceError::Lost`], and whatever went wrong meanwhile.
     fn wait(&mut self) -> Result<()>;
 
+    /// Begins to take times by the device's own clock, of each dispatch, draw, clear and copy. `false` if it
+    /// has none, as the native device: then wall time after [`Device::wait`] is what there is.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`], [`DeviceError::OutOfMemory`].
+    fn begin_clock(&mut self) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// How many times have been taken since [`Device::begin_clock`]. At most some thousands: what is asked
+    /// for after those has none.
+    fn laps(&self) -> usize {
+        0
+    }
+
+    /// Waits, takes no more times, and gives those taken, in seconds, in order.
+    ///
+    /// # Errors
+    /// As for [`Device::read_buffer`].
+    fn end_clock(&mut self) -> Result<Vec<f64>> {
+        Ok(Vec::new())
+    }
+
     /// Makes a buffer that holds `bytes`.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Any Vulkan adapter through wgpu: a GPU, or lavapipe on a machine without one.
 
+mod clock;
 mod indirect;
 mod pipelines;
 mod resources;
@@ -15,6 +16,7 @@ use super::error::{DeviceError, Result};
 use super::extent::{self, Extent};
 use super::slots::{self, Given, Slot};
 use super::{Backend, Bind, BufferId, Device, Pass, Program, TextureId, TextureShape};
+use clock::Clock;
 use indirect::Indirect;
 use pipelines::Pipelines;
 use resources::{Memory, Texture};
@@ -29,6 +31,7 @@ fn wanted_features() -> wgpu::Features {
         | wgpu::Features::FLOAT32_FILTERABLE
         | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM
         | wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES
+        | clock::FEATURES
 }
 
 /// A Vulkan device.
@@ -50,6 +53,9 @@ pub struct VulkanDevice {
     pipelines: Pipelines,
     /// Made when the first range is in a buffer.
     indirect: Option<Indirect>,
+    /// While times are taken.
+    clock: Option<Clock>,
+    by_timestamps: bool,
 }
 
 /// How many workgroups run along x, y, z.
@@ -155,6 +161,8 @@ impl VulkanDevice {
             samplers: HashMap::new(),
             pipelines: Pipelines::default(),
             indirect: None,
+            clock: None,
+            by_timestamps: false,
         })
     }
 
@@ -370,7 +378,7 @@ impl Device for VulkanDevice {
         let memory = self.memory(buffer)?;
         self.guarded(&|| format!("clearing {}", memory.what()), |device| {
             let mut encoder = device.create_command_encoder(&Default::default());
-            encoder.clear_buffer(&memory.buffer, 0, None);
+            self.timed(&mut encoder, |it| it.clear_buffer(&memory.buffer, 0, None));
             self.queue.submit([encoder.finish()]);
         })
     }
@@ -460,7 +468,7 @@ impl Device for VulkanDevice {
         let pipeline = self.compute_pipeline(program, &slots, &bound)?;
         self.guarded(&during, |device| {
             let mut encoder = device.create_command_encoder(&Default::default());
-            {
+            self.timed(&mut encoder, |encoder| {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some(&kernel.name),
                     timestamp_writes: None,
@@ -474,7 +482,7 @@ impl Device for VulkanDevice {
                     Groups::Known([x, y, z]) => pass.dispatch_workgroups(*x, *y, *z),
                     Groups::InBuffer(groups) => pass.dispatch_workgroups_indirect(groups, 0),
                 }
-            }
+            });
             self.queue.submit([encoder.finish()]);
         })
     }
@@ -485,5 +493,17 @@ impl Device for VulkanDevice {
 
     fn wait(&mut self) -> Result<()> {
         self.finish(&|| "waiting".into())
+    }
+
+    fn begin_clock(&mut self) -> Result<bool> {
+        VulkanDevice::begin_clock(self)
+    }
+
+    fn laps(&self) -> usize {
+        VulkanDevice::laps(self)
+    }
+
+    fn end_clock(&mut self) -> Result<Vec<f64>> {
+        VulkanDevice::end_clock(self)
     }
 }

@@ -711,7 +711,7 @@ impl VulkanDevice {
         };
         self.guarded(&|| format!("drawing pass `{}`", pass.label), |device| {
             let mut encoder = device.create_command_encoder(&Default::default());
-            {
+            self.timed(&mut encoder, |encoder| {
                 let colours: Vec<_> = colours.iter().map(|c| Some(colour_attachment(c))).collect();
                 let mut encoded = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some(pass.label),
@@ -739,7 +739,7 @@ impl VulkanDevice {
                         encoded.draw(0..draw.count, 0..1);
                     }
                 }
-            }
+            });
             self.queue.submit([encoder.finish()]);
         })
     }

@@ -326,11 +326,13 @@ impl VulkanDevice {
         let during = || format!("copying {} to level {level} of {}", from.what(), to.what());
         self.guarded(&during, |device| {
             let mut encoder = device.create_command_encoder(&Default::default());
-            encoder.copy_texture_to_texture(
-                from.texture.as_image_copy(),
-                level_of(&to.texture, level),
-                extent(&from.shape, 0),
-            );
+            self.timed(&mut encoder, |it| {
+                it.copy_texture_to_texture(
+                    from.texture.as_image_copy(),
+                    level_of(&to.texture, level),
+                    extent(&from.shape, 0),
+                );
+            });
             self.queue.submit([encoder.finish()]);
         })
     }
@@ -341,36 +343,38 @@ impl VulkanDevice {
         let [r, g, b, a] = value.to_array().map(f64::from);
         self.guarded(&|| format!("clearing {}", texture.what()), |device| {
             let mut encoder = device.create_command_encoder(&Default::default());
-            for level in 0..shape.levels {
-                for layer in 0..shape.layers {
-                    let view = layer_of(&texture.texture, level, layer);
-                    let colour = wgpu::RenderPassColorAttachment {
-                        view: &view,
-                        depth_slice: None,
-                        resolve_target: None,
-                        ops: wgpu::Operations {
-                            load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
-                            store: wgpu::StoreOp::Store,
-                        },
-                    };
-                    let depth = wgpu::RenderPassDepthStencilAttachment {
-                        view: &view,
-                        depth_ops: Some(wgpu::Operations {
-                            load: wgpu::LoadOp::Clear(value.x),
-                            store: wgpu::StoreOp::Store,
-                        }),
-                        stencil_ops: None,
-                    };
-                    let is_depth = shape.format == Format::Depth32;
-                    let colours = if is_depth { vec![] } else { vec![Some(colour)] };
-                    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                        label: Some("clear"),
-                        color_attachments: &colours,
-                        depth_stencil_attachment: is_depth.then_some(depth),
-                        ..Default::default()
-                    });
+            self.timed(&mut encoder, |encoder| {
+                for level in 0..shape.levels {
+                    for layer in 0..shape.layers {
+                        let view = layer_of(&texture.texture, level, layer);
+                        let colour = wgpu::RenderPassColorAttachment {
+                            view: &view,
+                            depth_slice: None,
+                            resolve_target: None,
+                            ops: wgpu::Operations {
+                                load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                                store: wgpu::StoreOp::Store,
+                            },
+                        };
+                        let depth = wgpu::RenderPassDepthStencilAttachment {
+                            view: &view,
+                            depth_ops: Some(wgpu::Operations {
+                                load: wgpu::LoadOp::Clear(value.x),
+                                store: wgpu::StoreOp::Store,
+                            }),
+                            stencil_ops: None,
+                        };
+                        let is_depth = shape.format == Format::Depth32;
+                        let colours = if is_depth { vec![] } else { vec![Some(colour)] };
+                        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                            label: Some("clear"),
+                            color_attachments: &colours,
+                            depth_stencil_attachment: is_depth.then_some(depth),
+                            ..Default::default()
+                        });
+                    }
                 }
-            }
+            });
             self.queue.submit([encoder.finish()]);
         })
     }
