@@ -72,8 +72,8 @@ fn with_lights(
 ) -> graph::Result<(Graph, Vec<Given>, Handle)> {
     let technique = scene.shadow.technique;
     for (number, light) in scene.lights.iter().enumerate() {
-        if let Some(problem) = light.refuses(scene.medium.is_some(), technique) {
-            let number = number + 1;
+        if let Some(problem) = light.refuses(scene.medium.is_some()) {
+            let (number, problem) = (number + 1, problem.into());
             return Err(GraphError::Light { number, problem });
         }
     }
@@ -349,10 +349,8 @@ impl<'d> Frame<'d> {
                 ),
             });
         };
-        if let Some(problem) =
-            light.refuses(self.scene.medium.is_some(), self.scene.shadow.technique)
-        {
-            let number = number + 1;
+        if let Some(problem) = light.refuses(self.scene.medium.is_some()) {
+            let (number, problem) = (number + 1, problem.into());
             return Err(GraphError::Light { number, problem }.into());
         }
         self.scene.lights[number] = *light;

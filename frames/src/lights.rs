@@ -99,7 +99,11 @@ const MARGIN: f32 = 0.5;
 
 /// The light's area as the kernels of soft shadows take it.
 pub fn area(light: &Light, view: &LightView) -> Area {
-    let radius = light.area.radius;
+    // What the light spans as seen from depth 0, and how much less of that from depth 1.
+    let (radius, narrowing) = match view.near {
+        None => (light.area.radius, 0.0),
+        Some(near) => (light.area.radius / near, view.depth / (near + view.depth)),
+    };
     let spread = view.texel.map(|texel| radius * view.depth / texel);
     // Texels of the largest rectangle that is read of a table, which is a texel wide at least.
     let [x, y] = spread.map(|s| 2 * s.clamp(0.5, MOST_REACH).ceil() as u32);
@@ -108,7 +112,7 @@ pub fn area(light: &Light, view: &LightView) -> Area {
         slack: (STEEPEST * radius).min(0.5),
         margin: (MARGIN * radius).min(0.5),
         one: FixedPoint::for_kernel(x * y).one,
-        padding: 0,
+        narrowing,
     }
 }
 
@@ -236,5 +240,57 @@ impl<'a> Seen<'a> {
             };
             !pyramid.iter().any(is_beyond)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{AreaShape, Procedural};
+
+    /// A place hides the light's edge from a receiver where the way between them passes: as far from the receiver in
+    /// the map as the penumbra reaches, for both kinds of lights, wherever the two are.
+    #[test]
+    fn penumbrae_reach_as_far_as_the_light_is_seen_by() {
+        let mesh = Procedural::Box.mesh();
+        let size = 256;
+        let spot = Spot {
+            position: Vec3::new(-0.9, 2.2, 0.7),
+            direction: Vec3::new(0.4, -1.0, -0.3).normalize(),
+            angle: 90.0,
+            inner: 60.0,
+        };
+        let directional = Light::directional(Vec3::new(0.4, -1.0, -0.3));
+        for mut light in [directional, Light::new(Source::Spot(spot))] {
+            light.area.radius = 0.2;
+            light.area.shape = AreaShape::Square;
+            let view = match light.source {
+                Source::Spot(spot) => LightView::spot(&spot, &mesh, size, 3, None),
+                Source::Directional { direction } => LightView::new(direction, &mesh, size, 3),
+            };
+            let area = area(&light, &view);
+            let along = light.direction().as_dvec3();
+            let across = view.clip_from_world.row(0).truncate().as_dvec3();
+            let across = across.reject_from_normalized(along).normalize();
+            let project = |place: DVec3| {
+                let clip = view.clip_from_world.as_dmat4() * place.extend(1.0);
+                clip.truncate() / clip.w
+            };
+            let receiver = DVec3::new(0.3, 0.0, -0.2);
+            for share in [0.1, 0.3, 0.6] {
+                let toward = match light.source {
+                    Source::Spot(spot) => spot.position.as_dvec3() - receiver,
+                    Source::Directional { .. } => -along,
+                };
+                let edge = toward + across * f64::from(light.area.radius);
+                let (behind, before) = (project(receiver), project(receiver + edge * share));
+                let texels = 0.5 * (before.x - behind.x) * f64::from(size);
+                let reach = f64::from(area.spread.x) * (behind.z - before.z);
+                assert!(
+                    (texels - reach).abs() < 1e-3 * reach.abs() && reach > 0.5,
+                    "{light:?}, {share}: {texels}, {reach}"
+                );
+            }
+        }
     }
 }

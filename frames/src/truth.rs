@@ -262,25 +262,27 @@ pub struct Pixels {
 /// A light that rays go to.
 struct Lamp {
     light: Light,
-    /// From its middle to that of its edge, along x and y of the shadow map, one unit before it; nothing for a point.
+    /// From its middle to that of its edge, along x and y of the shadow map: of a directional light as seen from one
+    /// unit before it; nothing for a point.
     axes: [DVec3; 2],
 }
 
 impl Lamp {
-    /// The way from a place to the light, all of it to a spot light; and what the cone of that leaves of its light.
+    /// The way from a place to the light, all of it to a spot light; and what the cone of that, from its middle,
+    /// leaves of its light.
     /// Ray `i` of a pixel goes to another point of an area.
     fn toward(&self, place: DVec3, pixel: [u32; 2], i: u32) -> (DVec3, f64) {
-        match self.light.source {
+        let (toward, within) = match self.light.source {
             Source::Spot(spot) => (spot.position.as_dvec3() - place, spot.within(place)),
             Source::Directional { direction } => {
-                let toward = -direction.as_dvec3().normalize_or(DVec3::Y);
-                if self.light.area.radius == 0.0 {
-                    return (toward, 1.0);
-                }
-                let [x, y] = self.light.area.point(light_sample(pixel, i));
-                (toward + self.axes[0] * x + self.axes[1] * y, 1.0)
+                (-direction.as_dvec3().normalize_or(DVec3::Y), 1.0)
             }
+        };
+        if self.light.area.radius == 0.0 {
+            return (toward, within);
         }
+        let [x, y] = self.light.area.point(light_sample(pixel, i));
+        (toward + self.axes[0] * x + self.axes[1] * y, within)
     }
 }
 
@@ -333,7 +335,12 @@ impl Pixels {
             let light = scene.lights[number];
             let clip = light_view(scene, &light, mesh).clip_from_world;
             let radius = f64::from(light.area.radius);
-            let axis = |i| clip.row(i).truncate().as_dvec3().normalize_or_zero();
+            // Across the light's way: rows of a perspective view have a part along it.
+            let along = light.direction().as_dvec3();
+            let axis = |i| {
+                let row = clip.row(i).truncate().as_dvec3();
+                row.reject_from_normalized(along).normalize_or_zero()
+            };
             Lamp {
                 light,
                 axes: [0, 1].map(|i| axis(i) * radius),
@@ -378,9 +385,9 @@ impl Pixels {
                 Source::Directional { .. } => {
                     (place + toward * away, toward * (2.0 * self.diagonal))
                 }
-                Source::Spot(spot) => {
-                    let from = place + toward.normalize_or_zero() * away;
-                    (from, spot.position.as_dvec3() - from)
+                Source::Spot(_) => {
+                    let before = toward.normalize_or_zero() * away;
+                    (place + before, toward - before)
                 }
             };
             within * self.passing(&Segment::new(from, way))

@@ -264,9 +264,9 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             LEAST.replace(
                 "[-1, -2, -1]",
-                "[-1, -2, -1]\nposition = [0, 2, 0]\nradius = 0.1",
+                "[-1, -2, -1]\nposition = [0, 2, 0]\nradius = -0.1",
             ),
-            &["`light.radius` is 0.1", "directional"],
+            &["`light.radius` is -0.1", "0 to"],
         ),
         (
             LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nposition = [0, inf, 0]"),

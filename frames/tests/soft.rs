@@ -9,9 +9,13 @@ use hankel_frames::{Clock, Executor, NoShaders, Quiet, Show, graph_of};
 use hankel_host::device::NativeDevice;
 
 fn scene(light: &str, shadow: &str) -> (Scene, Mesh) {
+    lit(&format!("direction = [0.62, -0.62, 0.48]\n{light}"), shadow)
+}
+
+fn lit(light: &str, shadow: &str) -> (Scene, Mesh) {
     let text = format!(
         "[geometry]\nprocedural = 'box'\n[camera]\neye = [1.9, 1.6, 3.1]\ntarget = [-0.2, 0.2, -0.3]\n\
-         [light]\ndirection = [0.62, -0.62, 0.48]\n{light}\n[shadow]\n{shadow}\n\
+         [light]\n{light}\n[shadow]\n{shadow}\n\
          [output]\nwidth = 160\nheight = 90\n"
     );
     let scene = Scene::parse(&text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"));
@@ -106,6 +110,30 @@ fn soft_shadows_are_near_the_rays() {
             println!("{light:?}, {technique}: {errors}");
             assert!(errors.rms < limit, "{light:?}, {technique}: {errors}");
         }
+    }
+}
+
+/// The same with a lamp, from which blockers and receivers are at very different distances.
+#[test]
+fn lamps_have_soft_shadows() {
+    let light = "position = [-2.2, 2.6, -1.7]\ndirection = [0.62, -0.7, 0.48]\nangle = 70.0\nradius = 0.25\n\
+                 shape = 'square'";
+    let (scene_of_truth, mesh) = lit(light, "");
+    let truth = by_rays(&scene_of_truth, &mesh, &mut |_| ());
+    let sharp = by_rays(&point(&scene_of_truth), &mesh, &mut |_| ());
+    println!("hard {}", sharp.errors(&truth).unwrap());
+    for (technique, limit) in [
+        ("pcss", 0.037),
+        ("vssm", 0.047),
+        ("soft", 0.05),
+        ("soft-6", 0.041),
+    ] {
+        let shadow = format!("technique = '{technique}'\nsize = 512");
+        let (scene, mesh) = lit(light, &shadow);
+        let picture = by_technique(&scene, &mesh).unwrap_or_else(|e| panic!("{e}"));
+        let errors = picture.errors(&truth).unwrap();
+        println!("{technique}: {errors}");
+        assert!(errors.rms < limit, "{technique}: {errors}");
     }
 }
 

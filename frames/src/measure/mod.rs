@@ -96,7 +96,7 @@ impl Configuration {
         let is_scattered = self.scattering.is_some();
         let has_area = lights.any(|light| light.area.radius > 0.0);
         let mut lights = scene.lights.iter();
-        let is_refused = lights.any(|l| l.refuses(has_medium, self.technique).is_some());
+        let is_refused = lights.any(|l| l.refuses(has_medium).is_some());
         (!self.technique.is_soft || has_area) && !is_refused && is_scattered == has_medium
     }
 

@@ -3,14 +3,12 @@
 use hankel_dsl::glam::{DVec3, Vec3};
 use serde::Deserialize;
 
-use crate::techniques::Technique;
-
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Where its light comes from.
     pub source: Source,
-    /// How large it is; a point for a spot light.
+    /// How large it is. Of a spot light, across its axis.
     pub area: Area,
     /// Of a directional light, the irradiance of a surface that faces it, as a multiple of that of the light that
     /// scenes have without this; of a spot light the same at a distance of 1. 0 to [`Light::MAX_STRENGTH`].
@@ -79,19 +77,11 @@ impl Light {
         }
     }
 
-    /// Why shadows by this technique, or a medium, are not for this light; `None` if they are.
+    /// Why a medium is not for this light; `None` if it is.
     #[must_use]
-    pub fn refuses(&self, has_medium: bool, technique: &Technique) -> Option<String> {
-        self.spot()?;
-        let name = technique.name;
-        if has_medium {
-            return Some(
-                "left out, or no `[medium]`: scattering is that of directional lights".into(),
-            );
-        }
-        technique.is_soft.then(|| {
-            format!("left out, or a technique of hard shadows: `{name}` is for directional lights, whose penumbrae are of one width at one distance")
-        })
+    pub fn refuses(&self, has_medium: bool) -> Option<&'static str> {
+        (has_medium && self.spot().is_some())
+            .then_some("left out, or no `[medium]`: scattering is that of directional lights")
     }
 
     /// The spot light, if it is one.
@@ -141,8 +131,8 @@ impl Spot {
 /// What of the sky a light fills, around the direction that it comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Area {
-    /// Its half width: the tangent of the angle between its middle and the middle of its edge, 0 (a
-    /// point) to [`Area::MAX_RADIUS`]. The sun has 0.0047.
+    /// Its half width. Of a directional light the tangent of the angle between its middle and the middle of its
+    /// edge, 0 (a point) to [`Area::MAX_RADIUS`]; the sun has 0.0047. Of a spot light a length.
     pub radius: f32,
     /// Its outline.
     pub shape: AreaShape,
@@ -160,7 +150,7 @@ pub enum AreaShape {
 }
 
 impl Area {
-    /// The largest half width: 45 degrees to each side.
+    /// The largest half width of a directional light: 45 degrees to each side.
     pub const MAX_RADIUS: f32 = 1.0;
 
     /// A point of the light, in units of its half width, for a point of the unit square: what is

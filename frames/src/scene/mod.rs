@@ -26,6 +26,7 @@
 //! # direction = [0.0, -1.0, 0.0]
 //! # angle = 60.0                  # of its cone, from edge to edge, degrees
 //! # inner = 48.0                  # of what does not fade; 0.8 of the angle, default
+//! # radius = 0.1                  # a length: half the width of what shines, across the axis
 //!
 //! # Several lights: [[light]] for each.
 //!

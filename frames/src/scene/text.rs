@@ -463,17 +463,17 @@ impl Reader<'_> {
 
     fn light(&self, l: LightText) -> Result<Light> {
         let direction = self.direction("light.direction", &l.direction)?;
+        // As an angle, or as a length.
+        let widest = match l.position {
+            None => Area::MAX_RADIUS,
+            Some(_) => FAR_OFF,
+        };
         let area = Area {
             shape: l
                 .shape
                 .as_ref()
                 .map_or_else(AreaShape::default, |s| *s.get_ref()),
-            radius: self.number(
-                "light.radius",
-                l.radius.clone(),
-                0.0,
-                0.0..=Area::MAX_RADIUS,
-            )?,
+            radius: self.number("light.radius", l.radius, 0.0, 0.0..=widest)?,
         };
         let source = match &l.position {
             None => {
@@ -487,10 +487,6 @@ impl Reader<'_> {
                 Source::Directional { direction }
             }
             Some(position) => {
-                if let Some(radius) = l.radius.filter(|_| area.radius > 0.0) {
-                    let allowed = "left out, or 0: soft shadows are those of directional lights";
-                    return self.refuse(radius.span(), "light.radius", area.radius, allowed);
-                }
                 let angle = self.number("light.angle", l.angle, 60.0, 1.0..=Spot::MAX_ANGLE)?;
                 let place = l.inner.as_ref().map_or(0..0, Spanned::span);
                 let inner = self.number("light.inner", l.inner, 0.8 * angle, 0.0..=angle)?;
@@ -525,12 +521,7 @@ impl Reader<'_> {
         })
     }
 
-    fn lights(
-        &self,
-        given: Spanned<Lights>,
-        has_medium: bool,
-        shadow: &Shadow,
-    ) -> Result<Vec<Light>> {
+    fn lights(&self, given: Spanned<Lights>, has_medium: bool) -> Result<Vec<Light>> {
         let span = given.span();
         let Lights(tables) = given.into_inner();
         if !(1..=Scene::MAX_LIGHTS).contains(&tables.len()) {
@@ -544,7 +535,7 @@ impl Reader<'_> {
                 .as_ref()
                 .map_or_else(|| span.clone(), Spanned::span);
             let light = self.light(table)?;
-            if let Some(why) = light.refuses(has_medium, shadow.technique) {
+            if let Some(why) = light.refuses(has_medium) {
                 let position = light.spot().map_or(Vec3::ZERO, |spot| spot.position);
                 return self.refuse(place, "light.position", position, why);
             }
@@ -598,7 +589,7 @@ impl Reader<'_> {
         Ok(Scene {
             geometry: self.geometry(f.geometry)?,
             camera: self.camera(&f.camera, fov)?,
-            lights: self.lights(f.light, f.medium.is_some(), &shadow)?,
+            lights: self.lights(f.light, f.medium.is_some())?,
             medium: f.medium.map(|m| self.medium(m)).transpose()?,
             shadow,
             width: self.integer("output.width", f.output.width, width, pixels.clone())?,

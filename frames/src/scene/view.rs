@@ -36,6 +36,8 @@ pub struct LightView {
     pub slope: f32,
     /// Edge of a texel in world units, along the map's x and y; of a spot light at the far end of its depth.
     pub texel: [f32; 2],
+    /// How far off depth 0 is along a spot light's axis; `None` of a directional light.
+    pub near: Option<f32>,
 }
 
 impl CameraView {
@@ -258,6 +260,7 @@ impl LightView {
             depth: extent[2] as f32,
             slope: 1.0,
             texel: [0, 1].map(|i| (extent[i] / f64::from(size)) as f32),
+            near: None,
         }
     }
 }
@@ -387,6 +390,7 @@ impl LightView {
             depth: depth as f32,
             slope: (low[2] * high[2]) as f32,
             texel: [0, 1].map(|i| ((high[i] - low[i]) * high[2] / f64::from(size)) as f32),
+            near: Some(low[2] as f32),
         }
     }
 }

@@ -2,9 +2,12 @@
 //! (\[VSSM\]), and moment soft shadows (\[BHS\], lecture, "Moment soft shadow mapping"). Sources are named
 //! in [`hankel_moments`].
 //!
-//! The light is directional, so that what lies a depth d before a receiver is seen from it, against the
-//! light, moved by up to d times the light's half width: the same for all receivers. Penumbrae are therefore
-//! as wide as their blockers are far, without a division.
+//! What lies a depth d before a receiver is seen from it, against the light, moved in the map by d times the
+//! light's half width: the same for all receivers. Of a directional light, as its depths are distances; of a spot
+//! light, because depth in its map is linear in the reciprocal of the distance D, and so are both the size of a
+//! thing in the map and a penumbra's: with half width w, blocker and receiver at D_b and D_r, that is
+//! w (D_r - D_b) / D_b on the receiver, and w (1 / D_b - 1 / D_r) as seen from the light. Penumbrae are
+//! therefore as wide as their blockers are far, without a division.
 
 #![allow(
     clippy::too_many_arguments,
@@ -36,7 +39,8 @@ pub struct Area {
     #[range(0.0..=40.0)]
     pub spread: Vec2,
     /// How much nearer the steepest surface that must not shade itself comes within the penumbra's reach, as
-    /// a share of the distance between blocker and receiver. Single depths are compared with that surface.
+    /// a share of the distance between blocker and receiver, for a receiver at depth 0. Single depths are compared
+    /// with that surface.
     #[range(0.0..=0.5)]
     pub slack: f32,
     /// How much nearer a receiver is moved before it is compared with a whole region, as a share of the same
@@ -46,8 +50,10 @@ pub struct Area {
     /// The integer that stands for 1 in the summed-area table ([`FixedPoint`]).
     #[range(1..=16_777_216)]
     pub one: u32,
-    /// Fills the structure up.
-    pub padding: u32,
+    /// What of these two shares is gone for a receiver at depth 1: the farther off a spot light is, the
+    /// smaller it looks. 0 for a directional light.
+    #[range(0.0..=1.0)]
+    pub narrowing: f32,
 }
 
 /// Texels to each side that a summed-area table is read over, at most. There, its numbers have as many
@@ -59,6 +65,12 @@ impl Area {
     #[inline(always)]
     fn point(&self) -> FixedPoint {
         FixedPoint { one: self.one }
+    }
+
+    /// What a share of a distance for a receiver at depth 0 is for one at depth `z`.
+    #[inline(always)]
+    fn seen_from(&self, share: f32, z: f32) -> f32 {
+        share * (1.0 - self.narrowing * z)
     }
 
     /// Half the size in texels of what is filtered for blockers so far before a receiver, in the map's depth:
@@ -403,7 +415,8 @@ pub fn shade_soft(
         let all = biased(light, table.around(place, area.reach(z)));
         let distance = 0.5 * blockers_4(all, symmetric_depth(z)).distance(EPSILON);
         let near = biased(light, table.around(place, area.reach(distance)));
-        hamburger_4(near, symmetric_depth(z - area.margin * distance))
+        let margin = area.seen_from(area.margin, z);
+        hamburger_4(near, symmetric_depth(z - margin * distance))
     })
 }
 
@@ -446,7 +459,8 @@ pub fn shade_soft_6(
         let around = |reach: Vec2| table.around(place, reach).lerp(*target, light.moment_bias);
         let blockers = blockers_6(around(area.reach(z)), symmetric_depth(z));
         let distance = 0.5 * blockers.distance(EPSILON);
-        let receiver = symmetric_depth(z - area.margin * distance);
+        let margin = area.seen_from(area.margin, z);
+        let receiver = symmetric_depth(z - margin * distance);
         hamburger_6(around(area.reach(distance)), receiver).lower
     })
 }
@@ -536,7 +550,8 @@ pub fn shade_vssm(
             }
         };
         let distance = 0.5 * blockers(area.reach(z), z).distance(EPSILON);
-        blockers(area.reach(distance), z - area.margin * distance).share
+        let margin = area.seen_from(area.margin, z);
+        blockers(area.reach(distance), z - margin * distance).share
     })
 }
 
@@ -571,12 +586,13 @@ pub fn shade_pcss(
     shade_with(light, world, normal, colour, |uv, z| {
         let size = depth.size();
         let place = in_texels(uv, size);
+        let steepest = area.seen_from(area.slack, z);
         // The depth at a point, and what it is less than if it blocks: the surface's own slope allowed for.
         let behind = |i: u32, offset: Vec2, distance: f32| {
             let reach = area.reach(distance);
             let at = Vec2::new(place.x + offset.x * reach.x, place.y + offset.y * reach.y);
             let width = Real::sqrt(offset.x * offset.x + offset.y * offset.y);
-            let slack = area.slack * width * distance;
+            let slack = steepest * width * distance;
             (
                 depth
                     .load(nearest(at, size), i.checked_rem(samples).unwrap_or(0))

@@ -12,14 +12,15 @@ use hankel_moments::{FixedPoint, Moments4, Moments6, quantize_symmetric_4, quant
 use super::maps::{self, SAMPLES, SIZE};
 use crate::soft::{Area, Lines};
 
-/// Lights from hardly more than a point to one whose penumbrae fill half of the map.
+/// Lights from hardly more than a point to one whose penumbrae fill half of the map, the second and the third
+/// spot lights.
 fn areas() -> [Area; 3] {
-    [0.5_f32, 6.0, 30.0].map(|spread| Area {
+    [(0.5_f32, 0.0), (6.0, 0.4), (30.0, 0.9)].map(|(spread, narrowing)| Area {
         spread: Vec2::new(spread, 0.6 * spread),
         slack: 0.1,
         margin: 0.05,
         one: FixedPoint::for_kernel((2.0 * spread + 2.0) as u32 * (1.2 * spread + 2.0) as u32).one,
-        padding: 0,
+        narrowing,
     })
 }
 
