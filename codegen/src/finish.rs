@@ -13,7 +13,7 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::Memory;
 use crate::spirv::{
-    self, bounds, canonical, exact, libm, names, order, refused, split, trim, uniform,
+    self, bounds, canonical, exact, libm, names, order, parts, refused, split, trim, uniform,
 };
 use crate::translate::reading;
 
@@ -146,8 +146,12 @@ fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
                 .register_pass(Passes::AggressiveDCE);
         })?;
         module = spirv::load(&words, name)?;
-        let (folded, bounded) = (exact::fold(&mut module), bounds::fold(&mut module));
-        if !folded && !bounded {
+        let changes = [
+            exact::fold(&mut module),
+            bounds::fold(&mut module),
+            parts::divide(&mut module),
+        ];
+        if changes == [false; 3] {
             break;
         }
     }

@@ -744,11 +744,12 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                 binding,
                 format,
                 dimensions,
+                array,
                 access,
             } => Binding {
                 written: access.writes(),
                 read: access.reads(),
-                texture: Some(format!("{dimensions}d")),
+                texture: Some(describe::storage_view(*dimensions, *array).into()),
                 format: Some(format_name(*format)),
                 ..plain(*binding, name, BindingKind::StorageTexture)
             },
@@ -784,7 +785,7 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                     dimensions,
                 } => Binding {
                     written: true,
-                    texture: Some(format!("{dimensions}d")),
+                    texture: Some(describe::storage_view(*dimensions, false).into()),
                     format: Some(format_name(*format)),
                     ..plain(*binding, &name, BindingKind::StorageTexture)
                 },

@@ -118,8 +118,8 @@ pub enum Role {
     StorageTexture {
         /// WebGPU's name of its format.
         format: String,
-        /// 2 or 3.
-        dimensions: u32,
+        /// How it is seen, in WebGPU's words: `2d`, `2d-array`, `3d`.
+        view: String,
         /// WebGPU's word for what is done with its texels: `write-only`, `read-only`, `read-write`.
         access: String,
     },

@@ -204,10 +204,11 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
         Use::StorageTexture {
             format,
             dimensions,
+            array,
             access,
         } => Role::StorageTexture {
             format: format.name().into(),
-            dimensions,
+            view: describe::storage_view(dimensions, array).into(),
             access: access.word().into(),
         },
         Use::Attribute(location, ty) => Role::Attribute {

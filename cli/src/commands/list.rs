@@ -134,15 +134,25 @@ fn bindings(kernel: &Kernel) {
             Role::StorageTexture {
                 binding,
                 format,
+                dimensions,
+                array,
                 access,
-                ..
             } => {
                 let does = match (access.reads(), access.writes()) {
                     (true, true) => "read and written",
                     (true, false) => "read",
                     _ => "written",
                 };
-                format!("binding {binding}: texture {}, {does}", format.name())
+                let layers = if *array { ", layers of" } else { "" };
+                let volume = if *dimensions == 3 {
+                    ", a volume of"
+                } else {
+                    ""
+                };
+                format!(
+                    "binding {binding}: texture{layers}{volume} {}, {does}",
+                    format.name()
+                )
             }
             Role::Sampler {
                 binding,

@@ -8,6 +8,7 @@ pub mod libm;
 pub(crate) mod lines;
 pub mod names;
 pub mod order;
+pub mod parts;
 pub mod refused;
 pub mod split;
 pub mod trim;

@@ -179,7 +179,8 @@ impl NativeDevice {
                 match taken.next() {
                     Some(Written::Bytes(memory)) => Arg::BytesMut(memory.get_mut()),
                     Some(Written::Texture(shape, format, memory)) => Arg::TextureMut(TextureMut {
-                        size: shape.size,
+                        // Depth or layers: one of them is 1.
+                        size: [shape.size[0], shape.size[1], shape.size[2] * shape.layers],
                         format: *format,
                         bytes: memory.get_mut(),
                     }),

@@ -55,6 +55,8 @@ pub enum Use<'a> {
         format: TexelFormat,
         /// 2 or 3.
         dimensions: u32,
+        /// It has any number of layers.
+        array: bool,
         /// What is done with its texels.
         access: TexelAccess,
     },
@@ -209,12 +211,14 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                 binding,
                 format,
                 dimensions,
+                array,
                 access,
             } => (
                 Some(*binding),
                 Use::StorageTexture {
                     format: *format,
                     dimensions: *dimensions,
+                    array: *array,
                     access: *access,
                 },
             ),
@@ -252,6 +256,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                 Use::StorageTexture {
                     format: *format,
                     dimensions: *dimensions,
+                    array: false,
                     access: TexelAccess::Write,
                 },
             ),
@@ -437,6 +442,7 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
             Use::StorageTexture {
                 format,
                 dimensions,
+                array,
                 access,
             },
             Given::Texture { shape, .. },
@@ -455,7 +461,7 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
                 ))
             } else if shape.samples != 1 {
                 Err("it is multisampled".into())
-            } else if shape.levels != 1 || shape.layers != 1 {
+            } else if shape.levels != 1 || (shape.layers != 1 && !array) {
                 Err(format!(
                     "it has {} levels and {} layers, but the kernel {does} one",
                     shape.levels, shape.layers

@@ -6,7 +6,7 @@
 //! to their ranges in every class: they are counts and indices, and what lies beyond is a mistake of
 //! the caller, not an input.
 //!
-//! A kernel's author may give the ordinary inputs, with a function of their own ([`of_entry`]).
+//! A kernel's author may give inputs with a function of their own ([`of_entry`]).
 
 pub mod values;
 
@@ -15,7 +15,7 @@ use std::fmt;
 
 use fastrand::Rng;
 use hankel_dsl::native::describe::{
-    Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Stage,
+    Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Scalar, Stage,
     TexelFormat, TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
@@ -231,8 +231,10 @@ pub fn set_constants(kernel: &mut Kernel, values: &[u32]) -> BTreeMap<String, u3
 }
 
 /// The cases of an entry point, for the values that its specialisation constants have by default:
-/// ordinary ones from the author's function, if there is one, else from the attributes; edge and
-/// hostile ones from the attributes.
+/// from the author's function, if there is one, else from the attributes.
+///
+/// The edge and hostile ones of an author's function have its lengths, sizes and integers, which belong
+/// together; their floats are edge and hostile ones by the attributes.
 ///
 /// # Errors
 /// See [`InputError`].
@@ -258,9 +260,25 @@ pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError>
         let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 40));
         all.push(case(kernel, Class::Ordinary, rng, Some(given))?);
     }
-    let made = cases(kernel, seed)?;
-    all.extend(made.into_iter().filter(|c| c.class != Class::Ordinary));
+    for (i, class) in Class::ALL.into_iter().enumerate() {
+        if class == Class::Ordinary {
+            continue;
+        }
+        for (run, given) in (0..runs(kernel)).zip(given.iter().cycle()) {
+            let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 32) ^ run);
+            all.push(case(kernel, class, rng, Some(given))?);
+        }
+    }
     Ok(all)
+}
+
+/// How many cases a class has.
+fn runs(kernel: &Kernel) -> u64 {
+    let has_uniform = kernel
+        .params
+        .iter()
+        .any(|p| matches!(p.role, Role::Uniform { .. }));
+    if has_uniform { 4 } else { 1 }
 }
 
 /// The name goes in, so that kernels do not share inputs by accident.
@@ -276,14 +294,9 @@ fn mixed(kernel: &Kernel, seed: u64) -> u64 {
 /// # Errors
 /// See [`InputError`].
 pub fn cases(kernel: &Kernel, seed: u64) -> Result<Vec<Case>, InputError> {
-    let has_uniform = kernel
-        .params
-        .iter()
-        .any(|p| matches!(p.role, Role::Uniform { .. }));
-    let runs = if has_uniform { 4 } else { 1 };
     let mut all = Vec::new();
     for (i, class) in Class::ALL.into_iter().enumerate() {
-        for run in 0..runs {
+        for run in 0..runs(kernel) {
             let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 32) ^ run);
             all.push(case(kernel, class, rng, None)?);
         }
@@ -317,7 +330,7 @@ fn case(
     };
     let slots = slots::slots(kernel);
     let given = Own::new(&slots, given)?;
-    let size = texels(kernel, &given);
+    let size = texels(kernel, &given, &mut values);
     let elements = match (&kernel.stage, size) {
         (Stage::Compute { .. }, Some(size)) => size.iter().map(|&n| n as usize).product(),
         (Stage::Compute { .. }, None) => ELEMENTS,
@@ -345,7 +358,8 @@ fn case(
     let mut args: Vec<Input> = slots
         .iter()
         .map(|slot| match given.get(&slot.name) {
-            Some(own) => Ok(own.clone()),
+            Some(own) if class == Class::Ordinary => Ok(own.clone()),
+            Some(own) => like(kernel, slot, own, &mut values),
             None => input(kernel, slot, &mut values, &extents),
         })
         .collect::<Result<_, _>>()?;
@@ -364,9 +378,13 @@ fn case(
             }
         }
     }
+    let what = given.what.map(|what| match class {
+        Class::Ordinary => what,
+        Class::Edge | Class::Hostile => format!("shaped like {what}"),
+    });
     Ok(Case {
         class,
-        what: given.what,
+        what,
         args,
         invocations: extents.elements,
     })
@@ -392,7 +410,7 @@ const fn size_of_range(dimensions: u32) -> [u32; 3] {
 }
 
 /// How far the kernel runs; none for a map over the elements of a buffer.
-fn texels(kernel: &Kernel, given: &Own) -> Option<[u32; 3]> {
+fn texels(kernel: &Kernel, given: &Own, values: &mut Values) -> Option<[u32; 3]> {
     let Stage::Compute {
         range, dimensions, ..
     } = &kernel.stage
@@ -403,7 +421,7 @@ fn texels(kernel: &Kernel, given: &Own) -> Option<[u32; 3]> {
         (Range::Fixed { size }, _) => Some(*size),
         (Range::Uniform { param, offset }, _) => {
             let Some(Input::Bytes(bytes)) = given.get(param) else {
-                return Some(size_of_range(*dimensions));
+                return Some(said_size(kernel, param, *offset, *dimensions, values));
             };
             let mut size = [1; 3];
             let words = bytes.get(*offset as usize..).unwrap_or_default();
@@ -416,6 +434,53 @@ fn texels(kernel: &Kernel, given: &Own) -> Option<[u32; 3]> {
         (Range::Outputs, Some(Output::Texture { .. })) => Some(size_of_range(*dimensions)),
         (Range::Outputs | Range::Elements { .. }, _) => None,
     }
+}
+
+/// The size of a range that a uniform says, as the attributes of its numbers allow: the usual one where
+/// they do, and of edge inputs now and then the least.
+fn said_size(
+    kernel: &Kernel,
+    param: &str,
+    offset: u32,
+    dimensions: u32,
+    values: &mut Values,
+) -> [u32; 3] {
+    let mut size = size_of_range(dimensions);
+    let uniform = kernel.params.iter().find_map(|p| match &p.role {
+        Role::Uniform { layout, .. } if p.name == param => Some((layout, &p.inputs)),
+        _ => None,
+    });
+    let Some((layout, outer)) = uniform else {
+        return size;
+    };
+    let leaves = flat::leaves(layout);
+    for (i, n) in size.iter_mut().enumerate().take(dimensions as usize) {
+        let at = offset as usize + 4 * i;
+        let domain = leaves
+            .iter()
+            .find(|leaf| leaf.offset == at)
+            .and_then(|leaf| leaf.inputs.within(outer).domain);
+        match domain {
+            Some(Domain::Values { values: said }) => {
+                // Of none is no range.
+                let said: Vec<u32> = said.iter().map(|n| *n as u32).filter(|n| *n > 0).collect();
+                if !said.is_empty() {
+                    *n = said[values.rng.usize(..said.len())];
+                }
+            }
+            Some(Domain::Range { least, most } | Domain::Magnitude { least, most }) => {
+                let least = (least.ceil() as u32).max(1);
+                let most = (most.floor() as u32).max(least);
+                *n = if values.class == Class::Edge && values.rng.bool() {
+                    least
+                } else {
+                    (*n).clamp(least, most)
+                };
+            }
+            _ => {}
+        }
+    }
+    size
 }
 
 /// The arguments that the author's function gave, by the names of parameters.
@@ -517,7 +582,7 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
             Value::Texture {
                 size,
                 levels: 1,
-                layers: 1,
+                layers,
                 samples: 1,
                 format,
                 bytes,
@@ -525,13 +590,18 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
             Use::StorageTexture {
                 format: wanted,
                 dimensions,
+                array,
                 ..
             },
         ) => {
             let shape = TextureShape {
                 dimensions,
+                layers: *layers,
                 ..TextureShape::d3(*size, *format)
             };
+            if *layers != 1 && !array {
+                return Err(format!("it has {layers} layers; the kernel takes one"));
+            }
             if *format != wanted {
                 return Err(format!(
                     "its format is {}, not {}",
@@ -582,6 +652,11 @@ const fn is_input(role: &Use<'_>) -> bool {
     }
 }
 
+/// Whether it has a number of elements or texels that other attributes may name.
+const fn has_length(role: &Use<'_>) -> bool {
+    is_input(role) || matches!(role, Use::Atomic { .. })
+}
+
 /// Whether an author may give it: what is written to as well, if its size is not the range's.
 const fn is_given(role: &Use<'_>) -> bool {
     is_input(role) || matches!(role, Use::StorageTexture { .. })
@@ -614,7 +689,7 @@ fn lengths(
     let mut known: BTreeMap<String, usize> = BTreeMap::new();
     let mut later: Vec<(&str, bool, &Length)> = Vec::new();
     let mut elements: Option<(String, usize)> = None;
-    for slot in slots.iter().filter(|s| is_input(&s.role)) {
+    for slot in slots.iter().filter(|s| has_length(&s.role)) {
         let name = slot.name.as_str();
         let own = is_own(kernel, slot);
         let count = match given.get(name) {
@@ -679,7 +754,7 @@ fn lengths(
                 });
             }
             settled = true;
-            for slot in slots.iter().filter(|s| is_input(&s.role)) {
+            for slot in slots.iter().filter(|s| has_length(&s.role)) {
                 if known.contains_key(&slot.name) || later.iter().any(|l| l.0 == slot.name) {
                     continue;
                 }
@@ -688,6 +763,7 @@ fn lengths(
                         elements.as_ref().map_or(extents.elements, |e| e.1)
                     }
                     Use::Storage(_) | Use::StorageMut { .. } => extents.table,
+                    Use::Atomic { .. } => COUNTERS,
                     Use::Texture(kind) => texels_of(kernel, &slot.name, kind, extents.size)
                         .iter()
                         .map(|&n| n as usize)
@@ -742,6 +818,53 @@ fn texels_of(kernel: &Kernel, name: &str, kind: TextureKind, otherwise: [u32; 3]
     }
 }
 
+/// What the author gave, with floats of another class: lengths, sizes and integers are kept.
+fn like(
+    kernel: &Kernel,
+    slot: &Slot<'_>,
+    own: &Input,
+    values: &mut Values,
+) -> Result<Input, InputError> {
+    let nothing = Inputs::default();
+    let said = about(kernel, &slot.name).map_or(&nothing, |p| &p.inputs);
+    Ok(match own {
+        Input::Bytes(given) => {
+            let leaves = match slot.role {
+                Use::Uniform(l) | Use::Element(l) | Use::ElementMut(l) | Use::Storage(l) => {
+                    flat::leaves(l)
+                }
+                Use::StorageMut { layout, .. } => flat::leaves(layout),
+                Use::Attribute(_, ty) | Use::Varying(_, ty) => flat::type_leaves(ty),
+                _ => return Ok(own.clone()),
+            };
+            let stride = slot.role.element_bytes().unwrap_or(1).max(1);
+            let mut made = values.elements(&leaves, said, stride, given.len() / stride)?;
+            let kept = leaves
+                .iter()
+                .filter(|leaf| !matches!(leaf.scalar, Scalar::F32 | Scalar::F64));
+            for leaf in kept {
+                let place = leaf.offset..leaf.offset + leaf.scalar.bytes();
+                let both = made
+                    .chunks_exact_mut(stride)
+                    .zip(given.chunks_exact(stride));
+                for (to, from) in both {
+                    to[place.clone()].copy_from_slice(&from[place.clone()]);
+                }
+            }
+            Input::Bytes(made)
+        }
+        Input::Texture { shape, .. }
+            if is_input(&slot.role) && shape.format.texel().numbers() == Channels::Float =>
+        {
+            Input::Texture {
+                shape: *shape,
+                bytes: values.texels(said, shape)?,
+            }
+        }
+        Input::Texture { .. } | Input::Sampler(_) => own.clone(),
+    })
+}
+
 fn input(
     kernel: &Kernel,
     slot: &Slot<'_>,
@@ -768,18 +891,20 @@ fn input(
             let stride = slots::type_bytes(ty);
             Input::Bytes(values.elements(&leaves, said, stride, extents.elements)?)
         }
-        Use::Atomic { .. } => zeros(COUNTERS),
+        Use::Atomic { .. } => zeros(length.unwrap_or(COUNTERS)),
         Use::Interface(_) | Use::Output(_) => zeros(extents.elements),
         Use::StorageTexture {
             format,
             dimensions,
+            array,
             access,
         } => {
             let [width, height, _] = extents.size;
             let shape = if dimensions == 3 {
                 TextureShape::d3(extents.volume, format)
             } else {
-                TextureShape::d2(width, height, format)
+                let layers = said.layers.unwrap_or(LAYERS);
+                TextureShape::d2(width, height, format).with_layers(if array { layers } else { 1 })
             };
             let bytes = if access.reads() {
                 values.texels(said, &shape)?

@@ -119,6 +119,7 @@ extern crate self as hankel_dsl;
 
 mod atomics;
 mod data;
+mod half;
 pub mod math;
 mod memory;
 #[cfg(not(target_arch = "spirv"))]
@@ -135,6 +136,7 @@ mod workgroup;
 pub use atomics::{AtomicInteger, Atomics};
 pub use data::{Bool, PackedVec3};
 pub use glam;
+pub use half::{F16, F16x2, F16x4};
 pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
 pub use memory::Buffer;
 pub use real::{Mask, Real, to_i32};
@@ -147,7 +149,8 @@ pub use stage::{
 };
 pub use storage::{StorageMut, Stored};
 pub use storage_texture::{
-    Access, Format, Readable, StorageTexture2d, StorageTexture3d, Writable, access, format,
+    Access, Format, Readable, StorageTexture2d, StorageTexture2dArray, StorageTexture3d, Writable,
+    access, format,
 };
 pub use subgroup::{
     SubgroupInteger, SubgroupNumber, SubgroupValue, quad_broadcast, quad_swap_diagonal,

@@ -18,7 +18,7 @@ pub mod format {
     use super::{Format, IVec2, IVec4, UVec2, UVec4, Vec4};
 
     macro_rules! formats {
-        ($($(#[doc = $doc:literal])* $name:ident, $texel:ty, $flat:ident, $volume:ident;)*) => { $(
+        ($($(#[doc = $doc:literal])* $name:ident, $texel:ty, $flat:ident, $layers:ident, $volume:ident;)*) => { $(
             $(#[doc = $doc])*
             #[derive(Clone, Copy, Debug)]
             pub enum $name {}
@@ -28,11 +28,19 @@ pub mod format {
                 #[cfg(target_arch = "spirv")]
                 type Flat = super::image::$flat;
                 #[cfg(target_arch = "spirv")]
+                type Layers = super::image::$layers;
+                #[cfg(target_arch = "spirv")]
                 type Volume = super::image::$volume;
                 #[cfg(target_arch = "spirv")]
                 #[inline(always)]
                 fn flat_size(image: &Self::Flat) -> glam::UVec2 {
                     image.query_size()
+                }
+                #[cfg(target_arch = "spirv")]
+                #[inline(always)]
+                fn layers_size(image: &Self::Layers) -> glam::UVec2 {
+                    let size: glam::UVec3 = image.query_size();
+                    size.truncate()
                 }
                 #[cfg(target_arch = "spirv")]
                 #[inline(always)]
@@ -47,35 +55,35 @@ pub mod format {
 
     formats! {
         /// One 32-bit float.
-        R32Float, f32, Storage2dR32Float, Storage3dR32Float;
+        R32Float, f32, Storage2dR32Float, Storage2dArrayR32Float, Storage3dR32Float;
         /// Four 32-bit floats.
-        Rgba32Float, Vec4, Storage2dRgba32Float, Storage3dRgba32Float;
+        Rgba32Float, Vec4, Storage2dRgba32Float, Storage2dArrayRgba32Float, Storage3dRgba32Float;
         /// Four 16-bit floats.
-        Rgba16Float, Vec4, Storage2dRgba16Float, Storage3dRgba16Float;
+        Rgba16Float, Vec4, Storage2dRgba16Float, Storage2dArrayRgba16Float, Storage3dRgba16Float;
         /// Four 16-bit numbers from 0 to 1.
-        Rgba16Unorm, Vec4, Storage2dRgba16Unorm, Storage3dRgba16Unorm;
+        Rgba16Unorm, Vec4, Storage2dRgba16Unorm, Storage2dArrayRgba16Unorm, Storage3dRgba16Unorm;
         /// Four 8-bit numbers from 0 to 1.
-        Rgba8Unorm, Vec4, Storage2dRgba8Unorm, Storage3dRgba8Unorm;
+        Rgba8Unorm, Vec4, Storage2dRgba8Unorm, Storage2dArrayRgba8Unorm, Storage3dRgba8Unorm;
         /// One 32-bit unsigned integer.
-        R32Uint, u32, Storage2dR32Uint, Storage3dR32Uint;
+        R32Uint, u32, Storage2dR32Uint, Storage2dArrayR32Uint, Storage3dR32Uint;
         /// Four 32-bit unsigned integers.
-        Rgba32Uint, UVec4, Storage2dRgba32Uint, Storage3dRgba32Uint;
+        Rgba32Uint, UVec4, Storage2dRgba32Uint, Storage2dArrayRgba32Uint, Storage3dRgba32Uint;
         /// One 32-bit signed integer.
-        R32Sint, i32, Storage2dR32Sint, Storage3dR32Sint;
+        R32Sint, i32, Storage2dR32Sint, Storage2dArrayR32Sint, Storage3dR32Sint;
         /// Four 32-bit signed integers.
-        Rgba32Sint, IVec4, Storage2dRgba32Sint, Storage3dRgba32Sint;
+        Rgba32Sint, IVec4, Storage2dRgba32Sint, Storage2dArrayRgba32Sint, Storage3dRgba32Sint;
         /// Two 32-bit unsigned integers.
-        Rg32Uint, UVec2, Storage2dRg32Uint, Storage3dRg32Uint;
+        Rg32Uint, UVec2, Storage2dRg32Uint, Storage2dArrayRg32Uint, Storage3dRg32Uint;
         /// Two 32-bit signed integers.
-        Rg32Sint, IVec2, Storage2dRg32Sint, Storage3dRg32Sint;
+        Rg32Sint, IVec2, Storage2dRg32Sint, Storage2dArrayRg32Sint, Storage3dRg32Sint;
         /// Four 16-bit unsigned integers. What does not fit must not be written.
-        Rgba16Uint, UVec4, Storage2dRgba16Uint, Storage3dRgba16Uint;
+        Rgba16Uint, UVec4, Storage2dRgba16Uint, Storage2dArrayRgba16Uint, Storage3dRgba16Uint;
         /// Four 16-bit signed integers. What does not fit must not be written.
-        Rgba16Sint, IVec4, Storage2dRgba16Sint, Storage3dRgba16Sint;
+        Rgba16Sint, IVec4, Storage2dRgba16Sint, Storage2dArrayRgba16Sint, Storage3dRgba16Sint;
         /// Four 8-bit unsigned integers. What does not fit must not be written.
-        Rgba8Uint, UVec4, Storage2dRgba8Uint, Storage3dRgba8Uint;
+        Rgba8Uint, UVec4, Storage2dRgba8Uint, Storage2dArrayRgba8Uint, Storage3dRgba8Uint;
         /// Four 8-bit signed integers. What does not fit must not be written.
-        Rgba8Sint, IVec4, Storage2dRgba8Sint, Storage3dRgba8Sint;
+        Rgba8Sint, IVec4, Storage2dRgba8Sint, Storage2dArrayRgba8Sint, Storage3dRgba8Sint;
     }
 }
 
@@ -132,10 +140,16 @@ pub trait Format: Copy {
     type Flat;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
+    type Layers;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
     type Volume;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
     fn flat_size(image: &Self::Flat) -> UVec2;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
+    fn layers_size(image: &Self::Layers) -> UVec2;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
     fn volume_size(image: &Self::Volume) -> UVec3;
@@ -144,8 +158,14 @@ pub trait Format: Copy {
     const FORMAT: TexelFormat;
 }
 
+/// `$place` makes a coordinate of what `store` and `load` take, which is `$whole` in three dimensions;
+/// `$sized` takes the size out of one in three dimensions.
 macro_rules! textures {
-    ($($(#[doc = $doc:literal])* $name:ident, $image:ident, $size:ident, $at:ty, $whole:expr, $sized:expr;)*) => { $(
+    ($(
+        $(#[doc = $doc:literal])*
+        $name:ident, $image:ident, $size:ident, $size_type:ty,
+        ($($arg:ident: $arg_type:ty),*), $place:expr, $whole:expr, $sized:expr;
+    )*) => { $(
         $(#[doc = $doc])*
         #[derive(Clone, Copy)]
         pub struct $name<'a, F: Format, A: Access = access::Write>(
@@ -163,24 +183,24 @@ macro_rules! textures {
                 Self(image, PhantomData)
             }
             #[inline(always)]
-            pub fn size(self) -> $at {
+            pub fn size(self) -> $size_type {
                 F::$size(self.0)
             }
             #[inline(always)]
-            pub fn store(self, at: $at, value: F::Value)
+            pub fn store(self, $($arg: $arg_type,)* value: F::Value)
             where
                 A: Writable,
             {
                 // SAFETY: the caller's contract; exports with bounds checks test it again.
-                unsafe { image::write(self.0, at, Texel::channels(value)) }
+                unsafe { image::write(self.0, $place, Texel::channels(value)) }
             }
             #[inline(always)]
-            pub fn load(self, at: $at) -> F::Value
+            pub fn load(self, $($arg: $arg_type),*) -> F::Value
             where
                 A: Readable,
             {
                 // SAFETY: the caller's contract; exports with bounds checks test it again.
-                Texel::of(unsafe { image::read(self.0, at) })
+                Texel::of(unsafe { image::read(self.0, $place) })
             }
         }
 
@@ -191,47 +211,46 @@ macro_rules! textures {
             pub fn new(texels: Texels<'a>) -> Self {
                 Self(texels, PhantomData)
             }
-            /// Texels along each axis.
+            /// Texels along each axis; of an array, those of a layer.
             #[inline]
             #[must_use]
-            pub fn size(self) -> $at {
-                let sized: fn(UVec3) -> $at = $sized;
+            pub fn size(self) -> $size_type {
+                let sized: fn(UVec3) -> $size_type = $sized;
                 sized(UVec3::from_array(self.0.size()))
             }
             #[track_caller]
-            fn inside(self, at: $at) -> UVec3 {
-                let whole: fn($at) -> UVec3 = $whole;
-                let (at, size) = (whole(at), UVec3::from_array(self.0.size()));
+            fn inside(self, at: UVec3) -> UVec3 {
+                let size = UVec3::from_array(self.0.size());
                 assert!(
                     at.cmplt(size).all(),
                     "texel {at} is out of range: the texture has {size}"
                 );
                 at
             }
-            /// Writes the texel at `at`, which must lie inside. A shader does not test that, unless
-            /// it was exported with bounds checks; the native device does, and reports the kernel.
-            /// An integer must fit the format: what becomes of one that does not differs.
-            /// No two invocations write the same texel: which comes last is undefined.
+            /// Writes the texel at `at`, which must lie inside; of an array, in a layer that is there. A
+            /// shader does not test that, unless it was exported with bounds checks; the native device
+            /// does, and reports the kernel. An integer must fit the format: what becomes of one that
+            /// does not differs. No two invocations write the same texel: which comes last is undefined.
             #[inline]
             #[track_caller]
-            pub fn store(self, at: $at, value: F::Value)
+            pub fn store(self, $($arg: $arg_type,)* value: F::Value)
             where
                 A: Writable,
                 F::Value: Texel<Channels: Channels>,
             {
-                self.0.store(self.inside(at), value);
+                self.0.store(self.inside($whole), value);
             }
             /// The texel at `at`, which must lie inside. An invocation sees what it wrote itself; what
             /// others of the same run wrote must not be read, as no barrier orders texels.
             #[inline]
             #[must_use]
             #[track_caller]
-            pub fn load(self, at: $at) -> F::Value
+            pub fn load(self, $($arg: $arg_type),*) -> F::Value
             where
                 A: Readable,
                 F::Value: Texel<Channels: Channels>,
             {
-                self.0.load(self.inside(at))
+                self.0.load(self.inside($whole))
             }
         }
     )* };
@@ -240,7 +259,12 @@ macro_rules! textures {
 textures! {
     /// A texture of two dimensions of which any texel may be written: `StorageTexture2d<'_,
     /// Rgba16Float>`; or read, or both: `StorageTexture2d<'_, R32Uint, ReadWrite>`.
-    StorageTexture2d, Flat, flat_size, UVec2, |at| at.extend(0), |size| size.truncate();
-    /// The same in three dimensions.
-    StorageTexture3d, Volume, volume_size, UVec3, |at| at, |size| size;
+    StorageTexture2d, Flat, flat_size, UVec2,
+        (at: UVec2), at, at.extend(0), |size| size.truncate();
+    /// Layers of two dimensions: `store(at, layer, value)`.
+    StorageTexture2dArray, Layers, layers_size, UVec2,
+        (at: UVec2, layer: u32), at.extend(layer), at.extend(layer), |size| size.truncate();
+    /// A texture of three dimensions.
+    StorageTexture3d, Volume, volume_size, UVec3,
+        (at: UVec3), at, at, |size| size;
 }

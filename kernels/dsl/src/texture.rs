@@ -112,6 +112,21 @@ pub mod image {
     pub type Storage3dRgba16Sint = Image!(3D, format = rgba16i, sampled = false);
     pub type Storage3dRgba8Uint = Image!(3D, format = rgba8ui, sampled = false);
     pub type Storage3dRgba8Sint = Image!(3D, format = rgba8i, sampled = false);
+    pub type Storage2dArrayR32Float = Image!(2D, format = r32f, sampled = false, arrayed);
+    pub type Storage2dArrayRgba32Float = Image!(2D, format = rgba32f, sampled = false, arrayed);
+    pub type Storage2dArrayRgba16Float = Image!(2D, format = rgba16f, sampled = false, arrayed);
+    pub type Storage2dArrayRgba16Unorm = Image!(2D, format = rgba16, sampled = false, arrayed);
+    pub type Storage2dArrayRgba8Unorm = Image!(2D, format = rgba8, sampled = false, arrayed);
+    pub type Storage2dArrayR32Uint = Image!(2D, format = r32ui, sampled = false, arrayed);
+    pub type Storage2dArrayRgba32Uint = Image!(2D, format = rgba32ui, sampled = false, arrayed);
+    pub type Storage2dArrayR32Sint = Image!(2D, format = r32i, sampled = false, arrayed);
+    pub type Storage2dArrayRgba32Sint = Image!(2D, format = rgba32i, sampled = false, arrayed);
+    pub type Storage2dArrayRg32Uint = Image!(2D, format = rg32ui, sampled = false, arrayed);
+    pub type Storage2dArrayRg32Sint = Image!(2D, format = rg32i, sampled = false, arrayed);
+    pub type Storage2dArrayRgba16Uint = Image!(2D, format = rgba16ui, sampled = false, arrayed);
+    pub type Storage2dArrayRgba16Sint = Image!(2D, format = rgba16i, sampled = false, arrayed);
+    pub type Storage2dArrayRgba8Uint = Image!(2D, format = rgba8ui, sampled = false, arrayed);
+    pub type Storage2dArrayRgba8Sint = Image!(2D, format = rgba8i, sampled = false, arrayed);
 
     /// Reads all four channels, whatever the format keeps of them.
     ///

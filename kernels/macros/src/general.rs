@@ -99,6 +99,7 @@ impl Kernel {
                         #text,
                         describe::TexelFormat::#format,
                         describe::TexelAccess::Write,
+                        false,
                     )?;)
                 }
                 None => {

@@ -5,8 +5,8 @@ use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 
 use crate::general::{Form, own};
-use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant, texture_type};
-use crate::shader::{output_name, sampler_type, storage_texture_type};
+use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, StorageKind, Variant, texture_type};
+use crate::shader::{output_name, sampler_type};
 use crate::stage::{Passed, Returned};
 use crate::twin;
 
@@ -214,15 +214,17 @@ impl Kernel {
                         quote!(Texture { binding: #b, texture: describe::TextureKind::#kind })
                     }
                     Role::StorageTexture {
-                        dimensions,
+                        kind,
                         format,
                         access,
                     } => {
+                        let (dimensions, array) = (kind.dimensions(), *kind == StorageKind::Layers);
                         let access = access_type(access.as_ref());
                         quote!(StorageTexture {
                             binding: #b,
                             format: <#format as ::hankel_dsl::Format>::FORMAT,
                             dimensions: #dimensions,
+                            array: #array,
                             access: <#access as ::hankel_dsl::Access>::ACCESS,
                         })
                     }
@@ -340,11 +342,11 @@ impl Kernel {
                     quote!(let #name = args.texture(#text, describe::TextureKind::#kind)?;)
                 }
                 Role::StorageTexture {
-                    dimensions,
+                    kind,
                     format,
                     access,
                 } => {
-                    let ty = storage_texture_type(*dimensions);
+                    let (ty, array) = (kind.ty(), *kind == StorageKind::Layers);
                     let access = access_type(access.as_ref());
                     quote! {
                         let #name = #ty::<#format, #access>::new(
@@ -352,6 +354,7 @@ impl Kernel {
                                 #text,
                                 <#format as ::hankel_dsl::Format>::FORMAT,
                                 <#access as ::hankel_dsl::Access>::ACCESS,
+                                #array,
                             )?,
                         );
                     }

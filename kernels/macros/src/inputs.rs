@@ -93,6 +93,8 @@ pub enum Holder {
     Field,
     /// A parameter that is a buffer of elements.
     Buffer,
+    /// Integers for atomic operations: they begin as zeros.
+    Counters,
     /// A parameter that is a texture.
     Texture {
         /// Dimensions of a layer.
@@ -103,6 +105,11 @@ pub enum Holder {
         array: bool,
         /// Its layers are squares.
         cube: bool,
+    },
+    /// A storage texture: nothing is said of its texels.
+    Texels {
+        /// It has any number of layers.
+        array: bool,
     },
     /// A sampler.
     Sampler {
@@ -302,7 +309,14 @@ impl Inputs {
         };
         if let Some((domain, span)) = &self.domain {
             match domain {
-                _ if matches!(holder, Holder::Nothing | Holder::Sampler { .. }) => {
+                _ if matches!(
+                    holder,
+                    Holder::Nothing
+                        | Holder::Counters
+                        | Holder::Texels { .. }
+                        | Holder::Sampler { .. }
+                ) =>
+                {
                     return error(
                         *span,
                         "this parameter has no numbers that inputs are made for",
@@ -327,13 +341,18 @@ impl Inputs {
         }
         if let (
             Some(default),
-            Holder::Buffer | Holder::Texture { .. } | Holder::Sampler { .. } | Holder::Nothing,
+            Holder::Buffer
+            | Holder::Counters
+            | Holder::Texture { .. }
+            | Holder::Texels { .. }
+            | Holder::Sampler { .. }
+            | Holder::Nothing,
         ) = (&self.default, holder)
         {
             return error(default.span(), "only a uniform's numbers have a default");
         }
         if let Some((length, span)) = &self.length {
-            if holder != Holder::Buffer {
+            if !matches!(holder, Holder::Buffer | Holder::Counters) {
                 return error(*span, "only a buffer has a length");
             }
             if let Length::Of { param, .. } = length {
@@ -345,6 +364,7 @@ impl Inputs {
                 (holder, wanted),
                 (Holder::Texture { levels: true, .. }, "levels")
                     | (Holder::Texture { array: true, .. }, "layers")
+                    | (Holder::Texels { array: true }, "layers")
             );
             if let (Some((_, span)), false) = (said, has) {
                 return error(*span, &format!("this has no {wanted} to choose"));

@@ -176,7 +176,7 @@ pub enum Role {
     /// The name of its kind and of its image.
     Texture(Ident),
     StorageTexture {
-        dimensions: u32,
+        kind: StorageKind,
         format: Type,
         /// None if it says nothing.
         access: Option<Type>,
@@ -197,6 +197,40 @@ pub enum Role {
     },
     Attribute(Type),
     Varying(Passed),
+}
+
+/// How the texels of a storage texture lie. The names are those of a format's images in the DSL.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StorageKind {
+    Flat,
+    Layers,
+    Volume,
+}
+
+impl StorageKind {
+    /// The DSL's type.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "StorageTexture2d",
+            Self::Layers => "StorageTexture2dArray",
+            Self::Volume => "StorageTexture3d",
+        }
+    }
+
+    /// The DSL's type, in full.
+    pub fn ty(self) -> TokenStream {
+        let name = format_ident!("{}", self.name());
+        quote!(::hankel_dsl::#name)
+    }
+
+    /// The format's type of its image in SPIR-V.
+    pub fn image(self) -> Ident {
+        format_ident!("{self:?}")
+    }
+
+    pub fn dimensions(self) -> u32 {
+        if self == Self::Volume { 3 } else { 2 }
+    }
 }
 
 /// What the device knows of an invocation.
@@ -358,11 +392,11 @@ impl Role {
                 comparison: *comparison,
             },
             Self::Constant { .. } => Holder::Constant,
-            Self::Atomic { .. }
-            | Self::StorageTexture { .. }
-            | Self::Index
-            | Self::BuiltIn(_)
-            | Self::Shared { .. } => Holder::Nothing,
+            Self::Atomic { .. } => Holder::Counters,
+            Self::StorageTexture { kind, .. } => Holder::Texels {
+                array: *kind == StorageKind::Layers,
+            },
+            Self::Index | Self::BuiltIn(_) | Self::Shared { .. } => Holder::Nothing,
         }
     }
 
@@ -514,7 +548,12 @@ impl Kernel {
         let sized: Vec<&Ident> = self
             .params
             .iter()
-            .filter(|p| matches!(p.role.holder(), Holder::Buffer | Holder::Texture { .. }))
+            .filter(|p| {
+                matches!(
+                    p.role.holder(),
+                    Holder::Buffer | Holder::Counters | Holder::Texture { .. }
+                )
+            })
             .map(|p| &p.name)
             .collect();
         for p in &self.params {
@@ -815,12 +854,7 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 unordered: unordered(&role)?,
             }
         }
-        "texture" if argument(ty, "StorageTexture2d").is_some() => {
-            storage_texture(ty, "StorageTexture2d", 2)
-        }
-        "texture" if argument(ty, "StorageTexture3d").is_some() => {
-            storage_texture(ty, "StorageTexture3d", 3)
-        }
+        "texture" if storage_texture(ty).is_some() => storage_texture(ty).unwrap_or(Role::Index),
         "texture" => match last_segment(ty) {
             Some(_) if texture_kind(ty).is_some() => {
                 Role::Texture(texture_kind(ty).unwrap_or_else(|| name.clone()))
@@ -833,7 +867,7 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 return Err(syn::Error::new(
                     ty.span(),
                     format!(
-                        "a texture is one of {}; one that is written is `StorageTexture2d<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
+                        "a texture is one of {}; one that is written is `StorageTexture2d<'_, FORMAT>`, `StorageTexture2dArray<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
                         names.join(", ")
                     ),
                 ));
@@ -926,14 +960,17 @@ fn arguments(ty: &Type, name: &str) -> Vec<Type> {
     types.collect()
 }
 
-/// The role of `NAME<'_, FORMAT, ACCESS>`.
-fn storage_texture(ty: &Type, name: &str, dimensions: u32) -> Role {
-    let mut arguments = arguments(ty, name).into_iter();
-    Role::StorageTexture {
-        dimensions,
-        format: arguments.next().unwrap_or_else(|| ty.clone()),
-        access: arguments.next(),
-    }
+/// The role of `NAME<'_, FORMAT, ACCESS>`, if it is a storage texture.
+fn storage_texture(ty: &Type) -> Option<Role> {
+    let kinds = [StorageKind::Flat, StorageKind::Layers, StorageKind::Volume];
+    kinds.into_iter().find_map(|kind| {
+        let mut arguments = arguments(ty, kind.name()).into_iter();
+        Some(Role::StorageTexture {
+            kind,
+            format: arguments.next()?,
+            access: arguments.next(),
+        })
+    })
 }
 
 fn shared(ty: &Type) -> syn::Result<Role> {

@@ -46,7 +46,7 @@ use syn::parse_macro_input;
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
 /// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube`; of integers: `Texture2d<'_, u32>`, `Texture2dArray<'_, i32>`, `Texture3d<'_, u32>` |
-/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
+/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture2dArray`, `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
 /// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` for depths |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
@@ -81,7 +81,7 @@ use syn::parse_macro_input;
 /// | `#[count_of(PARAM)]`, `#[index_of(PARAM)]` | the number of elements of another parameter; the number of one of its elements |
 /// | `#[default(0.5)]` | a uniform's number unless somebody gives another one; 0 without it |
 /// | `#[unit = "m"]` | the unit |
-/// | `#[length(64)]`, `#[length(1..=64)]`, `#[length(PARAM * 3)]` | elements of a buffer: a number, any number between two, as many as another's |
+/// | `#[length(64)]`, `#[length(1..=64)]`, `#[length(PARAM * 3)]` | elements of a buffer or of atomic integers (256 without it): a number, any number between two, as many as another's |
 /// | `#[size(64, 32)]` | texels of a texture |
 /// | `#[levels(4)]` | mip levels of a texture; without it 1 |
 /// | `#[layers(5)]` | layers or cubes of an array; without it 3 |
@@ -89,13 +89,17 @@ use syn::parse_macro_input;
 /// | `#[address(mirror_repeat)]` | what a sampler does beyond the edge: `clamp_to_edge`, `repeat`, `mirror_repeat` |
 /// | `#[compare(less)]` | how a comparison sampler compares: `never`, `less`, `equal`, `less_equal` (the default), `greater`, `not_equal`, `greater_equal`, `always` |
 ///
+/// A kernel's range that a uniform says keeps to the attributes of its numbers, too: as many invocations
+/// as parity runs of every kernel, where those allow it, and sometimes the fewest.
+///
 /// Without any, floats lie in \[-1, 1\], texels in \[0, 1\], and integers anywhere, 0, 1, -1 and the
 /// extremes among them.
 ///
 /// What this cannot say, a function does: `inputs = path::to::function` among the arguments of
 /// `#[kernel]`, a `fn(&hankel_dsl::native::inputs::Request) -> Vec<hankel_dsl::native::inputs::Given>`
 /// that is compiled for the host only (behind `cfg(not(target_arch = "spirv"))`); for a kernel that
-/// is generic over `R: Real`, one that is generic likewise. What it leaves out is made as above.
+/// is generic over `R: Real`, one that is generic likewise. What it leaves out is made as above. Edge and
+/// hostile inputs have its lengths, sizes and integers, with floats made as above.
 #[proc_macro_attribute]
 pub fn kernel(args: TokenStream, item: TokenStream) -> TokenStream {
     let item = parse_macro_input!(item as syn::ItemFn);

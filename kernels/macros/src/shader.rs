@@ -157,8 +157,8 @@ impl Kernel {
                 Role::Texture(kind) => {
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::image::#kind,)
                 }
-                Role::StorageTexture { dimensions, format, .. } => {
-                    let shape = storage_shape(*dimensions);
+                Role::StorageTexture { kind, format, .. } => {
+                    let shape = kind.image();
                     quote! {
                         #[spirv(descriptor_set = 0, binding = #here)]
                         #name: &<#format as ::hankel_dsl::Format>::#shape,
@@ -251,8 +251,8 @@ impl Kernel {
                     let ty = texture_type(kind);
                     quote!(#ty::new(#name))
                 }
-                Role::StorageTexture { dimensions, .. } => {
-                    let ty = storage_texture_type(*dimensions);
+                Role::StorageTexture { kind, .. } => {
+                    let ty = kind.ty();
                     quote!(#ty::new(#name))
                 }
                 Role::Sampler { comparison } => {
@@ -354,18 +354,4 @@ pub fn sampler_type(comparison: bool) -> TokenStream {
     } else {
         quote!(::hankel_dsl::Sampler)
     }
-}
-
-/// The DSL's type of a texture that is written.
-pub fn storage_texture_type(dimensions: u32) -> TokenStream {
-    if dimensions == 2 {
-        quote!(::hankel_dsl::StorageTexture2d)
-    } else {
-        quote!(::hankel_dsl::StorageTexture3d)
-    }
-}
-
-/// Which of a format's types in SPIR-V it is.
-fn storage_shape(dimensions: u32) -> Ident {
-    format_ident!("{}", if dimensions == 2 { "Flat" } else { "Volume" })
 }

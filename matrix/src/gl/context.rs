@@ -122,6 +122,13 @@ pub(super) struct Texture {
     size: [u32; 3],
 }
 
+impl Texture {
+    /// Whether it has slices or layers, which are bound all at once and read one by one.
+    const fn is_layered(self) -> bool {
+        matches!(self.target, glow::TEXTURE_3D | glow::TEXTURE_2D_ARRAY)
+    }
+}
+
 /// A sampler.
 #[derive(Clone, Copy)]
 pub(super) struct Sampler(glow::Sampler);
@@ -560,7 +567,8 @@ impl Context {
             raw,
             target,
             texel,
-            size,
+            // With layers in place of a depth.
+            size: of_level(0),
         })
     }
 
@@ -689,7 +697,7 @@ impl Context {
                 unit,
                 Some(texture.raw),
                 0,
-                texture.target == glow::TEXTURE_3D,
+                texture.is_layered(),
                 0,
                 glow::READ_WRITE,
                 texture.texel.internal
@@ -759,7 +767,7 @@ impl Context {
         let mut bytes = Vec::with_capacity(texels(texture.size) * texel.bytes);
         self.framebuffer()?;
         for z in 0..depth {
-            if texture.target == glow::TEXTURE_3D {
+            if texture.is_layered() {
                 gl!(
                     self,
                     framebuffer_texture_layer(

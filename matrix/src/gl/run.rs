@@ -306,9 +306,7 @@ impl<'a> Run<'a> {
                         view, depth: true, ..
                     } => (view.clone(), Texel::DEPTH),
                     Role::Texture { view, .. } => (view.clone(), Texel::named(format)?),
-                    Role::StorageTexture { dimensions, .. } => {
-                        (format!("{dimensions}d"), Texel::named(format)?)
-                    }
+                    Role::StorageTexture { view, .. } => (view.clone(), Texel::named(format)?),
                     _ => return Err(format!("{arg:?} is given for {role:?}")),
                 };
                 let bytes = self.bytes(arg)?;

@@ -287,12 +287,13 @@ void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned layer, uns
     }
 }
 
-void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const float *value) {
+void msl_store_float(msl_texture *t, const unsigned *at, unsigned layer, unsigned lod,
+                     const float *value) {
     if (t->is_integer())
         msl_fail("floats are written to a texture of integers");
-    if (!t->has(at, 0, 0, lod))
+    if (!t->has(at, layer, 0, lod))
         return;
-    unsigned char *texel = t->texel(at, 0, 0, lod);
+    unsigned char *texel = t->texel(at, layer, 0, lod);
     for (unsigned i = 0; i < 4; i++) {
         switch (t->format) {
         case rgba16float: {
@@ -315,12 +316,13 @@ void msl_store_float(msl_texture *t, const unsigned *at, unsigned lod, const flo
     }
 }
 
-void msl_store_uint(msl_texture *t, const unsigned *at, unsigned lod, const unsigned *value) {
+void msl_store_uint(msl_texture *t, const unsigned *at, unsigned layer, unsigned lod,
+                    const unsigned *value) {
     if (!t->is_integer())
         msl_fail("integers are written to a texture of floats");
-    if (!t->has(at, 0, 0, lod))
+    if (!t->has(at, layer, 0, lod))
         return;
-    unsigned char *texel = t->texel(at, 0, 0, lod);
+    unsigned char *texel = t->texel(at, layer, 0, lod);
     unsigned size = t->texel_bytes / t->channels();
     for (unsigned i = 0; i < t->channels(); i++)
         memcpy(texel + i * size, &value[i], size);

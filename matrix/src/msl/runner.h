@@ -90,8 +90,10 @@ void msl_load_float(const msl_texture *texture, const unsigned *at, unsigned lay
 void msl_load_uint(const msl_texture *texture, const unsigned *at, unsigned layer, unsigned sample,
                    unsigned lod, unsigned *out);
 // Does nothing outside.
-void msl_store_float(msl_texture *texture, const unsigned *at, unsigned lod, const float *value);
-void msl_store_uint(msl_texture *texture, const unsigned *at, unsigned lod, const unsigned *value);
+void msl_store_float(msl_texture *texture, const unsigned *at, unsigned layer, unsigned lod,
+                     const float *value);
+void msl_store_uint(msl_texture *texture, const unsigned *at, unsigned layer, unsigned lod,
+                    const unsigned *value);
 // At a level of detail; with a reference, its comparison.
 void msl_sample_float(const msl_texture *texture, unsigned flags, const msl_place *place,
                       const float *reference, float lod, float *out);

@@ -63,7 +63,7 @@ fn texture(written: bool, n: u32, format: &'static str, size: [u32; 3], bytes: V
         role: if written {
             Role::StorageTexture {
                 format: format.into(),
-                dimensions: 2,
+                view: "2d".into(),
                 access: "write-only".into(),
             }
         } else {

@@ -334,7 +334,7 @@ class Maker {
                     return { ...entry, storageTexture: {
                         access: role.access,
                         format: role.format,
-                        viewDimension: `${role.dimensions}d`,
+                        viewDimension: role.view,
                     } };
                 default:
                     throw new Error(`slot \`${name}\` is bound, and a ${role.kind}`);
@@ -449,8 +449,7 @@ class Maker {
                     }
                 });
                 if (isWritten) reads.set(i, readTexture(texture, arg.length));
-                const dimension = isStored ? `${role.dimensions}d` : role.view;
-                return { binding, resource: texture.createView({ dimension }) };
+                return { binding, resource: texture.createView({ dimension: role.view }) };
             }
             const isUniform = role.kind === "uniform";
             const usage = isUniform ? GPUBufferUsage.UNIFORM : GPUBufferUsage.STORAGE;

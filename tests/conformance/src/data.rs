@@ -1,8 +1,8 @@
 //! What memory can hold beside numbers of 32 bits and vectors of them: truth values, 64-bit integers,
-//! vectors of three without padding.
+//! vectors of three without padding, numbers of 16 bits.
 
-use hankel_dsl::glam::{UVec2, Vec3, Vec4};
-use hankel_dsl::{Bool, Element, PackedVec3, kernel};
+use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::{Bool, Element, F16, F16x2, PackedVec3, kernel};
 
 /// What to do with a number.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -97,4 +97,87 @@ pub fn pushed(#[push] tint: &Tint, #[element] numbers: UVec2) -> UVec2 {
 )]
 pub fn pushed_colour(#[uniform] base: &Vec4, #[push] tint: &Tint, #[varying] colour: Vec4) -> Vec4 {
     (colour + *base) * tint.strength + tint.add
+}
+
+/// Two pairs of halves.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Halves {
+    /// The first pair.
+    pub a: F16x2,
+    /// The second pair; neither is zero.
+    pub b: F16x2,
+}
+
+/// What is computed of them.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct HalfResults {
+    /// Their sum and their difference.
+    pub sums: F16x2,
+    /// Their product and their quotient.
+    pub products: F16x2,
+    /// The root of the product's magnitude, and the larger of the sums.
+    pub others: F16x2,
+    /// The mean of a pair, computed in 32 bits.
+    pub mean: f32,
+}
+
+/// Arithmetic on halves: each result is rounded to one.
+#[kernel(compute, threads(64), inputs = inputs::halves)]
+pub fn halves(#[element] pair: Halves) -> HalfResults {
+    let (a, b) = (pair.a, pair.b);
+    let sums = F16x2::new(a.x() + b.x(), a.y() - b.y());
+    let product = a.x() * b.x();
+    let larger = if sums.x() > sums.y() {
+        sums.x()
+    } else {
+        sums.y()
+    };
+    let both = Vec2::from(a);
+    HalfResults {
+        sums,
+        products: F16x2::new(product, a.y() / b.y()),
+        others: F16x2::new(product.abs().sqrt(), larger),
+        mean: (both.x + both.y) * 0.5,
+    }
+}
+
+/// The bits of any number of 32 bits as a half, and of any half as a number of 32.
+#[kernel(compute, threads(64))]
+pub fn half_bits(#[element] bits: u32) -> UVec2 {
+    let wide = F16::from_bits(bits).get().to_bits();
+    UVec2::new(F16::new(f32::from_bits(bits)).to_bits(), wide)
+}
+
+#[cfg(not(target_arch = "spirv"))]
+mod inputs {
+    //! Halves that are numbers.
+
+    use hankel_dsl::F16x2;
+    use hankel_dsl::native::inputs::{Given, Request, Source};
+
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::Halves;
+
+    /// Any finite ones, of which those of the second pair are not zero.
+    pub fn halves(request: &Request) -> Vec<Given> {
+        let mut chance = Source::new(request.seed);
+        let mut half = |least: u32| loop {
+            let bits = chance.bits() as u32 & 0xffff;
+            if (least..0x7c00).contains(&(bits & 0x7fff)) {
+                return bits;
+            }
+        };
+        let pairs: Vec<Halves> = (0..4099)
+            .map(|_| Halves {
+                a: F16x2::from_bits(half(0) | (half(0) << 16)),
+                b: F16x2::from_bits(half(1) | (half(1) << 16)),
+            })
+            .collect();
+        [Given::new("finite halves").buffer("pair", &pairs)].into()
+    }
 }

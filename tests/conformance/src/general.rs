@@ -149,3 +149,74 @@ pub fn several(#[index] at: UVec2) -> (Vec4, u32, UVec2) {
         at,
     )
 }
+
+/// Counts numbers by what is left when they are divided by how many counters there are.
+#[kernel(compute, threads(64))]
+pub fn tallied(
+    #[element] x: u32,
+    #[atomic]
+    #[length(17)]
+    bins: Atomics<'_>,
+) {
+    bins.add(x % bins.len(), 1);
+}
+
+/// A square grid in a buffer that has room for sixteen cells along each axis.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Tile {
+    /// Cells along x and y.
+    #[range(1..=16)]
+    pub cells: UVec2,
+}
+
+/// Marks the cells at the border of a grid.
+#[kernel(compute, threads(8, 8), range(tile.cells))]
+pub fn bordered(
+    #[index] at: UVec2,
+    #[uniform] tile: &Tile,
+    #[storage]
+    #[length(256)]
+    marks: StorageMut<'_, u32>,
+) {
+    let last = tile.cells - 1;
+    let inside = at.x > 0 && at.y > 0 && at.x < last.x && at.y < last.y;
+    marks.set(at.y * 16 + at.x, if inside { 1 } else { 2 });
+}
+
+/// The sum of the first and the last number of a part of a table: where it begins, and how many follow.
+#[kernel(
+    compute,
+    threads(64),
+    inputs = inputs::parts,
+    parity(non_finite, why = "sums of absurd numbers overflow")
+)]
+pub fn ends(#[element] part: UVec2, #[storage] table: Buffer<'_, f32>) -> f32 {
+    table.get(part.x) + table.get(part.x + part.y)
+}
+
+#[cfg(not(target_arch = "spirv"))]
+mod inputs {
+    //! Places that are in their table.
+
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use hankel_dsl::glam::UVec2;
+    use hankel_dsl::native::inputs::{Given, Request, Source};
+
+    /// A table, and parts of it.
+    pub fn parts(request: &Request) -> Vec<Given> {
+        let mut chance = Source::new(request.seed);
+        let table: Vec<f32> = (0..57).map(|_| chance.between(-1.0, 1.0) as f32).collect();
+        let parts: Vec<UVec2> = (0..1001)
+            .map(|_| {
+                let start = chance.count(0, 56);
+                UVec2::new(start, chance.count(0, 56 - start))
+            })
+            .collect();
+        let given = Given::new("parts of a table");
+        [given.buffer("table", &table).buffer("part", &parts)].into()
+    }
+}

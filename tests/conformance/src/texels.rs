@@ -1,11 +1,12 @@
 //! Textures of integers, storage textures that are read, and gathers from cubes.
 
 use hankel_dsl::access::{Read, ReadWrite};
-use hankel_dsl::format::{R32Float, R32Sint, R32Uint, Rgba8Sint, Rgba16Float};
+use hankel_dsl::format::{R32Float, R32Sint, R32Uint, Rgba8Sint, Rgba16Float, Rgba32Float};
 use hankel_dsl::glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec3, Vec4};
 use hankel_dsl::{
-    ComparisonSampler, DepthTextureCube, Sampler, StorageTexture2d, StorageTexture3d, Texture2d,
-    Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray, kernel,
+    ComparisonSampler, DepthTextureCube, Sampler, StorageTexture2d, StorageTexture2dArray,
+    StorageTexture3d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
+    TextureCubeArray, kernel,
 };
 
 /// Texels of integers, as they are: of all levels, of layers, of a volume.
@@ -112,6 +113,50 @@ pub fn edges(
     let last = source.size().x - 1;
     let right = if at.x < last { at.x + 1 } else { last };
     source.load(UVec2::new(right, at.y)) - source.load(at)
+}
+
+/// Each layer from right to left, with the place that it was written from.
+#[kernel(compute, threads(4, 4, 1), range(13, 11, 3))]
+pub fn written_layers(
+    #[index] at: UVec3,
+    #[texture]
+    #[layers(3)]
+    layers: StorageTexture2dArray<'_, Rgba32Float>,
+) {
+    let size = layers.size();
+    layers.store(
+        UVec2::new(size.x - 1 - at.x, at.y),
+        at.z,
+        Vec4::new(at.x as f32, at.y as f32, at.z as f32, size.y as f32),
+    );
+}
+
+/// Texels of an array count, in place.
+#[kernel(compute, threads(4, 4, 1), range(13, 11, 3))]
+pub fn counted_layers(
+    #[index] at: UVec3,
+    #[texture]
+    #[layers(3)]
+    numbers: StorageTexture2dArray<'_, R32Uint, ReadWrite>,
+) {
+    let own = numbers.load(at.truncate(), at.z);
+    numbers.store(at.truncate(), at.z, (own ^ at.x).wrapping_add(at.z + 1));
+}
+
+/// The mean of two layers that are only read.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    parity(non_finite, why = "the largest halves overflow")
+)]
+pub fn read_layers(
+    #[index] at: UVec2,
+    #[texture]
+    #[layers(2)]
+    layers: StorageTexture2dArray<'_, Rgba16Float, Read>,
+) -> Vec4 {
+    layers.load(at, 0) * 0.5 + layers.load(at, 1) * 0.5
 }
 
 /// A direction to a corner between four texels of a face that has 16 on each side, away from the

@@ -481,7 +481,12 @@ impl VulkanDevice {
                 });
                 (ty, Resource::View(view))
             }
-            Use::StorageTexture { format, access, .. } => {
+            Use::StorageTexture {
+                format,
+                array,
+                access,
+                ..
+            } => {
                 let Bind::Texture(id) = bind else {
                     return Err(refuse("it must be a texture"));
                 };
@@ -513,16 +518,25 @@ impl VulkanDevice {
                     let feature = format!("{does} {} textures", format.name());
                     return Err(self.missing(&feature, kernel));
                 }
+                let view_dimension = match texture.shape.dimensions {
+                    3 => wgpu::TextureViewDimension::D3,
+                    _ if array => wgpu::TextureViewDimension::D2Array,
+                    _ => wgpu::TextureViewDimension::D2,
+                };
+                let view = if array {
+                    texture.texture.create_view(&wgpu::TextureViewDescriptor {
+                        dimension: Some(view_dimension),
+                        ..Default::default()
+                    })
+                } else {
+                    texture.view.clone()
+                };
                 let ty = wgpu::BindingType::StorageTexture {
                     access,
                     format: resources::format(Format::Texel(format)),
-                    view_dimension: if texture.shape.dimensions == 3 {
-                        wgpu::TextureViewDimension::D3
-                    } else {
-                        wgpu::TextureViewDimension::D2
-                    },
+                    view_dimension,
                 };
-                (ty, Resource::View(texture.view.clone()))
+                (ty, Resource::View(view))
             }
             Use::Sampler { .. } => {
                 let Bind::Sampler(sampler) = bind else {

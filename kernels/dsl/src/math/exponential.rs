@@ -40,8 +40,10 @@ fn in_range<R: Elementary>(x: R) -> R {
 #[inline(always)]
 #[must_use]
 pub fn exp<R: Elementary>(x: R) -> R {
-    let (n, high, low) = parts(in_range(x));
-    scaled(high + low, n)
+    let (n, r, error) = reduced(in_range(x));
+    // What `r + …` rounds off is a quarter of the result's last place at most: it need not be kept.
+    let power = R::literal::<{ super::ONE }>() + (r + (r * r * exponential(r) + error));
+    scaled(power, n)
 }
 
 /// 2 to the power of `x`.

@@ -79,8 +79,9 @@ impl Elementary for f32 {
     }
     #[inline(always)]
     fn guard(self) -> Self {
+        // Not `core`'s `max`, which asks whether its argument is a NaN and branches.
         #[cfg(target_arch = "spirv")]
-        return self.max(-85_070_591_730_234_615_865_843_651_857_942_052_864.0);
+        return Real::max(self, -85_070_591_730_234_615_865_843_651_857_942_052_864.0);
         #[cfg(not(target_arch = "spirv"))]
         return self;
     }
@@ -237,7 +238,7 @@ impl Elementary for f64 {
     #[inline(always)]
     fn guard(self) -> Self {
         #[cfg(target_arch = "spirv")]
-        return self.max(const { Self::from_bits(0xffd0_0000_0000_0000) });
+        return Real::max(self, const { Self::from_bits(0xffd0_0000_0000_0000) });
         #[cfg(not(target_arch = "spirv"))]
         return self;
     }

@@ -137,6 +137,26 @@ const TWO_OVER_PI: [u32; 46] = [
     0x14a0_6840,
 ];
 
+/// Four words of 2/pi from `word` on, which is from 1 to 5: as far as arguments of `f32` reach. By
+/// choices, which cost a shader less than a table: it would copy that into memory for each use.
+#[inline(always)]
+fn four_words(word: u32) -> [u32; 4] {
+    const W: [u32; 46] = TWO_OVER_PI;
+    let choose = |holds: bool, a: u32, b: u32| if holds { a } else { b };
+    let (odd, two, last) = (word & 1 == 0, word == 3 || word == 4, word == 5);
+    let a = choose(two, W[3], W[1]);
+    let b = choose(two, W[4], W[2]);
+    let c = choose(two, W[5], W[3]);
+    let d = choose(two, W[6], W[4]);
+    let e = choose(two, W[7], W[5]);
+    [
+        choose(last, W[5], choose(odd, b, a)),
+        choose(last, W[6], choose(odd, c, b)),
+        choose(last, W[7], choose(odd, d, c)),
+        choose(last, W[8], choose(odd, e, d)),
+    ]
+}
+
 /// The words' bits from `shift` on, which is from 0 to 31.
 #[inline(always)]
 fn shifted(high: u32, low: u32, shift: u32) -> u32 {
@@ -152,11 +172,8 @@ pub fn single(x: f32) -> (f32, f32, f32) {
     // x = significand * 2^exponent, the exponent from -12 to 104. Bits of 2/pi before the one of
     // weight 2^(2 - exponent) are whole turns.
     let from = (bits >> 23).wrapping_sub(150 - 62);
-    let (word, shift) = ((from >> 5) as usize, from & 31);
-    let w0 = TWO_OVER_PI[word];
-    let w1 = TWO_OVER_PI[word + 1];
-    let w2 = TWO_OVER_PI[word + 2];
-    let w3 = TWO_OVER_PI[word + 3];
+    let (word, shift) = (from >> 5, from & 31);
+    let [w0, w1, w2, w3] = four_words(word);
     let a = shifted(w0, w1, shift);
     let b = shifted(w1, w2, shift);
     let c = shifted(w2, w3, shift);

@@ -72,10 +72,10 @@ pub fn texture_bytes(
     })
 }
 
-/// As [`TextureRef`], to be written; one level, one layer, one sample.
+/// As [`TextureRef`], to be written; one level, one sample.
 #[derive(Debug)]
 pub struct TextureMut<'a> {
-    /// Width, height, depth in texels.
+    /// Width, height, depth in texels; of an array, its layers in place of the depth.
     pub size: [u32; 3],
     /// Format of the texels; the kernel's own.
     pub format: TexelFormat,

@@ -356,6 +356,9 @@ pub enum Role {
         format: TexelFormat,
         /// 2 or 3.
         dimensions: u32,
+        /// It has any number of layers.
+        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+        array: bool,
         /// What is done with its texels.
         #[serde(default, skip_serializing_if = "TexelAccess::is_write")]
         access: TexelAccess,
@@ -408,6 +411,16 @@ pub enum Role {
         #[serde(default, skip_serializing_if = "core::ops::Not::not")]
         flat: bool,
     },
+}
+
+/// How a storage texture is seen, in WebGPU's words: `2d`, `2d-array`, `3d`.
+#[must_use]
+pub const fn storage_view(dimensions: u32, array: bool) -> &'static str {
+    match (dimensions, array) {
+        (3, _) => "3d",
+        (_, true) => "2d-array",
+        (_, false) => "2d",
+    }
 }
 
 /// What a kernel does with the texels of a storage texture.

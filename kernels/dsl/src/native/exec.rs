@@ -127,9 +127,10 @@ impl<'a> Args<'a> {
         name: &'static str,
         format: TexelFormat,
         access: TexelAccess,
+        array: bool,
     ) -> Result<Texels<'a>, CallError> {
         if !access.writes() {
-            return self.constant_texels(name, format);
+            return self.constant_texels(name, format, array);
         }
         let TextureMut {
             size,
@@ -150,6 +151,7 @@ impl<'a> Args<'a> {
         &mut self,
         name: &'static str,
         format: TexelFormat,
+        array: bool,
     ) -> Result<Texels<'a>, CallError> {
         let Some(Arg::Texture(t)) = self.args.next() else {
             return Err(CallError::Kind {
@@ -163,12 +165,17 @@ impl<'a> Args<'a> {
                 t.format.name(),
                 format.name()
             )
-        } else if t.levels != 1 || t.layers != 1 || t.samples != 1 {
-            "it has several levels, layers or samples, but the kernel reads one".into()
+        } else if t.levels != 1 || t.samples != 1 {
+            "it has several levels or samples, but the kernel reads one".into()
+        } else if t.layers != 1 && !array {
+            "it has several layers, but the kernel reads one".into()
         } else {
-            check_size(name, t.size, format, t.bytes.len())?;
+            let [width, height, depth] = t.size;
+            // One of them is 1.
+            let size = [width, height, depth.saturating_mul(t.layers)];
+            check_size(name, size, format, t.bytes.len())?;
             return Ok(Texels {
-                size: t.size,
+                size,
                 format,
                 memory: Memory::Constant(t.bytes),
             });
@@ -300,7 +307,7 @@ enum Memory<'a> {
 }
 
 impl Texels<'_> {
-    /// Width, height, depth.
+    /// Width, height, depth or layers.
     pub fn size(self) -> [u32; 3] {
         self.size
     }

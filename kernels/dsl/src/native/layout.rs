@@ -9,13 +9,13 @@ use bytemuck::Pod;
 use glam::{IVec2, IVec3, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
 use super::describe::{Field, Inputs, Layout, Precision, Scalar, Type};
-use crate::{Bool, Real};
+use crate::{Bool, F16x2, Real};
 
 /// A value that a buffer can hold: the same bytes on the host and in a shader.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be in a buffer",
     note = "a structure needs `#[derive(Element)]` and `#[repr(C)]`",
-    note = "`usize`, `f16` and enums have no place in a shader's memory: use `u32` or `f32`; for `bool`, use `Bool`"
+    note = "`usize` and enums have no place in a shader's memory: use `u32` or `f32`; for `bool`, use `Bool`; for halves, `F16x2`"
 )]
 pub trait Element: Pod + Send + Sync {
     /// Alignment in bytes that a shader wants (std430).
@@ -80,6 +80,7 @@ leaf! {
     u64, 8, Type::Scalar { scalar: Scalar::U64 };
     i64, 8, Type::Scalar { scalar: Scalar::I64 };
     Bool, 4, Type::Scalar { scalar: Scalar::Bool };
+    F16x2, 4, Type::Scalar { scalar: Scalar::U32 };
     Vec2, 8, Type::Vector { scalar: Scalar::F32, size: 2 };
     Vec3, 16, Type::Vector { scalar: Scalar::F32, size: 3 };
     Vec4, 16, Type::Vector { scalar: Scalar::F32, size: 4 };
@@ -95,6 +96,11 @@ leaf! {
 unsafe impl bytemuck::Zeroable for Bool {}
 // SAFETY: see above.
 unsafe impl Pod for Bool {}
+
+// SAFETY: a transparent `u32`, of which every bit pattern is a value.
+unsafe impl bytemuck::Zeroable for F16x2 {}
+// SAFETY: see above.
+unsafe impl Pod for F16x2 {}
 
 impl<T: Element, const N: usize> Element for [T; N]
 where
@@ -266,6 +272,13 @@ macro_rules! scalar {
             type Over<L: Real> = i32;
             #[inline(always)]
             fn splat<L: Lane<Scalar = $float>>(self) -> i32 {
+                self
+            }
+        }
+        impl Splat<$float> for F16x2 {
+            type Over<L: Real> = F16x2;
+            #[inline(always)]
+            fn splat<L: Lane<Scalar = $float>>(self) -> F16x2 {
                 self
             }
         }
