@@ -89,6 +89,10 @@ pub struct Translucent {
 /// What [`Graph::omit`] calls translucent casters that cast no shadow.
 pub const TRANSLUCENT: &str = "shadow of translucent casters";
 
+/// Why maps of floats hold opaque casters only.
+pub const CANNOT_BLEND_FLOATS: &str =
+    "not every device can blend 32-bit floats: a map of 16 bits shows it";
+
 /// Depth as the light sees it, of opaque casters only.
 ///
 /// # Errors
@@ -207,38 +211,55 @@ pub fn moment_map(graph: &mut Graph, given: &Given) -> Result<Handle> {
         let depth = opaque_depth(graph, given)?;
         return moments(graph, given, depth);
     };
-    let Map {
-        format, encoding, ..
-    } = given.shadow.map;
+    let encoding = given.shadow.map.encoding;
     if encoding == encoding::PLAIN {
-        graph.omit(
-            TRANSLUCENT,
-            "not every device can blend 32-bit floats: a map of 16 bits shows it",
-        );
+        graph.omit(TRANSLUCENT, CANNOT_BLEND_FLOATS);
         let depth = opaque_depth(graph, given)?;
         return moments(graph, given, depth);
     }
     let depth = opaque_depth(graph, given)?;
-    let size = [given.shadow.size; 2];
-    let mut halves = Vec::new();
-    for (part, label) in ["blend first half", "blend second half"]
-        .into_iter()
-        .enumerate()
-    {
-        let pass = draw_translucent(graph, given, &translucent, label, given.light_view)
-            .fragment("translucent_moments")
-            .constant("encoding", encoding)
-            .constant("part", part as u32)
-            .blend(Blend::Alpha)
-            .before(depth);
-        halves.push(pass.samples(size, format, [0.0; 4])?);
-    }
+    let encode = [("encoding", encoding)];
+    let [first, second] = blended_halves(
+        graph,
+        given,
+        &translucent,
+        depth,
+        "translucent_moments",
+        &encode,
+    )?;
     resolve(graph, given, "resolve_translucent")
         .arg("depth", depth)
-        .arg("first", halves[0])
-        .arg("second", halves[1])
+        .arg("first", first)
+        .arg("second", second)
         .constant("encoding", encoding)
-        .image(size)
+        .image([given.shadow.size; 2])
+}
+
+/// Translucent triangles before the opaque `depth`, blended into both halves of a map's moments: the kernel's `part`
+/// 0 and 1.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn blended_halves(
+    graph: &mut Graph,
+    given: &Given,
+    translucent: &Translucent,
+    depth: Handle,
+    kernel: &'static str,
+    constants: &[(&'static str, u32)],
+) -> Result<[Handle; 2]> {
+    let mut half = |part, label| {
+        let pass = draw_translucent(graph, given, translucent, label, given.light_view)
+            .fragment(kernel)
+            .constant("part", part)
+            .blend(Blend::Alpha)
+            .before(depth);
+        let pass = constants
+            .iter()
+            .fold(pass, |pass, (name, value)| pass.constant(*name, *value));
+        pass.samples([given.shadow.size; 2], given.shadow.map.format, [0.0; 4])
+    };
+    Ok([half(0, "blend first half")?, half(1, "blend second half")?])
 }
 
 /// Begins the pass that draws translucent triangles as a light or a camera sees them.
@@ -304,6 +325,29 @@ pub fn resolve<'g>(
         graph.omit("quantisation", "32 bits hold what is filtered as it is");
     }
     graph.compute("resolve", kernel)
+}
+
+/// The filtered maps that `kernel` makes of the light's depths: a texture for each of `names`, which are those of the
+/// parameters that it is looked up by.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn filtered_maps(
+    graph: &mut Graph,
+    given: &Given,
+    kernel: impl Into<Cow<'static, str>>,
+    names: &[&'static str],
+) -> Result<Vec<(&'static str, Handle)>> {
+    let depth = light_depth(graph, given)?;
+    let size = [given.shadow.size, given.shadow.size, 1];
+    let pass = resolve(graph, given, kernel).arg("depth", depth);
+    let pass = names.iter().fold(pass, |pass, _| pass.texels(size));
+    let maps = pass.finish()?.outputs;
+    names
+        .iter()
+        .zip(maps)
+        .map(|(name, map)| Ok((*name, blur(graph, given, map)?)))
+        .collect()
 }
 
 /// Weights of a Gaussian with `taps` taps: of the centre and of the taps to one side. They reach

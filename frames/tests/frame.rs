@@ -248,8 +248,37 @@ fn six_moments_give_the_same_light_and_shadow() {
 }
 
 #[test]
+fn any_number_of_moments_gives_the_same_light_and_shadow() {
+    for technique in ["moments-4", "moments-6", "moments-8", "moments-10"] {
+        is_as_filtered_depths(technique);
+    }
+}
+
+#[test]
 fn trigonometric_moments_give_the_same_light_and_shadow() {
     is_as_filtered_depths("tmsm");
+}
+
+/// As bright where nothing shades; what is well behind the box is dark, what is near it is as a slow rise leaves it.
+#[test]
+fn series_give_the_same_light() {
+    let pcf = scene("technique = 'pcf'\nfilter = 3\nsize = 512\ndepth_bias = 0.003");
+    let [dark, lit] = ground(&pcf, &native(&pcf), 3).map(|g| i32::from(range(&g)[0]));
+    for technique in ["convolution", "convolution-8"] {
+        for map in Technique::named(technique).unwrap().maps {
+            let map = with_map(technique, map);
+            let scene = scene(&format!("filter = 3\nsize = 512\n{map}"));
+            let [shaded, bright] = ground(&scene, &native(&scene), 3);
+            let [low, high] = range(&bright).map(i32::from);
+            assert!(low >= lit - 3 && high <= lit + 3, "{map}: {low} {high}");
+            let [low, high] = range(&shaded).map(i32::from);
+            println!("{map}: {low} {high}, lit {lit}, dark {dark}");
+            assert!(
+                (low - dark).abs() <= 3 && high <= lit + 3,
+                "{map}: {low} {high}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -102,6 +102,10 @@ fn mip_levels_agree_in_the_yard() {
         "technique = 'hamburger'\nformat = 'rgba32float'\nanisotropy = 16",
         "technique = 'hausdorff'\nanisotropy = 4",
         "technique = 'hamburger-6'\nanisotropy = 4",
+        "technique = 'moments-4'\nanisotropy = 4",
+        "technique = 'moments-10'\nanisotropy = 4",
+        "technique = 'convolution'\nanisotropy = 4",
+        "technique = 'convolution-8'\nformat = 'rgba16unorm'\nanisotropy = 4",
         "technique = 'vsm'\nanisotropy = 4",
         "technique = 'tmsm'\nanisotropy = 4",
         "technique = 'esm'\nanisotropy = 4",
@@ -114,7 +118,7 @@ fn mip_levels_agree_in_the_yard() {
 
 #[test]
 fn glass_agrees() {
-    for technique in ["hamburger", "hausdorff", "pcf", "esm"] {
+    for technique in ["hamburger", "hamburger-6", "hausdorff", "pcf", "esm"] {
         agree("glass", &format!("technique = '{technique}'"));
     }
 }

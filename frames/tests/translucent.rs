@@ -423,6 +423,7 @@ fn shadows_of_glass_are_near_the_rays() {
     let slack = "depth_bias = 0.008";
     for (technique, more, limit) in [
         ("hamburger", "", 0.070),
+        ("hamburger-6", "", 0.070),
         ("hausdorff", "", 0.072),
         ("vsm", "", 0.092),
         ("pcf", slack, 0.053),
@@ -447,15 +448,20 @@ fn darker(picture: &Arriving, truth: &Arriving) -> f32 {
 /// pane, up to four times. What that makes is measured (0.0099).
 #[test]
 fn blended_moments_are_nowhere_darker_than_all_surfaces_filtered() {
-    for technique in ["hamburger", "hausdorff", "vsm"] {
-        for range in ["symmetric", "unit"] {
+    for (technique, ranges) in [
+        ("hamburger", &["symmetric", "unit"][..]),
+        ("hausdorff", &["symmetric", "unit"]),
+        ("vsm", &["symmetric", "unit"]),
+        ("hamburger-6", &["symmetric"]),
+    ] {
+        for range in ranges {
             let (scene, mesh) = scene(&format!(
                 "technique = '{technique}'\nformat = 'rgba16unorm'\ndepth_range = '{range}'\nleak_cut = 0.0"
             ));
             let truth = filtered(&scene, &mesh, &mut |_| ());
             let by = darker(&light(&scene, &mesh), &truth);
             println!("{technique}, {range}: darker by {by}");
-            let is_delicate = technique == "hausdorff" && range == "unit";
+            let is_delicate = technique == "hausdorff" && *range == "unit";
             let allowed = if is_delicate {
                 0.012
             } else {
@@ -548,20 +554,35 @@ fn what_is_left_out_is_said() {
     );
     // Two draws into the map; depth, tint and what is seen through it.
     assert_eq!(passes(&of_glass, &glass), passes(&of_glass, &opaque) + 5);
-    for (technique, shows) in [("pcf", true), ("esm", false), ("pcf-gaussian", false)] {
+    for (technique, shows) in [
+        ("pcf", true),
+        ("hamburger-6", true),
+        ("esm", false),
+        ("convolution", false),
+        ("moments-8", false),
+        ("pcf-gaussian", false),
+    ] {
         let (scene, mesh) = scene(&format!("technique = '{technique}'"));
         let is_blind = omitted(&scene, &mesh)
             .iter()
             .any(|(what, _)| what == TRANSLUCENT);
         assert_eq!(is_blind, !shows, "{technique}");
     }
-    let (of_floats, _) = scene("technique = 'hamburger'\nformat = 'rgba32float'");
-    let why = omitted(&of_floats, &glass);
-    assert!(
-        why.iter()
-            .any(|(what, why)| what == TRANSLUCENT && why.contains("32-bit")),
-        "{why:?}"
-    );
+    for (technique, format, part) in [
+        ("hamburger", "rgba32float", "32-bit"),
+        ("hamburger-6", "rgba32float", "32-bit"),
+        ("hamburger-6", "r32uint", "words"),
+        ("hamburger-6", "rg32uint", "words"),
+    ] {
+        let (scene, _) = scene(&format!("technique = '{technique}'\nformat = '{format}'"));
+        let omitted = omitted(&scene, &glass);
+        assert!(
+            omitted
+                .iter()
+                .any(|(what, why)| what == TRANSLUCENT && why.contains(part)),
+            "{omitted:?}"
+        );
+    }
 }
 
 #[test]

@@ -9,7 +9,10 @@ use hankel_shadows::shade::encoding;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, blur, gaussian, light_depth, resolve, shade, shade_filtered};
+use crate::passes::{
+    CANNOT_BLEND_FLOATS, Given, TRANSLUCENT, blended_halves, blur, gaussian, opaque_depth, resolve,
+    shade, shade_filtered,
+};
 use crate::scene::DepthRange;
 
 pub const TECHNIQUE: Technique = Technique {
@@ -94,9 +97,27 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         None if encoding == encoding::PLAIN => ("resolve_plain_6", 2, SYMMETRIC_6_32),
         None => ("resolve_symmetric_6", 2, SYMMETRIC_6_16),
     };
-    let depth = light_depth(graph, given)?;
+    let depth = opaque_depth(graph, given)?;
     let size = [given.shadow.size, given.shadow.size, 1];
-    let pass = resolve(graph, given, kernel).arg("depth", depth);
+    let pass = match &given.translucent {
+        Some(translucent) if encoding == encoding::SYMMETRIC => {
+            let blend = "translucent_moments_6";
+            let [first, second] = blended_halves(graph, given, translucent, depth, blend, &[])?;
+            resolve(graph, given, "resolve_translucent_6")
+                .arg("depth", depth)
+                .arg("first", first)
+                .arg("second", second)
+        }
+        Some(_) => {
+            let why = match words {
+                Some(_) => "no device blends words: a map in `rgba16unorm` shows it",
+                None => CANNOT_BLEND_FLOATS,
+            };
+            graph.omit(TRANSLUCENT, why);
+            resolve(graph, given, kernel).arg("depth", depth)
+        }
+        None => resolve(graph, given, kernel).arg("depth", depth),
+    };
     let maps = (0..textures)
         .fold(pass, |pass, _| pass.texels(size))
         .finish()?

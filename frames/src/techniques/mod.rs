@@ -1,11 +1,13 @@
 //! The techniques: each one a file that adds its passes to a graph, and a line in [`ALL`]. Nothing
 //! else knows their names.
 
+mod convolution;
 mod esm;
 mod evsm;
 mod hamburger;
 mod hamburger_6;
 mod hausdorff;
+mod moments;
 mod pcf;
 mod pcf_gaussian;
 mod pcss;
@@ -62,15 +64,21 @@ pub struct Map {
 }
 
 /// All of them.
-pub const ALL: [&Technique; 16] = [
+pub const ALL: [&Technique; 22] = [
     &hamburger::TECHNIQUE,
     &hausdorff::TECHNIQUE,
     &hamburger_6::TECHNIQUE,
+    &moments::FOUR,
+    &moments::SIX,
+    &moments::EIGHT,
+    &moments::TEN,
     &trigonometric::TECHNIQUE,
     &vsm::TECHNIQUE,
     &esm::TECHNIQUE,
     &evsm::POSITIVE,
     &evsm::BOTH,
+    &convolution::FOUR,
+    &convolution::EIGHT,
     &pcf::TECHNIQUE,
     &pcf_gaussian::TECHNIQUE,
     &pcss::TECHNIQUE,

@@ -22,6 +22,8 @@
 //! - \[PCSS\] R. Fernando: *Percentage-Closer Soft Shadows* (2005).
 //! - \[ESM\] T. Annen, T. Mertens, H.-P. Seidel, E. Flerackers, J. Kautz: *Exponential Shadow Maps*
 //!   (2008).
+//! - \[CSM\] T. Annen, T. Mertens, P. Bekaert, H.-P. Seidel, J. Kautz: *Convolution Shadow Maps*
+//!   (2007).
 //! - \[PSS\] O. Klehm, H.-P. Seidel, E. Eisemann: *Prefiltered Single Scattering* (2014).
 //! - \[LVSM\] A. Lauritzen, M. McCool: *Layered Variance Shadow Maps* (2008).
 #![no_std]
@@ -31,6 +33,7 @@ mod blockers;
 mod bound;
 mod degenerate;
 mod exponential;
+mod fourier;
 mod hamburger;
 mod hausdorff;
 mod leak;
@@ -52,6 +55,7 @@ pub use bound::{
 };
 pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
 pub use exponential::{markov_1, warped_2};
+pub use fourier::{OddHarmonics, fourier_light};
 pub use hamburger::{blockers_4, hamburger_4, hamburger_4_bounds};
 pub use hausdorff::{hausdorff_4, hausdorff_4_symmetric};
 pub use leak::cut_leak;

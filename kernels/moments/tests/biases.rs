@@ -4,12 +4,12 @@ mod validity;
 
 use hankel_moments::bias::{
     Basis, Bias, CLAMPED_4_16, CLAMPED_6_10, PUBLISHED, SYMMETRIC_4_16, SYMMETRIC_4_16_LECTURE,
-    SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32, SYMMETRIC_8_32, UNIT_4_16,
+    SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32, SYMMETRIC_8_32, SYMMETRIC_10_32, UNIT_4_16,
 };
 use hankel_moments::{
-    Moments4, Moments6, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4,
-    dequantize_unit_6, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
-    quantize_unit_6,
+    Moments4, Moments6, bias_target, dequantize_symmetric_4, dequantize_symmetric_6,
+    dequantize_unit_4, dequantize_unit_6, quantize_symmetric_4, quantize_symmetric_6,
+    quantize_unit_4, quantize_unit_6,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng};
@@ -52,6 +52,15 @@ fn the_table_is_in_order() {
         let twins = PUBLISHED.iter().filter(|(n, b)| *n == name || *b == bias);
         assert_eq!(twins.count(), 1, "{name}");
     }
+}
+
+/// The bounds for any number of moments have the targets of the biases for 32-bit floats.
+#[test]
+fn the_bounds_mix_in_the_same_targets() {
+    assert_eq!(bias_target::<f64, 2>(), SYMMETRIC_4_32.target);
+    assert_eq!(bias_target::<f64, 3>(), SYMMETRIC_6_32.target);
+    assert_eq!(bias_target::<f64, 4>(), SYMMETRIC_8_32.target);
+    assert_eq!(bias_target::<f64, 5>(), SYMMETRIC_10_32.target);
 }
 
 /// Fewer bits and more moments need a stronger bias.

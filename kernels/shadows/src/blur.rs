@@ -70,6 +70,31 @@ pub fn blur(
     filtered(at, direction, weights, source, |texel| texel)
 }
 
+/// The same of four channels of 8 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba8unorm),
+    inputs = crate::inputs::maps::blurred,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        non_finite,
+        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn blur_rgba8unorm(
+    #[index] at: UVec2,
+    #[uniform] direction: &Direction,
+    #[storage]
+    #[length(1..=7)]
+    #[range(0.0..=0.15)]
+    weights: Buffer<'_, f32>,
+    #[texture] source: Texture2d<'_>,
+) -> Vec4 {
+    filtered(at, direction, weights, source, |texel| texel)
+}
+
 /// The same of four 16-bit floats.
 #[kernel(
     compute,

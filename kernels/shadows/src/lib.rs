@@ -8,18 +8,21 @@
 //! | to six | [`resolve_symmetric_6`](six::resolve_symmetric_6), [`resolve_plain_6`](six::resolve_plain_6) |
 //! | to six in words | [`resolve_packed_10`](packed::resolve_packed_10), [`resolve_packed_16`](packed::resolve_packed_16) |
 //! | to trigonometric ones | [`resolve_trigonometric_unorm`](trigonometric::resolve_trigonometric_unorm), [`resolve_trigonometric_plain`](trigonometric::resolve_trigonometric_plain) |
+//! | to eight and ten | [`resolve_plain_8`](moment_maps::resolve_plain_8), [`resolve_plain_10`](moment_maps::resolve_plain_10) |
+//! | to terms of Fourier series | [`resolve_convolution_rgba8unorm`](convolution::resolve_convolution_rgba8unorm), [`resolve_convolution_rgba16unorm`](convolution::resolve_convolution_rgba16unorm), [`resolve_convolution_8_rgba8unorm`](convolution::resolve_convolution_8_rgba8unorm), [`resolve_convolution_8_rgba16unorm`](convolution::resolve_convolution_8_rgba16unorm) |
 //! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm) |
 //! | translucent casters, blended | [`translucent`](translucent::translucent), [`translucent_moments`](translucent::translucent_moments) twice, [`resolve_translucent`](translucent::resolve_translucent) |
+//! | and six moments of them | [`translucent_moments_6`](translucent::translucent_moments_6) twice, [`resolve_translucent_6`](translucent::resolve_translucent_6) |
 //! | or hashed | [`stochastic_depths`](translucent::stochastic_depths) |
 //! | and what is seen through them | [`tint`](translucent::tint), [`tinted`](translucent::tinted) |
-//! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float), [`blur_packed_10`](packed::blur_packed_10), [`blur_packed_16`](packed::blur_packed_16) |
-//! | mip levels | [`halve`](mips::halve), [`halve_rgba16float`](mips::halve_rgba16float), [`halve_r32float`](mips::halve_r32float) |
+//! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba8unorm`](blur::blur_rgba8unorm), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float), [`blur_packed_10`](packed::blur_packed_10), [`blur_packed_16`](packed::blur_packed_16) |
+//! | mip levels | [`halve`](mips::halve), [`halve_rgba8unorm`](mips::halve_rgba8unorm), [`halve_rgba16float`](mips::halve_rgba16float), [`halve_r32float`](mips::halve_r32float) |
 //! | summed-area table of moments | [`resolve_summed`](soft::resolve_summed), [`prefix_sums`](soft::prefix_sums) twice |
 //! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) twice |
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface), [`surface_with_plane`](mips::surface_with_plane) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
-//! | with mip levels | [`shade_hamburger_mips`](mips::shade_hamburger_mips), [`shade_hausdorff_mips`](mips::shade_hausdorff_mips), [`shade_variance_mips`](mips::shade_variance_mips), [`shade_hamburger_6_mips`](mips::shade_hamburger_6_mips), [`shade_trigonometric_mips`](mips::shade_trigonometric_mips), [`shade_esm_mips`](mips::shade_esm_mips), [`shade_evsm_mips`](mips::shade_evsm_mips) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
+//! | with mip levels | [`shade_hamburger_mips`](mips::shade_hamburger_mips), [`shade_hausdorff_mips`](mips::shade_hausdorff_mips), [`shade_variance_mips`](mips::shade_variance_mips), [`shade_hamburger_6_mips`](mips::shade_hamburger_6_mips), [`shade_trigonometric_mips`](mips::shade_trigonometric_mips), [`shade_esm_mips`](mips::shade_esm_mips), [`shade_evsm_mips`](mips::shade_evsm_mips), [`shade_convolution_mips`](convolution::shade_convolution_mips), [`shade_convolution_8_mips`](convolution::shade_convolution_8_mips), [`shade_moments_4_mips`](moment_maps::shade_moments_4_mips), [`shade_moments_6_mips`](moment_maps::shade_moments_6_mips), [`shade_moments_8_mips`](moment_maps::shade_moments_8_mips), [`shade_moments_10_mips`](moment_maps::shade_moments_10_mips) |
 //! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
@@ -30,6 +33,7 @@ extern crate std;
 
 pub mod blur;
 pub mod bounds;
+pub mod convolution;
 pub mod depth;
 pub mod exponential;
 mod grid;
@@ -38,6 +42,7 @@ pub mod inputs;
 pub mod library;
 pub mod mips;
 pub mod moment_bounds;
+pub mod moment_maps;
 pub mod packed;
 pub mod points;
 pub mod quantize;
@@ -59,9 +64,16 @@ hankel_dsl::kernels![
     six::resolve_plain_6,
     trigonometric::resolve_trigonometric_unorm,
     trigonometric::resolve_trigonometric_plain,
+    moment_maps::resolve_plain_8,
+    moment_maps::resolve_plain_10,
+    convolution::resolve_convolution_rgba8unorm,
+    convolution::resolve_convolution_rgba16unorm,
+    convolution::resolve_convolution_8_rgba8unorm,
+    convolution::resolve_convolution_8_rgba16unorm,
     exponential::resolve_esm,
     exponential::resolve_evsm,
     blur::blur,
+    blur::blur_rgba8unorm,
     blur::blur_rgba16float,
     blur::blur_r32float,
     packed::resolve_packed_10,
@@ -69,6 +81,7 @@ hankel_dsl::kernels![
     packed::blur_packed_10,
     packed::blur_packed_16,
     mips::halve,
+    mips::halve_rgba8unorm,
     mips::halve_rgba16float,
     mips::halve_r32float,
     shade::surface,
@@ -83,6 +96,12 @@ hankel_dsl::kernels![
     trigonometric::shade_trigonometric,
     exponential::shade_esm,
     exponential::shade_evsm,
+    convolution::shade_convolution,
+    convolution::shade_convolution_8,
+    moment_maps::shade_moments_4,
+    moment_maps::shade_moments_6,
+    moment_maps::shade_moments_8,
+    moment_maps::shade_moments_10,
     packed::shade_packed_10,
     packed::shade_packed_16,
     mips::shade_hamburger_mips,
@@ -92,6 +111,12 @@ hankel_dsl::kernels![
     mips::shade_trigonometric_mips,
     mips::shade_esm_mips,
     mips::shade_evsm_mips,
+    convolution::shade_convolution_mips,
+    convolution::shade_convolution_8_mips,
+    moment_maps::shade_moments_4_mips,
+    moment_maps::shade_moments_6_mips,
+    moment_maps::shade_moments_8_mips,
+    moment_maps::shade_moments_10_mips,
     soft::resolve_summed,
     soft::resolve_summed_6,
     soft::prefix_sums,
@@ -109,6 +134,8 @@ hankel_dsl::kernels![
     translucent::translucent,
     translucent::translucent_moments,
     translucent::resolve_translucent,
+    translucent::translucent_moments_6,
+    translucent::resolve_translucent_6,
     translucent::stochastic_depths,
     translucent::shade_stochastic,
     translucent::tint,

@@ -88,6 +88,23 @@ pub fn halve(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec4 {
     halved(at, source)
 }
 
+/// The same of four channels of 8 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba8unorm),
+    inputs = crate::inputs::mips::halved,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        non_finite,
+        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn halve_rgba8unorm(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec4 {
+    halved(at, source)
+}
+
 /// The same of four 16-bit floats.
 #[kernel(
     compute,
@@ -156,7 +173,7 @@ pub fn surface_with_plane(
 
 /// What a pixel sees of a map: an ellipse, as places along its longer axis.
 #[derive(Clone, Copy)]
-struct Footprint {
+pub(crate) struct Footprint {
     /// Its longer axis over its shorter one, 1 or more.
     length: f32,
     /// From a place to the next, in coordinates of the map.
@@ -256,7 +273,7 @@ impl Footprint {
     /// large as the footprint is wide; those that stick out count in part, so that nothing jumps where there is
     /// one more.
     #[inline(always)]
-    fn mean(self, uv: Vec2, sample: impl Fn(Vec2, f32) -> Vec4) -> Vec4 {
+    pub(crate) fn mean(self, uv: Vec2, sample: impl Fn(Vec2, f32) -> Vec4) -> Vec4 {
         let reach = 0.5 * (self.length + 1.0);
         let mut sum = sample(uv, self.level);
         let mut i = 1;
@@ -272,17 +289,18 @@ impl Footprint {
 
 /// What all pixels share.
 #[derive(Clone, Copy)]
-struct View<'a> {
-    light: &'a Light,
-    camera: &'a Transform,
-    raster: &'a Raster,
-    size: UVec2,
+pub(crate) struct View<'a> {
+    pub(crate) light: &'a Light,
+    pub(crate) camera: &'a Transform,
+    pub(crate) raster: &'a Raster,
+    /// Texels of the map.
+    pub(crate) size: UVec2,
 }
 
 impl View<'_> {
     /// Lambert's law with what `shadow` gives for a pixel's footprint, its coordinates in the map and its depth.
     #[inline(always)]
-    fn light_up(
+    pub(crate) fn light_up(
         self,
         world: Vec3,
         normal: Vec3,

@@ -16,7 +16,15 @@ pub(crate) fn mean<T: AddAssign + Div<f32, Output = T>>(
     samples: u32,
     moments: impl Fn(f32) -> T,
 ) -> T {
-    let sample = |i: u32| moments(Real::saturate(depth.load(at, i).x));
+    mean_of(samples, |i| moments(Real::saturate(depth.load(at, i).x)))
+}
+
+/// The mean over a texel's samples.
+#[inline(always)]
+pub(crate) fn mean_of<T: AddAssign + Div<f32, Output = T>>(
+    samples: u32,
+    sample: impl Fn(u32) -> T,
+) -> T {
     let mut sum = sample(0);
     let mut i = 1;
     while i < samples {

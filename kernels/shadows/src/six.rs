@@ -233,9 +233,9 @@ pub(crate) fn hamburger_6_shadow(
     hamburger_6(m.lerp(*target, light.moment_bias), 2.0 * z - 1.0).lower
 }
 
-/// A depth's quantised moments.
+/// Quantised moments of a depth in [0, 1]: the odd ones, and the even ones.
 #[inline(always)]
-fn halves(z: f32) -> [Vec4; 2] {
+pub(crate) fn halves(z: f32) -> [Vec4; 2] {
     let q = quantize_symmetric_6(symmetric(z));
     [
         Vec4::new(q.r0, q.g0, q.b0, 0.0),

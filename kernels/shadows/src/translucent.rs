@@ -7,14 +7,17 @@
 //! 2016; lecture, "Translucent occluders").
 //!
 //! Four moments and an opacity are five channels. [`translucent_moments`] draws them in two halves, each with the
-//! opacity as its alpha; [`resolve_translucent`] puts them before the opaque surfaces, sample by sample.
+//! opacity as its alpha; [`resolve_translucent`] puts them before the opaque surfaces, sample by sample. Six moments
+//! are two halves of three channels: [`translucent_moments_6`], [`resolve_translucent_6`].
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
 use hankel_moments::{Moments4, Quantized4, quantize_symmetric_4, quantize_unit_4};
 
 use crate::depth::Transform;
+use crate::resolve::mean_of;
 use crate::shade::{Light, encoding, percentage, shade_by};
+use crate::six::halves;
 
 /// A vertex of a translucent surface: position; colour with opacity; position in clip space once more.
 #[kernel(
@@ -121,13 +124,78 @@ pub fn resolve_translucent(
             back.y + passes * q.a,
         )
     };
-    let mut sum = sample(0);
-    let mut i = 1;
-    while i < samples {
-        sum += sample(i);
-        i += 1;
-    }
-    sum / samples as f32
+    mean_of(samples, sample)
+}
+
+/// Half of a translucent fragment's six moments in the optimised basis, depths moved to [-1, 1], for alpha blending
+/// into zeros: the odd ones with `part` 0, the even ones with 1. Alpha is the opacity.
+#[kernel(
+    fragment,
+    inputs = crate::inputs::translucent::places,
+    parity(
+        ulp = 0,
+        absolute = 4e-6,
+        why = "sums of products: drivers may contract them, and so leave out the rounding of up to three products of at most 24, which is 9.5e-7 each"
+    )
+)]
+pub fn translucent_moments_6(
+    #[varying]
+    #[range(0.0..=1.0)]
+    surface: Vec4,
+    #[varying] place: Vec4,
+    #[constant(id = 0, default = 0)]
+    #[values(0, 1)]
+    part: u32,
+) -> Vec4 {
+    let [odd, even] = halves(Real::saturate(divided(place).z));
+    let half = if part == 0 { odd } else { even };
+    Vec4::new(half.x, half.y, half.z, Real::saturate(surface.w))
+}
+
+/// Means of a texel's six moments: in each sample, what [`translucent_moments_6`] has blended, before the moments of
+/// the depth of the opaque surface.
+#[kernel(
+    compute,
+    threads(8, 8),
+    outputs(rgba16unorm, rgba16unorm),
+    inputs = crate::inputs::translucent::blended_6,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn resolve_translucent_6(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+    #[texture] first: Texture2dMultisampled<'_>,
+    #[texture] second: Texture2dMultisampled<'_>,
+) -> (Vec4, Vec4) {
+    (
+        mean_of(samples, |i| {
+            let opaque = halves(Real::saturate(depth.load(at, i).x));
+            before(first.load(at, i), opaque[0])
+        }),
+        mean_of(samples, |i| {
+            let opaque = halves(Real::saturate(depth.load(at, i).x));
+            before(second.load(at, i), opaque[1])
+        }),
+    )
+}
+
+/// What is blended, before an opaque surface's moments; of three channels.
+#[inline(always)]
+fn before(blended: Vec4, opaque: Vec4) -> Vec4 {
+    let passes = 1.0 - blended.w;
+    Vec4::new(
+        blended.x + passes * opaque.x,
+        blended.y + passes * opaque.y,
+        blended.z + passes * opaque.z,
+        0.0,
+    )
 }
 
 /// What a fragment lets through of what is seen behind it, for multiplicative blending: each channel loses

@@ -79,7 +79,7 @@ const SIXTEEN: Storage = Storage::Normalised(16);
 const TEN: Storage = Storage::Normalised(10);
 
 /// All that are measured.
-pub const FORMATS: [Format; 18] = [
+pub const FORMATS: [Format; 19] = [
     of(Basis::Unit, 4, FLOAT),
     of(Basis::Unit, 4, SIXTEEN),
     of(Basis::Unit, 4, TEN),
@@ -98,6 +98,7 @@ pub const FORMATS: [Format; 18] = [
     of(Basis::Trigonometric, 4, FLOAT),
     of(Basis::Trigonometric, 4, SIXTEEN),
     of(Basis::Trigonometric, 4, TEN),
+    of(Basis::Symmetric, 10, FLOAT),
 ];
 
 impl fmt::Display for Format {
@@ -154,7 +155,8 @@ impl Format {
             (Basis::Unit, _, _) => bias::CLAMPED_6_10,
             (Basis::Symmetric, 4, _) => bias::SYMMETRIC_4_16,
             (Basis::Symmetric, 6, _) => bias::SYMMETRIC_6_16,
-            (Basis::Symmetric, _, _) => bias::SYMMETRIC_8_16,
+            (Basis::Symmetric, 8, _) => bias::SYMMETRIC_8_16,
+            (Basis::Symmetric, _, _) => bias::SYMMETRIC_10_32,
             (Basis::Trigonometric, _, _) => bias::TRIGONOMETRIC_2_16,
         };
         self.published_bias().unwrap_or(fallback).target
@@ -405,7 +407,8 @@ impl Format {
             (Criterion::Robust, _) => beyond(match self.count {
                 4 => bound::<f32, 2>(m, query),
                 6 => bound::<f32, 3>(m, query),
-                _ => bound::<f32, 4>(m, query),
+                8 => bound::<f32, 4>(m, query),
+                _ => bound::<f32, 5>(m, query),
             }),
             (Criterion::Listing, _) => beyond(listed(&m, query)),
         }

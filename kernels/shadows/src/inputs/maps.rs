@@ -10,14 +10,15 @@ use hankel_dsl::native::inputs::{Given, Request, Source, Value};
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_moments::bias::{
     Bias, CLAMPED_4_16, MEASURED, SYMMETRIC_4_16, SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32,
-    TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32,
+    SYMMETRIC_8_32, SYMMETRIC_10_32, TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32,
 };
 use hankel_moments::{
-    Moments4, Moments6, TrigonometricMoments, from_unorm, pack_10, pack_16, quantize_symmetric_4,
-    quantize_symmetric_6, quantize_unit_4, to_unorm,
+    Moments4, Moments6, OddHarmonics, TrigonometricMoments, from_unorm, pack_10, pack_16,
+    quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, to_unorm,
 };
 
 use crate::blur::Direction;
+use crate::convolution::Series;
 use crate::exponential::Exponents;
 use crate::shade::{Light, encoding};
 use crate::trigonometric;
@@ -345,6 +346,124 @@ pub fn shaded_trigonometric(request: &Request) -> Vec<Given> {
         }
     });
     with_bias(request, &bias, &[("map", texels.collect())])
+}
+
+/// The textures of maps of 4, 6, 8 and 10 moments as they are, and the moment of each channel.
+pub(super) fn many(count: usize) -> &'static [(&'static str, [usize; 4])] {
+    match count {
+        4 => &[("map", [1, 2, 3, 4])],
+        10 => &[
+            ("first", [1, 3, 5, 7]),
+            ("second", [2, 4, 6, 8]),
+            ("third", [9, 10, 11, 11]),
+        ],
+        _ => &[("first", [1, 3, 5, 7]), ("second", [2, 4, 6, 8])],
+    }
+}
+
+/// Moments 0 to `count` of a depth from 0 to 1, moved to [-1, 1]; those beyond are 0.
+pub(super) fn powers(count: usize, z: f64) -> [f64; 12] {
+    core::array::from_fn(|k| {
+        if k <= count {
+            (2.0 * z - 1.0).powi(k as i32)
+        } else {
+            0.0
+        }
+    })
+}
+
+/// The bias of maps of 4, 6, 8 or 10 moments in floats.
+pub(super) fn float_bias(count: usize) -> Bias {
+    match count {
+        4 => SYMMETRIC_4_32,
+        6 => SYMMETRIC_6_32,
+        8 => SYMMETRIC_8_32,
+        _ => SYMMETRIC_10_32,
+    }
+}
+
+fn shaded_moments(request: &Request, count: usize) -> Vec<Given> {
+    let map = filtered(|z| powers(count, z));
+    let maps: Vec<_> = many(count)
+        .iter()
+        .map(|(name, channels)| {
+            let texel = |m: &[f64; 12]| Vec4::from_array(channels.map(|k| m[k] as f32));
+            (*name, map.iter().map(texel).collect())
+        })
+        .collect();
+    with_bias(request, &float_bias(count), &maps)
+}
+
+/// What shading with a map of four moments in floats reads.
+#[must_use]
+pub fn moments_4(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 4)
+}
+
+/// What shading with maps of six moments in floats reads.
+#[must_use]
+pub fn moments_6(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 6)
+}
+
+/// What shading with maps of eight moments in floats reads.
+#[must_use]
+pub fn moments_8(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 8)
+}
+
+/// What shading with maps of ten moments in floats reads.
+#[must_use]
+pub fn moments_10(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 10)
+}
+
+/// The textures of convolution shadow maps of eight terms; of four, the first two.
+pub(super) const TERMS: [&str; 4] = ["cosines", "sines", "high_cosines", "high_sines"];
+
+/// Cosines and sines of eight terms of a depth from 0 to 1, each from 0 to 1, texture by texture.
+pub(super) fn terms(z: f64) -> [f64; 16] {
+    let [low, high] = OddHarmonics::of_depth(z);
+    let all = [low.cos, low.sin, high.cos, high.sin];
+    core::array::from_fn(|i| 0.5 * all[i / 4][i % 4] + 0.5)
+}
+
+/// The weights of `count` terms, attenuated as much as convolution shadow maps are.
+pub(super) fn series(count: usize) -> Series {
+    let weight = |k: usize| {
+        let attenuation = f64::exp(-(k as f64 / count as f64).powi(2));
+        (2.0 * attenuation / ((2 * k - 1) as f64 * core::f64::consts::PI)) as f32
+    };
+    let four = |first: usize| Vec4::from_array(core::array::from_fn(|k| weight(first + k)));
+    Series {
+        low: four(1),
+        high: four(5),
+    }
+}
+
+fn convolution(request: &Request, count: usize) -> Vec<Given> {
+    let map = filtered(terms);
+    let texture = |i: usize| {
+        let texel = |m: &[f64; 16]| unorm(core::array::from_fn(|k| m[4 * i + k]));
+        map.iter().map(texel).collect()
+    };
+    let maps: Vec<_> = (0..count / 2).map(|i| (TERMS[i], texture(i))).collect();
+    with_bias(request, &SYMMETRIC_4_32, &maps)
+        .into_iter()
+        .map(|given| given.uniform("series", &series(count)))
+        .collect()
+}
+
+/// What shading with a convolution shadow map of four terms reads.
+#[must_use]
+pub fn shaded_convolution(request: &Request) -> Vec<Given> {
+    convolution(request, 4)
+}
+
+/// What shading with a convolution shadow map of eight terms reads.
+#[must_use]
+pub fn shaded_convolution_8(request: &Request) -> Vec<Given> {
+    convolution(request, 8)
 }
 
 /// The warps of a depth for exponential variance shadow maps, and their squares.

@@ -210,6 +210,66 @@ pub fn shaded_6(request: &Request) -> Vec<Given> {
     given.map(|g| g.uniform("target", &bias.six())).collect()
 }
 
+fn shaded_moments(request: &Request, count: usize) -> Vec<Given> {
+    let bias = maps::float_bias(count);
+    let many = maps::many(count);
+    let textures: Vec<_> = many
+        .iter()
+        .map(|(name, _)| (*name, TexelFormat::Rgba32Float))
+        .collect();
+    let store = |i: usize, m: [f64; 12]| plain(many[i].1.map(|k| m[k]));
+    let of = |z| maps::powers(count, z);
+    with_levels(request, &bias, bias.strength as f32, of, &textures, store)
+}
+
+/// What shading with a map of four moments in floats reads.
+#[must_use]
+pub fn moments_4(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 4)
+}
+
+/// What shading with maps of six moments in floats reads.
+#[must_use]
+pub fn moments_6(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 6)
+}
+
+/// What shading with maps of eight moments in floats reads.
+#[must_use]
+pub fn moments_8(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 8)
+}
+
+/// What shading with maps of ten moments in floats reads.
+#[must_use]
+pub fn moments_10(request: &Request) -> Vec<Given> {
+    shaded_moments(request, 10)
+}
+
+fn convolution(request: &Request, count: usize) -> Vec<Given> {
+    let textures: Vec<_> = maps::TERMS[..count / 2]
+        .iter()
+        .map(|name| (*name, TexelFormat::Rgba32Float))
+        .collect();
+    let store = |i: usize, m: [f64; 16]| stored(false, core::array::from_fn(|k| m[4 * i + k]));
+    with_levels(request, &SYMMETRIC_4_32, 0.0, maps::terms, &textures, store)
+        .into_iter()
+        .map(|given| given.uniform("series", &maps::series(count)))
+        .collect()
+}
+
+/// What shading with a convolution shadow map of four terms reads.
+#[must_use]
+pub fn shaded_convolution(request: &Request) -> Vec<Given> {
+    convolution(request, 4)
+}
+
+/// What shading with a convolution shadow map of eight terms reads.
+#[must_use]
+pub fn shaded_convolution_8(request: &Request) -> Vec<Given> {
+    convolution(request, 8)
+}
+
 /// What shading with a map of trigonometric moments reads, for the map's `encoding`.
 #[must_use]
 pub fn shaded_trigonometric(request: &Request) -> Vec<Given> {

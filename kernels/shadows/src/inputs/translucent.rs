@@ -5,7 +5,9 @@ use std::vec::Vec;
 use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
-use hankel_moments::{Moments4, quantize_symmetric_4, quantize_unit_4};
+use hankel_moments::{
+    Moments4, Moments6, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
+};
 
 use super::maps::{self, SAMPLES, SIZE};
 use crate::shade::encoding;
@@ -39,15 +41,40 @@ pub fn blended(request: &Request) -> Vec<Given> {
             quantize_symmetric_4(Moments4::of_depth(2.0 * z - 1.0))
         }
     };
+    halves(request, |second, z| {
+        let q = of(z);
+        if second {
+            [q.b, q.a, 0.0]
+        } else {
+            [q.r, q.g, 0.0]
+        }
+    })
+}
+
+/// The same with six moments.
+#[must_use]
+pub fn blended_6(request: &Request) -> Vec<Given> {
+    halves(request, |second, z| {
+        let q = quantize_symmetric_6(Moments6::of_depth(2.0 * z - 1.0));
+        if second {
+            [q.r1, q.g1, q.b1]
+        } else {
+            [q.r0, q.g0, q.b0]
+        }
+    })
+}
+
+/// Depths of opaque surfaces, and both halves of what `of` gives for a depth, blended before them.
+fn halves(request: &Request, of: impl Fn(bool, f64) -> [f64; 3]) -> Vec<Given> {
     let half = |second: bool| {
+        let of = &of;
         panes().map(move |panes| {
-            let sum = panes.fold([0.0; 3], |sum: [f64; 3], [depth, opacity, _]| {
-                let q = of(depth);
-                let pair = if second { [q.b, q.a] } else { [q.r, q.g] };
-                let source = [pair[0], pair[1], 1.0];
+            let sum = panes.fold([0.0; 4], |sum: [f64; 4], [depth, opacity, _]| {
+                let [x, y, z] = of(second, depth);
+                let source = [x, y, z, 1.0];
                 std::array::from_fn(|i| opacity * source[i] + (1.0 - opacity) * sum[i])
             });
-            Vec4::new(sum[0] as f32, sum[1] as f32, 0.0, sum[2] as f32)
+            Vec4::from_array(sum.map(|x| x as f32))
         })
     };
     maps::depths(request)

@@ -1,0 +1,75 @@
+//! The least shadow that four, six, eight or ten moments of a texel in 32-bit floats allow, by the bound for any
+//! number of moments, with depths anywhere on the line.
+
+use hankel_dsl::native::describe::TexelFormat;
+use hankel_moments::bias::{Bias, SYMMETRIC_4_32, SYMMETRIC_6_32, SYMMETRIC_8_32, SYMMETRIC_10_32};
+
+use super::{Map, Technique};
+use crate::graph::{Graph, Handle, Result};
+use crate::passes::{Given, filtered_maps, shade_filtered};
+use crate::scene::DepthRange;
+
+pub const FOUR: Technique = Technique {
+    name: "moments-4",
+    summary: "four moments, by the bound for any number",
+    // The moment bias spreads a single surface a little, which keeps it from shading itself.
+    depth_bias: 0.0,
+    maps: &[map(SYMMETRIC_4_32)],
+    is_lower_bound: true,
+    is_soft: false,
+    add: |graph, given| add(graph, given, ["resolve_plain", "shade_moments_4"], &["map"]),
+};
+
+pub const SIX: Technique = Technique {
+    name: "moments-6",
+    summary: "six moments, by the bound for any number",
+    maps: &[map(SYMMETRIC_6_32)],
+    add: |graph, given| {
+        let kernels = ["resolve_plain_6", "shade_moments_6"];
+        add(graph, given, kernels, &["first", "second"])
+    },
+    ..FOUR
+};
+
+pub const EIGHT: Technique = Technique {
+    name: "moments-8",
+    summary: "eight moments, by the bound for any number",
+    maps: &[map(SYMMETRIC_8_32)],
+    add: |graph, given| {
+        let kernels = ["resolve_plain_8", "shade_moments_8"];
+        add(graph, given, kernels, &["first", "second"])
+    },
+    ..FOUR
+};
+
+pub const TEN: Technique = Technique {
+    name: "moments-10",
+    summary: "ten moments, by the bound for any number",
+    maps: &[map(SYMMETRIC_10_32)],
+    add: |graph, given| {
+        let kernels = ["resolve_plain_10", "shade_moments_10"];
+        add(graph, given, kernels, &["first", "second", "third"])
+    },
+    ..FOUR
+};
+
+const fn map(bias: Bias) -> Map {
+    Map {
+        format: TexelFormat::Rgba32Float,
+        depth_range: DepthRange::Symmetric,
+        encoding: 0,
+        moment_bias: bias.strength as f32,
+        // The kernels have targets of their own.
+        bias_target: [0.0; 4],
+    }
+}
+
+fn add(
+    graph: &mut Graph,
+    given: &Given,
+    [make, shade]: [&'static str; 2],
+    textures: &[&'static str],
+) -> Result<Handle> {
+    let maps = filtered_maps(graph, given, make, textures)?;
+    shade_filtered(graph, given, shade, &maps, |pass| pass)
+}

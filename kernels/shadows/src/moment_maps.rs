@@ -1,0 +1,280 @@
+//! Shadow maps of four, six, eight or ten power moments in 32-bit floats, shaded by the bound for any number of
+//! moments ([`hankel_moments::bound`]; \[MSM\], Algorithm 2; \[MBD\], Algorithm 1). Moments lie in as many
+//! textures as they need: four in one; of more, odd ones in the first and even ones in the second, the ninth and
+//! the tenth in a third.
+
+#![allow(
+    clippy::too_many_arguments,
+    reason = "a kernel's parameters are its bindings"
+)]
+
+use core::ops::{AddAssign, Div};
+
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::{Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_moments::{MAX_MOMENTS, bias_target, bound, mix_bias};
+
+use crate::depth::Transform;
+use crate::mips::{Raster, View};
+use crate::resolve::mean;
+use crate::shade::{Light, shade_with};
+
+/// A texel of each texture.
+#[derive(Clone, Copy)]
+struct Texels {
+    odd: Vec4,
+    even: Vec4,
+    last: Vec4,
+}
+
+impl AddAssign for Texels {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        self.odd += other.odd;
+        self.even += other.even;
+        self.last += other.last;
+    }
+}
+
+impl Div<f32> for Texels {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, by: f32) -> Self {
+        Self {
+            odd: self.odd / by,
+            even: self.even / by,
+            last: self.last / by,
+        }
+    }
+}
+
+/// Powers of a depth in [0, 1], moved to [-1, 1].
+#[inline(always)]
+fn powers(z: f32) -> Texels {
+    let z = 2.0 * z - 1.0;
+    let z2 = z * z;
+    let z3 = z2 * z;
+    let z4 = z2 * z2;
+    let z5 = z4 * z;
+    Texels {
+        odd: Vec4::new(z, z3, z5, z4 * z3),
+        even: Vec4::new(z2, z4, z3 * z3, z4 * z4),
+        last: Vec4::new(z5 * z4, z5 * z5, 0.0, 0.0),
+    }
+}
+
+/// Means of a texel's eight moments, depths moved to [-1, 1], as they are.
+#[kernel(
+    compute,
+    threads(8, 8),
+    outputs(rgba32float, rgba32float),
+    inputs = crate::inputs::maps::depths
+)]
+pub fn resolve_plain_8(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> (Vec4, Vec4) {
+    let texels = mean(depth, at, samples, powers);
+    (texels.odd, texels.even)
+}
+
+/// Means of a texel's ten moments, depths moved to [-1, 1], as they are.
+#[kernel(
+    compute,
+    threads(8, 8),
+    outputs(rgba32float, rgba32float, rgba32float),
+    inputs = crate::inputs::maps::depths
+)]
+pub fn resolve_plain_10(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> (Vec4, Vec4, Vec4) {
+    let texels = mean(depth, at, samples, powers);
+    (texels.odd, texels.even, texels.last)
+}
+
+/// The least shadow that moments 0 to 2N allow for a receiver's depth from 0 to 1. The bias mixes in
+/// [`bias_target`].
+#[inline(always)]
+fn shadow<const N: usize>(light: &Light, m: [f32; MAX_MOMENTS], z: f32) -> f32 {
+    let m = mix_bias::<f32, N>(m, bias_target::<f32, N>(), light.moment_bias);
+    bound::<f32, N>(m, 2.0 * z - 1.0).lower
+}
+
+#[inline(always)]
+fn shadow_4(light: &Light, map: Vec4, z: f32) -> f32 {
+    let mut m = [0.0; MAX_MOMENTS];
+    m[0] = 1.0;
+    m[1] = map.x;
+    m[2] = map.y;
+    m[3] = map.z;
+    m[4] = map.w;
+    shadow::<2>(light, m, z)
+}
+
+#[inline(always)]
+fn moments(odd: Vec4, even: Vec4) -> [f32; MAX_MOMENTS] {
+    let mut m = [0.0; MAX_MOMENTS];
+    m[0] = 1.0;
+    m[1] = odd.x;
+    m[2] = even.x;
+    m[3] = odd.y;
+    m[4] = even.y;
+    m[5] = odd.z;
+    m[6] = even.z;
+    m[7] = odd.w;
+    m[8] = even.w;
+    m
+}
+
+#[inline(always)]
+fn shadow_6(light: &Light, odd: Vec4, even: Vec4, z: f32) -> f32 {
+    shadow::<3>(light, moments(odd, even), z)
+}
+
+#[inline(always)]
+fn shadow_8(light: &Light, odd: Vec4, even: Vec4, z: f32) -> f32 {
+    shadow::<4>(light, moments(odd, even), z)
+}
+
+#[inline(always)]
+fn shadow_10(light: &Light, odd: Vec4, even: Vec4, last: Vec4, z: f32) -> f32 {
+    let mut m = moments(odd, even);
+    m[9] = last.x;
+    m[10] = last.y;
+    shadow::<5>(light, m, z)
+}
+
+/// Shading for one number of moments, and the same with mip levels.
+macro_rules! shading {
+    (
+        $of:ident($first:ident $(, $map:ident)*), $inputs:ident, parity($($parity:tt)*);
+        $(#[$doc:meta])* $shade:ident,
+        $(#[$mips_doc:meta])* $mips:ident
+    ) => {
+        $(#[$doc])*
+        #[kernel(
+            fragment,
+            pinned,
+            inputs = crate::inputs::maps::$inputs,
+            parity($($parity)*)
+        )]
+        pub fn $shade(
+            #[varying] world: Vec3,
+            #[varying]
+            #[unit_vector]
+            normal: Vec3,
+            #[varying]
+            #[range(0.0..=1.0)]
+            colour: Vec3,
+            #[uniform] light: &Light,
+            #[texture] $first: Texture2d<'_>,
+            $(#[texture] $map: Texture2d<'_>,)*
+            #[sampler] sampler: Sampler,
+        ) -> Vec4 {
+            shade_with(light, world, normal, colour, |uv, z| {
+                $of(
+                    light,
+                    $first.sample_level(sampler, uv, 0.0),
+                    $($map.sample_level(sampler, uv, 0.0),)*
+                    z,
+                )
+            })
+        }
+
+        $(#[$mips_doc])*
+        #[kernel(
+            fragment,
+            pinned,
+            inputs = crate::inputs::mips::$inputs,
+            parity($($parity)*)
+        )]
+        pub fn $mips(
+            #[varying] world: Vec3,
+            #[varying]
+            #[unit_vector]
+            normal: Vec3,
+            #[varying]
+            #[range(0.0..=1.0)]
+            colour: Vec3,
+            #[varying]
+            #[unit_vector]
+            plane: Vec3,
+            #[uniform] light: &Light,
+            #[uniform] camera: &Transform,
+            #[uniform] raster: &Raster,
+            #[texture] $first: Texture2d<'_>,
+            $(#[texture] $map: Texture2d<'_>,)*
+            #[sampler] sampler: Sampler,
+        ) -> Vec4 {
+            let view = View {
+                light,
+                camera,
+                raster,
+                size: $first.size(),
+            };
+            view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+                $of(
+                    light,
+                    footprint.mean(uv, |uv, level| $first.sample_level(sampler, uv, level)),
+                    $(footprint.mean(uv, |uv, level| $map.sample_level(sampler, uv, level)),)*
+                    z,
+                )
+            })
+        }
+    };
+}
+
+shading! {
+    shadow_4(map), moments_4, parity(
+        ulp = 0,
+        absolute = 2e-3,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-7, the bound's steepest slope is 2600, and the light's strength is 2.5"
+    );
+    /// Shading with the least shadow that four moments allow.
+    shade_moments_4,
+    /// Shading with the least shadow that four moments allow, with mip levels.
+    shade_moments_4_mips
+}
+
+shading! {
+    shadow_6(first, second), moments_6, parity(
+        ulp = 0,
+        absolute = 1.7e-3,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-6, the bound's steepest slope is 2200, and the light's strength is 2.5"
+    );
+    /// Shading with the least shadow that six moments allow.
+    shade_moments_6,
+    /// Shading with the least shadow that six moments allow, with mip levels.
+    shade_moments_6_mips
+}
+
+shading! {
+    shadow_8(first, second), moments_8, parity(
+        ulp = 0,
+        absolute = 8e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-5, the bound's steepest slope is 1000, and the light's strength is 2.5"
+    );
+    /// Shading with the least shadow that eight moments allow.
+    shade_moments_8,
+    /// Shading with the least shadow that eight moments allow, with mip levels.
+    shade_moments_8_mips
+}
+
+shading! {
+    shadow_10(first, second, third), moments_10, parity(
+        ulp = 0,
+        absolute = 5e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 1.5e-4, the bound's steepest slope is 640, and the light's strength is 2.5"
+    );
+    /// Shading with the least shadow that ten moments allow.
+    shade_moments_10,
+    /// Shading with the least shadow that ten moments allow, with mip levels.
+    shade_moments_10_mips
+}
