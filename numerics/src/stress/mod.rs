@@ -14,7 +14,8 @@ mod tables;
 
 pub use backend::{Backend, BackendError, LANES, Map, Native};
 pub use reference::{
-    Agreement, Judgement, Truth, bounds_of, canonical_of, gradient_by_duals, gradient_of, judgement,
+    Agreement, Judgement, Truth, bounds_of, canonical_of, gradient_by_differences, gradient_of,
+    judgement,
 };
 
 use std::path::PathBuf;
