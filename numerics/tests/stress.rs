@@ -14,6 +14,7 @@ fn options(families: &[&str], samples: u64) -> Options {
     Options {
         families: Options::families_named(&names).unwrap(),
         samples,
+        derivative_rows: 0,
         wide_checks: 2,
         programme_checks: 1,
         ..Options::default()
@@ -98,6 +99,57 @@ fn compensated_bounds_are_as_exact_as_their_inputs() {
     assert!(beyond.is_empty(), "{}", beyond.join("\n"));
     // By family, n, format and backend.
     assert!(cells > 300, "{cells}");
+}
+
+#[test]
+fn derivatives_are_measured_by_what_rounding_does_to_them() {
+    let stress = native(&Options {
+        derivative_rows: 100,
+        ..options(&["paper", "generic-unit", "silhouettes-biased"], 100)
+    });
+    // By family, n from 1 to 3, and format.
+    assert_eq!(stress.derivatives.len(), 18);
+    for d in &stress.derivatives {
+        let over = d.over.unwrap();
+        assert_eq!((d.non_finite, d.valid), (0, 100), "{d:?}");
+        // Half of the rows have no derivative that is worse than a few roundings.
+        assert!(over.median < 4.0, "{d:?}");
+    }
+    // What digits are lost without compensation is seen.
+    assert!(stress.report("x").table("derivatives-over").is_some());
+    let greatest = |n: usize| {
+        let of_order = stress.derivatives.iter().filter(|d| d.n == n);
+        of_order
+            .filter_map(|d| d.over)
+            .map(|o| o.greatest)
+            .fold(0.0, f64::max)
+    };
+    assert!(greatest(3) > 1000.0, "{}", greatest(3));
+}
+
+#[test]
+fn derivatives_that_are_no_number_are_found() {
+    let options = Options {
+        derivative_rows: 50,
+        orders: vec![2],
+        precisions: vec![Precision::F32],
+        ..options(&["paper"], 50)
+    };
+    let mut faulty = Faulty {
+        inner: Native::scalar(),
+        fault: |kernel: &Kernel, x: &mut [f32]| {
+            if kernel.function.contains("adjoint") {
+                x[7] = f32::NAN;
+            }
+        },
+    };
+    let stress = run(&options, &mut [&mut faulty], &mut |_| ()).unwrap();
+    let [found] = &stress.derivatives[..] else {
+        panic!("one order")
+    };
+    assert_eq!(found.non_finite, 1);
+    assert_eq!(found.over.unwrap().greatest, f64::INFINITY);
+    assert!(!stress.passed());
 }
 
 #[test]
