@@ -1,7 +1,7 @@
 //! Reports as people and programs get them.
 
 use hankel_numerics::report::{
-    Axis, Cell, Column, Plot, Report, ReportError, Series, Style, Table,
+    Axis, Cell, Column, Plot, Report, ReportError, Series, Style, Table, pareto_front,
 };
 
 fn sample() -> Report {
@@ -213,4 +213,47 @@ fn a_file_stands_where_the_folder_should() {
     assert!(matches!(&error, ReportError::Output(error) if !error.is_machine()));
     assert!(error.to_string().contains("should be a folder"), "{error}");
     assert_eq!(std::fs::read(&file).unwrap(), b"x");
+}
+
+#[test]
+fn of_crafted_points() {
+    assert!(pareto_front(&[]).is_empty());
+    // A staircase with one dominated point, in no order.
+    let points = [(3.0, 1.0), (1.0, 3.0), (2.0, 2.0), (2.5, 2.5)];
+    assert_eq!(pareto_front(&points), [1, 2, 0]);
+    // Equal in one coordinate: the better in the other.
+    assert_eq!(pareto_front(&[(1.0, 2.0), (1.0, 1.0)]), [1]);
+    assert_eq!(pareto_front(&[(1.0, 1.0), (2.0, 1.0)]), [0]);
+    // Twins count once.
+    assert_eq!(pareto_front(&[(1.0, 1.0), (1.0, 1.0)]), [0]);
+}
+
+#[test]
+fn leaves_out_what_failed() {
+    let points = [
+        (1.0, f64::NAN),
+        (f64::NAN, 0.0),
+        (2.0, f64::INFINITY),
+        (3.0, 0.5),
+    ];
+    assert_eq!(pareto_front(&points), [3]);
+}
+
+/// By the definition, on pseudo-random points.
+#[test]
+fn is_what_nothing_dominates() {
+    let mut random = fastrand::Rng::with_seed(3);
+    for _ in 0..200 {
+        let points: Vec<(f64, f64)> = (0..random.usize(0..30))
+            .map(|_| (f64::from(random.u8(0..12)), f64::from(random.u8(0..12))))
+            .collect();
+        let front = pareto_front(&points);
+        for (i, p) in points.iter().enumerate() {
+            let dominated = points
+                .iter()
+                .any(|q| q.0 <= p.0 && q.1 <= p.1 && (q.0 < p.0 || q.1 < p.1));
+            let twin = points[..i].contains(p);
+            assert_eq!(front.contains(&i), !dominated && !twin, "{i} of {points:?}");
+        }
+    }
 }

@@ -2,10 +2,14 @@
 
 use std::path::Path;
 
+use hankel_dsl::{Real, lit};
 use hankel_numerics::families::{Family, Precision, Row};
 use hankel_numerics::peer::{Peer, PeerError, Quantity, default_python};
 use hankel_numerics::report::{Cell, Report};
-use hankel_numerics::speed::{Options, Solver, Speed, SpeedError, Timing, measure, serve};
+use hankel_numerics::speed::count::{Counted, Operations, operations_of, per_row};
+use hankel_numerics::speed::{
+    Options, Quantiles, Solver, Speed, SpeedError, Timing, measure, serve,
+};
 
 fn small() -> Options {
     Options {
@@ -304,4 +308,105 @@ fn a_python_without_the_package() {
         matches!(&error, PeerError::Gone(why) if why == "no such thing"),
         "{error}"
     );
+}
+
+fn horner<R: Real>(x: R) -> R {
+    let root = (x * x + lit!(1.0)).sqrt();
+    R::select(x.lt(root), -x, x.max(root) / root)
+}
+
+#[test]
+fn every_operation_is_counted_once() {
+    let counted = operations_of(|| {
+        let y = horner(Counted::input(2.0_f64));
+        assert_eq!(y.value, -2.0);
+        [y]
+    });
+    let expected = Operations {
+        sums: 1.0,
+        products: 1.0,
+        quotients: 1.0,
+        roots: 1.0,
+        comparisons: 2.0,
+        selections: 1.0,
+        others: 1.0,
+        fused: 0.0,
+    };
+    assert_eq!(counted, expected);
+    assert_eq!(counted.simple(), 6.0);
+    assert_eq!(counted.flops(), 4.0);
+}
+
+#[test]
+fn what_a_compiler_drops_is_not_counted() {
+    let counted = operations_of(|| {
+        let (x, y) = (Counted::input(3.0_f32), Counted::input(5.0_f32));
+        let one: Counted<f32> = lit!(1.0);
+        let four = (one + one) * lit!(2.0);
+        let unused = x / y;
+        assert_eq!(unused.value, 0.6);
+        // x y twice, a product with 1, a quotient by 4, a choice that is known.
+        let sum = x * y + (y * x) * one;
+        let known = Real::select(one.lt(four), sum - lit!(0.0), unused);
+        [known / four]
+    });
+    let expected = Operations {
+        sums: 1.0,
+        products: 2.0,
+        ..Operations::default()
+    };
+    assert_eq!(counted, expected);
+}
+
+#[test]
+fn inputs_are_not_constants() {
+    let counted = operations_of(|| {
+        let (x, y) = (Counted::input(1.0_f32), Counted::input(1.0_f32));
+        [x * y, x + y]
+    });
+    assert_eq!((counted.products, counted.sums), (1.0, 1.0));
+}
+
+#[test]
+fn error_terms_count_as_what_they_take() {
+    let counted = operations_of(|| {
+        let (a, b) = (Counted::input(1.0_f32), Counted::input(1e-9_f32));
+        let (sum, error) = a.two_sum(b);
+        assert_eq!((sum.value, error.value), (1.0, 1e-9));
+        let (product, rest) = a.two_product(b);
+        assert_eq!((product.value, rest.value), (1e-9, 0.0));
+        [sum, error, product, rest]
+    });
+    assert_eq!(counted.sums, 6.0);
+    assert_eq!((counted.products, counted.fused), (1.0, 1.0));
+    assert_eq!(counted.flops(), 9.0);
+}
+
+/// The bound of one order is a known handful of operations, whatever the rows are.
+#[test]
+fn kernels_are_traced_through_their_entry_points() {
+    let rows = |n| {
+        let family = Family::named("paper").unwrap();
+        (0..8).map(|i| family.row(n, 1, i)).collect::<Vec<_>>()
+    };
+    let few = per_row("moment_bound_n2", 2, &rows(2)[..1]).unwrap();
+    let more = per_row("moment_bound_n2", 2, &rows(2)).unwrap();
+    assert_eq!(few, more, "no early exits");
+    assert!(few.quotients >= 1.0 && few.products > 10.0, "{few:?}");
+    assert_eq!(per_row("moment_bound_n2", 3, &rows(3)), None);
+    assert_eq!(per_row("blur", 2, &rows(2)), None);
+}
+
+#[test]
+fn quantiles_are_errors_that_occur() {
+    let errors: Vec<f64> = (0..=100).rev().map(f64::from).collect();
+    let q = Quantiles::of(errors);
+    assert_eq!(
+        (q.median, q.ninety, q.ninety_nine, q.greatest),
+        (50.0, 90.0, 99.0, 100.0)
+    );
+    assert_eq!(Quantiles::of(vec![3.0]).median, 3.0);
+    assert_eq!(Quantiles::of(Vec::new()).greatest, 0.0);
+    // Not a number is the worst of all.
+    assert!(Quantiles::of(vec![f64::NAN, 1.0]).greatest.is_nan());
 }

@@ -5,7 +5,8 @@ use hankel_numerics::accuracy::{singularities, table_1};
 use hankel_numerics::families::{FAMILIES, Family, Precision, Row, scaled, validity};
 use hankel_numerics::numbers::DoubleDouble;
 use hankel_numerics::stress::{
-    Backend, BackendError, Cell, Native, Options, Solver, Stress, StressError, run,
+    Backend, BackendError, Cell, Native, Options, Solver, Stress, StressError,
+    gradient_by_differences, gradient_of, judgement, run,
 };
 
 fn options(families: &[&str], samples: u64) -> Options {
@@ -13,6 +14,7 @@ fn options(families: &[&str], samples: u64) -> Options {
     Options {
         families: Options::families_named(&names).unwrap(),
         samples,
+        derivative_rows: 0,
         wide_checks: 2,
         programme_checks: 1,
         ..Options::default()
@@ -97,6 +99,57 @@ fn compensated_bounds_are_as_exact_as_their_inputs() {
     assert!(beyond.is_empty(), "{}", beyond.join("\n"));
     // By family, n, format and backend.
     assert!(cells > 300, "{cells}");
+}
+
+#[test]
+fn derivatives_are_measured_by_what_rounding_does_to_them() {
+    let stress = native(&Options {
+        derivative_rows: 100,
+        ..options(&["paper", "generic-unit", "silhouettes-biased"], 100)
+    });
+    // By family, n from 1 to 3, and format.
+    assert_eq!(stress.derivatives.len(), 18);
+    for d in &stress.derivatives {
+        let over = d.over.unwrap();
+        assert_eq!((d.non_finite, d.valid), (0, 100), "{d:?}");
+        // Half of the rows have no derivative that is worse than a few roundings.
+        assert!(over.median < 4.0, "{d:?}");
+    }
+    // What digits are lost without compensation is seen.
+    assert!(stress.report("x").table("derivatives-over").is_some());
+    let greatest = |n: usize| {
+        let of_order = stress.derivatives.iter().filter(|d| d.n == n);
+        of_order
+            .filter_map(|d| d.over)
+            .map(|o| o.greatest)
+            .fold(0.0, f64::max)
+    };
+    assert!(greatest(3) > 1000.0, "{}", greatest(3));
+}
+
+#[test]
+fn derivatives_that_are_no_number_are_found() {
+    let options = Options {
+        derivative_rows: 50,
+        orders: vec![2],
+        precisions: vec![Precision::F32],
+        ..options(&["paper"], 50)
+    };
+    let mut faulty = Faulty {
+        inner: Native::scalar(),
+        fault: |kernel: &Kernel, x: &mut [f32]| {
+            if kernel.function.contains("adjoint") {
+                x[7] = f32::NAN;
+            }
+        },
+    };
+    let stress = run(&options, &mut [&mut faulty], &mut |_| ()).unwrap();
+    let [found] = &stress.derivatives[..] else {
+        panic!("one order")
+    };
+    assert_eq!(found.non_finite, 1);
+    assert_eq!(found.over.unwrap().greatest, f64::INFINITY);
+    assert!(!stress.passed());
 }
 
 #[test]
@@ -357,7 +410,7 @@ fn reproduction_and_derivatives_are_as_the_paper_has_them() {
             assert!(line.d_eta <= published.d_eta, "{line:?}");
         }
     }
-    for (n, rows, difference) in table.duals {
+    for (n, rows, difference) in table.reference {
         assert!(rows > 0 && difference < 1e-9, "n = {n}: {difference:e}");
     }
     let report = table_1::measure(&options, &mut |_| ()).unwrap().report("x");
@@ -381,4 +434,51 @@ fn the_reference_is_what_it_is_called() {
     let lower = f64::from(bounds.lower - third).abs();
     let upper = f64::from(bounds.upper - third - third).abs();
     assert!(lower < 1e-28 && upper < 1e-28, "{lower:e} {upper:e}");
+}
+
+#[test]
+fn derivatives_agree_by_two_roads() {
+    let family = Family::named("paper").unwrap();
+    for n in 1..=5 {
+        for index in 0..20 {
+            let row: Row<f64> = family.row(n, 7, index);
+            let m = row.m.map(DoubleDouble::from);
+            let eta = DoubleDouble::from(row.eta);
+            let adjoint = gradient_of(n, m, eta, DoubleDouble::from(0.0));
+            let differences = gradient_by_differences(n, m, eta);
+            for k in 0..=2 * n {
+                let (a, b) = (f64::from(adjoint.m[k]), differences.m[k]);
+                assert!(
+                    (a - b).abs() <= 1e-12 * b.abs().max(1.0),
+                    "n = {n}: {a} {b}"
+                );
+            }
+            let (a, b) = (f64::from(adjoint.eta), differences.eta);
+            assert!(
+                (a - b).abs() <= 1e-12 * b.abs().max(1.0),
+                "n = {n}: {a} {b}"
+            );
+        }
+    }
+}
+
+#[test]
+fn errors_are_shares_of_the_total_at_any_scale() {
+    // One point at 0 and one at 1, a little blurred: at 1/2, half is below.
+    for mass in [1.0, 1e-30, 1e30, 2.0_f64.powi(-1060)] {
+        let mut row = Row {
+            eta: 0.5,
+            ..Row::<f64>::default()
+        };
+        row.m[..3].copy_from_slice(&[mass, 0.5 * mass, 0.75 * mass]);
+        let judged = judgement(1, &row);
+        let truth = judged.truth.unwrap();
+        let exact = truth.shares.map(f64::from);
+        assert!((truth.error([exact[0] * mass, exact[1] * mass])) < 1e-3);
+        let off = truth.error([(exact[0] + 0.25) * mass, exact[1] * mass]);
+        assert!((off - 0.25).abs() < 1e-3, "{mass}: {off}");
+        assert_eq!(truth.error([f64::NAN, 0.0]), 1.0);
+        let over = truth.over_sensitivity([f64::NAN, exact[1] * mass]);
+        assert_eq!(over, 1.0 / truth.sensitivities[0]);
+    }
 }

@@ -115,30 +115,3 @@ pub fn orthogonal_roots(n: usize, m: &[DoubleDouble; 11]) -> Option<[DoubleDoubl
     }
     Some(precise)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn roots_are_those_of_legendre_polynomials() {
-        // Moments of the uniform distribution on [-1, 1].
-        let mut m = [lit!(0.0); 11];
-        for (j, m) in m.iter_mut().enumerate().step_by(2) {
-            let one: DoubleDouble = lit!(1.0);
-            *m = one / DoubleDouble::from((j + 1) as f64);
-        }
-        let roots = orthogonal_roots(3, &m).unwrap().map(f64::from);
-        let expected = [-0.6_f64.sqrt(), 0.0, 0.6_f64.sqrt()];
-        for (root, expected) in roots.iter().zip(expected) {
-            assert!((root - expected).abs() < 1e-15, "{root} {expected}");
-        }
-        let roots = orthogonal_roots(5, &m).unwrap().map(f64::from);
-        let outer = (5.0 + 2.0 * (10.0_f64 / 7.0).sqrt()).sqrt() / 3.0;
-        let inner = (5.0 - 2.0 * (10.0_f64 / 7.0).sqrt()).sqrt() / 3.0;
-        let expected = [-outer, -inner, 0.0, inner, outer];
-        for (root, expected) in roots.iter().zip(expected) {
-            assert!((root - expected).abs() < 1e-15, "{root} {expected}");
-        }
-    }
-}

@@ -11,7 +11,9 @@ use super::{AccuracyError, LEAST_SAMPLES};
 use crate::families::{Family, Format, ORDERS, Precision, Row, scaled, validity};
 use crate::numbers::DoubleDouble;
 use crate::peer::{Peer, Quantity};
-use crate::stress::{Backend, Map, Native, Solver, canonical_of, gradient_by_duals, gradient_of};
+use crate::stress::{
+    Backend, Map, Native, Solver, canonical_of, gradient_by_differences, gradient_of,
+};
 
 /// The rows: 2n + 1 normal points.
 const FAMILY: &str = "paper";
@@ -34,8 +36,9 @@ pub struct Options {
     pub orders: Vec<usize>,
     /// Rows of each order and precision.
     pub samples: u64,
-    /// Rows of each order on which the reference derivative is compared with dual numbers.
-    pub dual_checks: u64,
+    /// Rows of each order on which the reference derivative is compared with
+    /// differences in 300 bits.
+    pub difference_checks: u64,
     /// Seed of the rows.
     pub seed: u64,
     /// The interpreter that has `diffmoments`; `None` leaves it out.
@@ -47,7 +50,7 @@ impl Default for Options {
         Self {
             orders: ORDERS.collect(),
             samples: 20_000,
-            dual_checks: 64,
+            difference_checks: 64,
             seed: 1,
             python: None,
         }
@@ -96,9 +99,9 @@ pub struct Table1 {
     pub peer: Option<String>,
     /// The figures.
     pub lines: Vec<Line>,
-    /// For each order, rows on which the reference derivative was compared with that of dual numbers
-    /// in double-double, and the largest difference relative to the larger of 1 and the derivative.
-    pub duals: Vec<(usize, u64, f64)>,
+    /// For each order, rows on which the reference derivative was compared with differences of the
+    /// bound in 300 bits, and the largest difference relative to the larger of 1 and the derivative.
+    pub reference: Vec<(usize, u64, f64)>,
 }
 
 /// What the paper's Table 1 has for its C++ code.
@@ -165,7 +168,7 @@ pub fn measure(options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Tabl
             };
             table.lines.extend(lines);
         }
-        table.duals.push(duals(n, options)?);
+        table.reference.push(reference(n, options)?);
     }
     Ok(table)
 }
@@ -427,10 +430,10 @@ fn differences<T: Format>(
     Ok(all)
 }
 
-/// Compares the reference derivative with that of dual numbers.
-fn duals(n: usize, options: &Options) -> Result<(usize, u64, f64), AccuracyError> {
+/// Compares the reference derivative with differences in 300 bits.
+fn reference(n: usize, options: &Options) -> Result<(usize, u64, f64), AccuracyError> {
     let family = family()?;
-    let differences: Vec<f64> = (0..options.dual_checks)
+    let differences: Vec<f64> = (0..options.difference_checks)
         .into_par_iter()
         .filter_map(|index| match draw::<f64>(family, n, options.seed, index) {
             Drawn::Counts(sample) => Some(sample),
@@ -438,8 +441,8 @@ fn duals(n: usize, options: &Options) -> Result<(usize, u64, f64), AccuracyError
         })
         .map(|sample| {
             let m = sample.row.m.map(DoubleDouble::from);
-            let duals = gradient_by_duals(n, m, DoubleDouble::from(sample.row.eta));
-            let all = duals.m[..=2 * n].iter().chain([&duals.eta]);
+            let differences = gradient_by_differences(n, m, DoubleDouble::from(sample.row.eta));
+            let all = differences.m[..=2 * n].iter().chain([&differences.eta]);
             all.zip(&sample.gradient)
                 .map(|(a, b)| (a - b).abs() / a.abs().max(1.0))
                 .fold(0.0, f64::max)

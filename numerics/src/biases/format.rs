@@ -149,7 +149,9 @@ impl Format {
 
     /// What is mixed in: the published vector for this format, or else that for as many moments and
     /// the most similar number of bits.
-    pub(super) fn target(self) -> [f64; 11] {
+    #[doc(hidden)]
+    #[must_use]
+    pub fn target(self) -> [f64; 11] {
         let fallback = match (self.basis, self.count, self.storage) {
             (Basis::Unit, 4, _) => bias::CLAMPED_4_16,
             (Basis::Unit, _, _) => bias::CLAMPED_6_10,
@@ -164,8 +166,9 @@ impl Format {
 }
 
 /// A region of a shadow map: its moments, a query, and how much lies below it.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Region {
+pub struct Region {
     /// Power moments, the zeroth first, or cosines and sines.
     moments: [f64; 11],
     query: f64,
@@ -176,7 +179,7 @@ pub(super) struct Region {
 }
 
 impl Region {
-    pub fn draw(format: Format, s: &mut Source) -> Self {
+    pub(super) fn draw(format: Format, s: &mut Source) -> Self {
         let depths = match format.basis {
             Basis::Symmetric => Depths::Symmetric,
             Basis::Unit | Basis::Trigonometric => Depths::Unit,
@@ -212,7 +215,7 @@ impl Region {
     }
 
     /// Depths with weights that add up to 1, in [-1, 1], and a query.
-    #[cfg(test)]
+    #[must_use]
     pub fn of(points: &[(f64, f64)], query: f64) -> Self {
         let points: Vec<Point> = points
             .iter()
@@ -365,7 +368,9 @@ impl Format {
     }
 
     /// Whether the result for a region is invalid.
-    pub(super) fn is_invalid(
+    #[doc(hidden)]
+    #[must_use]
+    pub fn is_invalid(
         self,
         region: &Region,
         criterion: Criterion,

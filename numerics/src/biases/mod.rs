@@ -19,6 +19,8 @@
 mod format;
 mod tables;
 
+#[doc(hidden)]
+pub use format::Region;
 pub use format::{FORMATS, Format, Storage};
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -27,7 +29,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::families::draw::Source;
-use format::Region;
 
 /// How far a bound may be beyond the truth: a fiftieth, the darkness that the lecture's shader takes
 /// for full shadow.
@@ -275,6 +276,11 @@ impl Search {
     }
 }
 
+/// The strengths on trial, ascending.
+pub fn strengths() -> impl Iterator<Item = f64> {
+    (FIRST..=LAST).map(strength)
+}
+
 /// Of a whole number of steps, with two digits rounded up.
 fn strength(step: i32) -> f64 {
     let exact = 10.0_f64.powf(f64::from(step) / f64::from(PER_DECADE));
@@ -284,54 +290,4 @@ fn strength(step: i32) -> f64 {
     // Decimal digits as text are the nearest number.
     let exponent = unit.log10().round();
     format!("{digits}e{exponent}").parse().unwrap_or(exact)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn strengths_rise_in_two_digits() {
-        let all: Vec<f64> = (FIRST..=LAST).map(strength).collect();
-        assert!(all.is_sorted_by(|a, b| a < b));
-        assert_eq!(all[0], 1e-9);
-        assert_eq!(strength(-PER_DECADE), 0.1);
-        assert_eq!(strength(-PER_DECADE * 3 / 2), 0.032);
-    }
-
-    #[test]
-    fn more_bias_is_never_worse_and_coarser_formats_need_more() {
-        let found: Vec<Found> = {
-            let options = Options {
-                formats: formats_named(&["symmetric-4-32".into(), "symmetric-4-10".into()])
-                    .unwrap(),
-                samples: 4000,
-                seed: 3,
-            };
-            measure(&options, &mut |_| ()).unwrap().found
-        };
-        let [float, coarse] = &found[..] else {
-            panic!("two formats")
-        };
-        for f in [float, coarse] {
-            // Without a bias, one texel alone makes the matrix singular.
-            assert!(f.without[0] > 0.1, "{f:?}");
-            assert!(f.definite.unwrap() > 0.0, "{f:?}");
-            assert!(f.robust.unwrap() <= f.definite.unwrap(), "{f:?}");
-        }
-        assert!(coarse.definite > float.definite);
-    }
-
-    #[test]
-    fn a_bound_beyond_the_truth_is_invalid() {
-        let format = formats_named(&["symmetric-4-32".into()]).unwrap()[0];
-        let region = Region::of(&[(0.0, 1.0)], 0.5);
-        let target = format.target();
-        let good = format.is_invalid(&region, Criterion::Robust, &target, 1e-6);
-        assert!(!good);
-        // The same moments, but everything lies behind the query.
-        let mut lie = region;
-        lie.below = 0.0;
-        assert!(format.is_invalid(&lie, Criterion::Robust, &target, 1e-6));
-    }
 }

@@ -16,6 +16,8 @@ mod precision;
 mod validity;
 
 pub use precision::{Format, Precision};
+#[doc(hidden)]
+pub use validity::last_place;
 pub use validity::{Validity, pivots, scaled, validity};
 
 use std::fmt;

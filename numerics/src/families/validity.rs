@@ -139,7 +139,8 @@ fn is_singular(n: usize, row: &Row<f64>, pivots: &[Wide; 6]) -> bool {
 }
 
 /// The power of two that the last set bit of a number stands for.
-fn last_place(x: f64) -> f64 {
+#[must_use]
+pub fn last_place(x: f64) -> f64 {
     let (bits, exponent) = (x.to_bits(), (x.to_bits() >> 52) & 0x7ff);
     let fraction = bits & ((1 << 52) - 1);
     let whole = if exponent == 0 {
@@ -149,63 +150,4 @@ fn last_place(x: f64) -> f64 {
     };
     let place = exponent.max(1) as i32 - 1075 + whole.trailing_zeros() as i32;
     2.0_f64.powi(place / 2) * 2.0_f64.powi(place - place / 2)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn row(m: &[f64]) -> Row<f64> {
-        let mut row = Row::default();
-        row.m[..m.len()].copy_from_slice(m);
-        row
-    }
-
-    #[test]
-    fn distributions_are_told_from_what_is_none() {
-        // Three equal points at -1, 0, 1.
-        let three = [1.0, 0.0, 2.0 / 3.0, 0.0, 2.0 / 3.0];
-        assert!(validity(1, &row(&three[..3])).is_definite());
-        assert!(validity(2, &row(&three)).is_definite());
-        // Two points: singular for n = 2, to the last bit.
-        assert_eq!(validity(2, &row(&[1.0, 0.0, 1.0, 0.0, 1.0])), Validity::Not);
-        assert_eq!(validity(1, &row(&[1.0, 0.5, 0.2])), Validity::Not);
-        assert_eq!(validity(1, &row(&[1.0, 0.5, -1.0])), Validity::Not);
-    }
-
-    #[test]
-    fn an_excess_far_below_double_double_is_seen() {
-        let tiny = 2.0_f64.powi(-52);
-        // A third pivot of one unit in the last place.
-        let m = [1.0, 0.0, 1.0, 0.0, 1.0 + tiny];
-        let Validity::Definite(left) = validity(2, &row(&m)) else {
-            panic!("it is positive definite");
-        };
-        assert!((left / tiny - 1.0).abs() < 1e-9, "{left}");
-    }
-
-    #[test]
-    fn a_singular_matrix_is_one_to_the_last_bit() {
-        // Points at 1/2 and 3/4, weights 1/3 and 2/3 of 3: elimination divides by 3, and by 24.
-        let moments: Vec<f64> = (0..7)
-            .map(|j| 0.5_f64.powi(j) + 2.0 * 0.75_f64.powi(j))
-            .collect();
-        assert_eq!(validity(3, &row(&moments)), Validity::Not);
-        assert!(validity(1, &row(&moments)).is_definite());
-        for (x, place) in [(1.0, 1.0), (0.75, 0.25), (-6.0, 2.0), (1e-310, 0.0)] {
-            let found = last_place(x);
-            assert!(place == 0.0 || found == place, "{x}: {found}");
-            assert!(x % found == 0.0 && x % (2.0 * found) != 0.0, "{x}: {found}");
-        }
-    }
-
-    #[test]
-    fn scaling_takes_the_smallest_numbers() {
-        let tiny = f64::from_bits(3);
-        let (scaled, exponent) = scaled(&row(&[tiny, 0.0, tiny])).unwrap();
-        assert_eq!(scaled.m[0], 1.5);
-        assert_eq!(exponent, -1073);
-        assert!(super::scaled(&row(&[0.0, 0.0, 1.0])).is_none());
-        assert!(super::scaled(&row(&[f64::NAN, 0.0, 1.0])).is_none());
-    }
 }

@@ -322,6 +322,3 @@ impl Judge {
         Ok(least)
     }
 }
-
-#[cfg(test)]
-mod tests;

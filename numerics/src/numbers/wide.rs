@@ -197,6 +197,7 @@ impl Finite {
 }
 
 impl From<f64> for Wide {
+    #[inline(never)]
     fn from(x: f64) -> Self {
         let bits = x.to_bits();
         let fraction = bits & ((1 << 52) - 1);
@@ -243,6 +244,7 @@ impl PartialEq for Wide {
 }
 
 impl PartialOrd for Wide {
+    #[inline(never)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let difference = (*self - *other).0?;
         Some(match difference {
@@ -255,6 +257,7 @@ impl PartialOrd for Wide {
 
 impl Neg for Wide {
     type Output = Self;
+    #[inline(never)]
     fn neg(self) -> Self {
         Self(self.0.map(|x| Finite {
             negative: !x.negative && !x.is_zero(),
@@ -265,6 +268,7 @@ impl Neg for Wide {
 
 impl Add for Wide {
     type Output = Self;
+    #[inline(never)]
     fn add(self, other: Self) -> Self {
         Self(self.0.zip(other.0).and_then(|(a, b)| a.sum(b)))
     }
@@ -272,6 +276,7 @@ impl Add for Wide {
 
 impl Mul for Wide {
     type Output = Self;
+    #[inline(never)]
     fn mul(self, other: Self) -> Self {
         Self(self.0.zip(other.0).and_then(|(a, b)| a.product(b)))
     }
@@ -279,6 +284,7 @@ impl Mul for Wide {
 
 impl Div for Wide {
     type Output = Self;
+    #[inline(never)]
     fn div(self, other: Self) -> Self {
         Self(self.0.zip(other.0).and_then(|(a, b)| a.quotient(b)))
     }
@@ -296,6 +302,7 @@ impl Real for Wide {
     fn epsilon() -> Self {
         Self::from(2.0_f64.powi(1 - PRECISION as i32))
     }
+    #[inline(never)]
     fn sqrt(self) -> Self {
         Self(self.0.and_then(Finite::root))
     }

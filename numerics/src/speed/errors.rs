@@ -1,7 +1,7 @@
 //! How wrong the bounds are that were timed: a rough look, on a few thousand rows of two families.
 
 use hankel_dsl::native::Mode;
-use hankel_moments::{MAX_MOMENTS, bound};
+use hankel_moments::MAX_MOMENTS;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +10,7 @@ use super::{Solver, SpeedError, rows_of};
 use crate::families::{Format, Precision, Row, validity};
 use crate::numbers::DoubleDouble;
 use crate::peer::{Peer, Quantity};
+use crate::stress::bounds_of;
 
 /// Families that errors are taken on: easy and hard rows.
 pub const ERROR_FAMILIES: [&str; 2] = ["paper", "silhouettes-biased"];
@@ -126,31 +127,5 @@ pub(super) fn measure<T: Format>(
 fn reference<T: Format>(n: usize, row: &Row<T>) -> f64 {
     let m: [DoubleDouble; MAX_MOMENTS] = row.m.map(|m| DoubleDouble::from(m.widen()));
     let eta = DoubleDouble::from(row.eta.widen());
-    let bounds = match n {
-        1 => bound::<_, 1>(m, eta),
-        2 => bound::<_, 2>(m, eta),
-        3 => bound::<_, 3>(m, eta),
-        4 => bound::<_, 4>(m, eta),
-        _ => bound::<_, 5>(m, eta),
-    };
-    bounds.lower.into()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Quantiles;
-
-    #[test]
-    fn quantiles_are_errors_that_occur() {
-        let errors: Vec<f64> = (0..=100).rev().map(f64::from).collect();
-        let q = Quantiles::of(errors);
-        assert_eq!(
-            (q.median, q.ninety, q.ninety_nine, q.greatest),
-            (50.0, 90.0, 99.0, 100.0)
-        );
-        assert_eq!(Quantiles::of(vec![3.0]).median, 3.0);
-        assert_eq!(Quantiles::of(Vec::new()).greatest, 0.0);
-        // Not a number is the worst of all.
-        assert!(Quantiles::of(vec![f64::NAN, 1.0]).greatest.is_nan());
-    }
+    bounds_of(n, m, eta).lower.into()
 }

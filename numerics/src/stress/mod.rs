@@ -9,12 +9,15 @@
 //! is not enough; samples of it are compared with 300 bits and with the linear programme.
 
 mod backend;
+mod derivatives;
 mod reference;
 mod tables;
 
 pub use backend::{Backend, BackendError, LANES, Map, Native};
+pub use derivatives::Derivatives;
 pub use reference::{
-    Agreement, Judgement, Truth, bounds_of, canonical_of, gradient_by_duals, gradient_of, judgement,
+    Agreement, Judgement, Truth, bounds_of, canonical_of, gradient_by_differences, gradient_of,
+    judgement,
 };
 
 use std::path::PathBuf;
@@ -85,6 +88,8 @@ pub struct Options {
     pub precisions: Vec<Precision>,
     /// Rows of each family, order and precision.
     pub samples: u64,
+    /// How many of them derivatives are measured on: what these are sensitive to is found in 300 bits.
+    pub derivative_rows: u64,
     /// How many of them the reference is compared with 300 bits on.
     pub wide_checks: u64,
     /// And with the linear programme.
@@ -102,6 +107,7 @@ impl Default for Options {
             orders: ORDERS.collect(),
             precisions: vec![Precision::F32, Precision::F64],
             samples: 10_000,
+            derivative_rows: 100,
             wide_checks: 8,
             programme_checks: 2,
             seed: 1,
@@ -230,6 +236,8 @@ pub struct Stress {
     pub peer: Option<String>,
     /// The figures.
     pub cells: Vec<Cell>,
+    /// The figures of derivatives.
+    pub derivatives: Vec<Derivatives>,
     /// How well the reference was confirmed, by family.
     pub agreement: Vec<(String, Agreement)>,
     /// What was left out, and why.
@@ -237,14 +245,15 @@ pub struct Stress {
 }
 
 impl Stress {
-    /// Whether every kernel gave a number from 0 to m_0 for every row, and lanes the scalar bits.
+    /// Whether every kernel gave a number from 0 to m_0 for every row, finite derivatives, and lanes the scalar bits.
     /// What is no kernel is not asked.
     #[must_use]
     pub fn passed(&self) -> bool {
-        self.cells.iter().filter(|c| c.solver.is_kernel()).all(|c| {
-            let same = c.backend != LANES || c.other_bits.unwrap_or(0) == 0;
-            c.non_finite == 0 && c.out_of_range == 0 && same
-        })
+        self.derivatives.iter().all(|d| d.non_finite == 0)
+            && self.cells.iter().filter(|c| c.solver.is_kernel()).all(|c| {
+                let same = c.backend != LANES || c.other_bits.unwrap_or(0) == 0;
+                c.non_finite == 0 && c.out_of_range == 0 && same
+            })
     }
 }
 
@@ -378,6 +387,11 @@ impl Case<'_> {
                 .collect();
             let cell = self.cell(Solver::Peer, "library".into(), &rows, &judgements, &bounds);
             self.stress.cells.push(cell);
+        }
+        if let Some(first) = backends.first_mut() {
+            let count = self.options.derivative_rows.min(self.options.samples);
+            let measured = derivatives::measure::<T>(self.family, n, count, seed, &mut **first)?;
+            self.stress.derivatives.extend(measured);
         }
         Ok(self.agreement(&rows, &judgements))
     }

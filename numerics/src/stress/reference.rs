@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::families::{Format, Row, Validity, scaled, validity};
 use crate::judge::{DepthFunction, Judge, Range};
-use crate::numbers::{DoubleDouble, Dual, Wide};
+use crate::numbers::{DoubleDouble, Wide};
 
 /// Below this share of digits that elimination leaves, double-double has too few of its own.
 const NEEDS_WIDE: f64 = 1e-24;
@@ -49,17 +49,45 @@ pub fn gradient_of<R: Real>(n: usize, m: [R; 11], eta: R, overestimation: R) -> 
     by_order!(n, bound_adjoint::<R>(m, eta, overestimation, one))
 }
 
-/// The derivatives of the lower bound, one direction after the other.
-#[must_use]
-pub fn gradient_by_duals(n: usize, m: [DoubleDouble; 11], eta: DoubleDouble) -> Gradient<f64> {
-    let directional = |direction: usize| {
-        let mut duals = m.map(Dual::constant);
-        let mut query = Dual::constant(eta);
-        match duals.get_mut(direction) {
-            Some(moment) if direction <= 2 * n => *moment = Dual::variable(m[direction]),
-            _ => query = Dual::variable(eta),
+/// The step of differences in 300 bits, for moments with a total near 1. What it leaves out is less than 1e-30 of a
+/// derivative, unless pivots of the Hankel matrix are below 1e-33; what rounding does to a difference is 1e-42 of the
+/// total.
+const STEP: f64 = 1.0 / (1_u128 << 80) as f64 / (1_u128 << 80) as f64;
+
+/// A function of a row a step further in one direction, a step back, and twice the step: moments in their
+/// order, then the query point.
+pub(super) fn difference<F>(
+    n: usize,
+    m: [Wide; 11],
+    eta: Wide,
+    direction: usize,
+    function: impl Fn([Wide; 11], Wide) -> F,
+) -> (F, F, Wide) {
+    let step = Wide::from(STEP);
+    let at = |step: Wide| {
+        let (mut m, mut eta) = (m, eta);
+        match m.get_mut(direction) {
+            Some(moment) if direction <= 2 * n => *moment += step,
+            _ => eta += step,
         }
-        f64::from(bounds_of(n, duals, query).lower.derivative)
+        function(m, eta)
+    };
+    (at(step), at(-step), step + step)
+}
+
+/// The derivatives of the lower bound in 300 bits, by central differences: one argument after the other, through
+/// the bound's source alone.
+#[must_use]
+pub fn gradient_by_differences(
+    n: usize,
+    m: [DoubleDouble; 11],
+    eta: DoubleDouble,
+) -> Gradient<f64> {
+    let (m, eta) = (m.map(Wide::from), Wide::from(eta));
+    let directional = |direction: usize| {
+        let lower = |m, eta| bounds_of(n, m, eta).lower;
+        let (there, back, twice) = difference(n, m, eta, direction, lower);
+        f64::from((there - back) / twice)
     };
     let mut gradient = Gradient {
         m: [0.0; 11],
@@ -148,11 +176,7 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
             truth: None,
         };
     }
-    let rounding = Rounding {
-        half: 0.5 * T::epsilon().widen(),
-        least: 0.5 * T::LEAST_NORMAL * T::epsilon().widen(),
-        exponent,
-    };
+    let rounding = Rounding::new::<T>(exponent);
     let mass = row.m[0];
     let (shares, sensitivities) = if left < NEEDS_WIDE {
         (
@@ -180,7 +204,7 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
 }
 
 /// Whether a valid row is within the range that [`bound`] is documented for.
-fn is_in_range(n: usize, row: &Row<f64>) -> bool {
+pub(super) fn is_in_range(n: usize, row: &Row<f64>) -> bool {
     let mass = row.m[0];
     let moments_are = row.m[..=2 * n]
         .iter()
@@ -190,7 +214,7 @@ fn is_in_range(n: usize, row: &Row<f64>) -> bool {
 }
 
 /// What rounding once does to a number, of which the moments were multiplied by a power of two.
-struct Rounding {
+pub(super) struct Rounding {
     /// Half a unit in the last place of 1.
     half: f64,
     /// Half of the smallest number.
@@ -199,8 +223,27 @@ struct Rounding {
 }
 
 impl Rounding {
+    /// That of a format.
+    pub fn new<T: Format>(exponent: i32) -> Self {
+        Self {
+            half: 0.5 * T::epsilon().widen(),
+            least: 0.5 * T::LEAST_NORMAL * T::epsilon().widen(),
+            exponent,
+        }
+    }
+
+    /// From 1 to the next number.
+    pub fn epsilon(&self) -> f64 {
+        2.0 * self.half
+    }
+
+    /// The largest rounding error of a scaled moment, and of whatever else has its unit.
+    pub fn of_moment(&self, m: f64) -> f64 {
+        self.of(m, -self.exponent)
+    }
+
     /// The largest rounding error of a number near `x` that was multiplied by 2 to that power.
-    fn of(&self, x: f64, exponent: i32) -> f64 {
+    pub fn of(&self, x: f64, exponent: i32) -> f64 {
         let least = self.least * 2.0_f64.powi(exponent / 2) * 2.0_f64.powi(exponent - exponent / 2);
         let of_nothing = if x == 0.0 { 0.0 } else { least };
         (self.half * x.abs()).max(of_nothing)
@@ -213,14 +256,13 @@ impl Rounding {
         f64: From<R>,
     {
         let m = row.m.map(R::from);
-        let of_moment = |m: f64| self.of(m, -self.exponent);
         [0.0, 1.0].map(|overestimation| {
             let gradient = gradient_of(n, m, R::from(row.eta), R::from(overestimation));
             let of_query = f64::from(gradient.eta).abs() * self.of(row.eta, 0);
             let of_moments =
-                (0..=2 * n).map(|k| f64::from(gradient.m[k]).abs() * of_moment(row.m[k]));
+                (0..=2 * n).map(|k| f64::from(gradient.m[k]).abs() * self.of_moment(row.m[k]));
             let sum: f64 = of_moments.chain([of_query]).sum();
-            ((of_moment(row.m[0]) + sum) / row.m[0]).min(1.0)
+            ((self.of_moment(row.m[0]) + sum) / row.m[0]).min(1.0)
         })
     }
 }
@@ -308,58 +350,5 @@ impl Agreement {
         self.programme_difference = self.programme_difference.max(difference);
         let within = difference <= judged.margin / row.m[0];
         self.programme_beyond += u64::from(!within);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::families::Family;
-
-    #[test]
-    fn derivatives_agree_by_two_roads() {
-        let family = Family::named("paper").unwrap();
-        for n in 1..=5 {
-            for index in 0..20 {
-                let row: Row<f64> = family.row(n, 7, index);
-                let m = row.m.map(DoubleDouble::from);
-                let eta = DoubleDouble::from(row.eta);
-                let adjoint = gradient_of(n, m, eta, DoubleDouble::from(0.0));
-                let duals = gradient_by_duals(n, m, eta);
-                for k in 0..=2 * n {
-                    let (a, b) = (f64::from(adjoint.m[k]), duals.m[k]);
-                    assert!(
-                        (a - b).abs() <= 1e-12 * b.abs().max(1.0),
-                        "n = {n}: {a} {b}"
-                    );
-                }
-                let (a, b) = (f64::from(adjoint.eta), duals.eta);
-                assert!(
-                    (a - b).abs() <= 1e-12 * b.abs().max(1.0),
-                    "n = {n}: {a} {b}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn errors_are_shares_of_the_total_at_any_scale() {
-        // One point at 0 and one at 1, a little blurred: at 1/2, half is below.
-        for mass in [1.0, 1e-30, 1e30, 2.0_f64.powi(-1060)] {
-            let mut row = Row {
-                eta: 0.5,
-                ..Row::<f64>::default()
-            };
-            row.m[..3].copy_from_slice(&[mass, 0.5 * mass, 0.75 * mass]);
-            let judged = judgement(1, &row);
-            let truth = judged.truth.unwrap();
-            let exact = truth.shares.map(f64::from);
-            assert!((truth.error([exact[0] * mass, exact[1] * mass])) < 1e-3);
-            let off = truth.error([(exact[0] + 0.25) * mass, exact[1] * mass]);
-            assert!((off - 0.25).abs() < 1e-3, "{mass}: {off}");
-            assert_eq!(truth.error([f64::NAN, 0.0]), 1.0);
-            let over = truth.over_sensitivity([f64::NAN, exact[1] * mass]);
-            assert_eq!(over, 1.0 / truth.sensitivities[0]);
-        }
     }
 }

@@ -23,6 +23,9 @@ impl Stress {
         for solver in [Solver::Compensated, Solver::Plain, Solver::Published] {
             report.tables.push(self.overview(solver));
         }
+        if !self.derivatives.is_empty() {
+            report.tables.push(self.overview_of_derivatives());
+        }
         report.tables.push(self.errors());
         if self.peer.is_some() {
             report.tables.push(self.against());
@@ -121,6 +124,41 @@ impl Stress {
                             && (c.solver, c.n) == (solver, n)
                     });
                     row.push(cell.and_then(|c| c.over).map(|o| o.greatest).into());
+                }
+                if row[2..].iter().any(|c| *c != crate::report::Cell::Empty) {
+                    table.push(row);
+                }
+            }
+        }
+        table
+    }
+
+    /// The worst row's derivative, by family and order.
+    fn overview_of_derivatives(&self) -> Table {
+        let orders: Vec<usize> = ORDERS
+            .filter(|&n| self.derivatives.iter().any(|d| d.n == n))
+            .collect();
+        let headings = orders.iter().map(|n| Column::number(format!("n = {n}")));
+        let mut table = Table::new(
+            "derivatives-over",
+            "Error over sensitivity of derivatives: the greatest of all derivatives of all valid rows. The \
+             sensitivity is what rounding each number of the row and the result once does to a derivative; \
+             one that is less than epsilon times the greatest of its row counts as that",
+            [Column::text("family"), Column::text("precision")]
+                .into_iter()
+                .chain(headings),
+        );
+        for precision in [Precision::F32, Precision::F64] {
+            for (family, _) in &self.agreement {
+                let of_order = |n: usize| {
+                    self.derivatives.iter().find(|d| {
+                        (d.family.as_str(), d.precision, d.n) == (family.as_str(), precision, n)
+                    })
+                };
+                let mut row: Vec<crate::report::Cell> =
+                    vec![family.as_str().into(), precision.to_string().into()];
+                for &n in &orders {
+                    row.push(of_order(n).and_then(|d| d.over).map(|o| o.greatest).into());
                 }
                 if row[2..].iter().any(|c| *c != crate::report::Cell::Empty) {
                     table.push(row);

@@ -1,9 +1,21 @@
+//! The linear programme, its functions of depth, and its simplex method.
+
 use std::fs;
 
 use hankel_moments::{Moments4, hamburger_4, hausdorff_4, variance_2};
 use proptest::prelude::*;
 
-use super::*;
+use hankel_numerics::judge::{
+    DepthFunction, Judge, JudgeError, Judged, Range, Region, evaluate, regions, table,
+};
+
+/// Private to the library, and compiled once more for their own tests.
+#[path = "../src/judge/candidates.rs"]
+#[allow(dead_code, reason = "not everything is tested here")]
+mod candidates;
+#[path = "../src/judge/simplex.rs"]
+#[allow(dead_code, reason = "not everything is tested here")]
+mod simplex;
 
 /// Depths with weights.
 type Distribution = Vec<(f64, f64)>;
@@ -411,4 +423,66 @@ fn bad_tables_are_explained_and_nothing_is_written() {
     assert!(error.to_string().contains("nowhere.csv"), "{error}");
     let error = table(&judge, &input, folder.path(), &mut |_| {}).unwrap_err();
     assert!(error.to_string().contains("folder"), "{error}");
+}
+
+#[test]
+fn names_are_distinct_and_read_back() {
+    for (i, function) in DepthFunction::ALL.into_iter().enumerate() {
+        let name = function.to_string();
+        assert_eq!(name.parse::<DepthFunction>().unwrap(), function);
+        assert!(
+            DepthFunction::ALL[..i]
+                .iter()
+                .all(|f| f.to_string() != name),
+            "{name}"
+        );
+    }
+    assert_eq!(
+        " asin( 2z - 1 )".parse::<DepthFunction>().unwrap(),
+        DepthFunction::ArcsineOfUnit
+    );
+    assert_eq!(
+        "z^10".parse::<DepthFunction>().unwrap(),
+        DepthFunction::Power(10)
+    );
+    let error = "z^17".parse::<DepthFunction>().unwrap_err().to_string();
+    assert!(error.contains("z^17") && error.contains("z^16"), "{error}");
+}
+
+/// Every candidate is continuous on the paper's range of depths.
+#[test]
+fn candidates_are_finite_on_the_unit_interval() {
+    for function in DepthFunction::ALL {
+        for i in 0..=100 {
+            let z = f64::from(i) / 100.0;
+            assert!(function.is_defined(z), "{function} at {z}");
+            assert!(function.eval(z).is_finite(), "{function} at {z}");
+        }
+    }
+}
+
+#[test]
+fn values_are_those_of_the_formulas() {
+    for (name, z, value) in [
+        ("z^8", 0.5, 1.0 / 256.0),
+        ("z^(1/2)", 0.25, 0.5),
+        ("z^(1/3)", 0.125, 0.5),
+        ("z^(1/4)", 0.0625, 0.5),
+        ("1/(z+1)", 0.25, 0.8),
+        ("1/(z+1)^4", 1.0, 1.0 / 16.0),
+        ("exp(4z)", 0.25, std::f64::consts::E),
+        ("log(z+1)", 1.0, std::f64::consts::LN_2),
+        ("log(z+3)", 1.0, 2.0 * std::f64::consts::LN_2),
+        ("sin(8pi*z)", 1.0 / 16.0, 1.0),
+        ("cos(2pi*z)", 0.5, -1.0),
+        ("cosh(z)", 0.0, 1.0),
+        ("sinh(z)", 1.0, 1.175_201_193_643_801_5),
+        ("asin(z)", 1.0, std::f64::consts::FRAC_PI_2),
+        ("asin(2z-1)", 0.0, -std::f64::consts::FRAC_PI_2),
+        ("atan(z)", 1.0, std::f64::consts::FRAC_PI_4),
+        ("exp(-z^2)", 1.0, (-1.0_f64).exp()),
+    ] {
+        let found = name.parse::<DepthFunction>().unwrap().eval(z);
+        assert!((found - value).abs() < 1e-14, "{name}: {found}");
+    }
 }
