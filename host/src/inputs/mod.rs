@@ -235,6 +235,9 @@ pub fn set_constants(kernel: &mut Kernel, values: &[u32]) -> BTreeMap<String, u3
 ///
 /// The edge and hostile ones of an author's function have its lengths, sizes and integers, which belong
 /// together; their floats are edge and hostile ones by the attributes.
+/// Those of a kernel that samples textures come from the attributes alone: textures have sizes of their
+/// own, and what a map of one size holds at edge coordinates is compared with depths that lie on it to
+/// the last bit.
 ///
 /// # Errors
 /// See [`InputError`].
@@ -260,6 +263,11 @@ pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError>
         let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 40));
         all.push(case(kernel, Class::Ordinary, rng, Some(given))?);
     }
+    if samples(kernel) {
+        let made = cases(kernel, seed)?;
+        all.extend(made.into_iter().filter(|c| c.class != Class::Ordinary));
+        return Ok(all);
+    }
     for (i, class) in Class::ALL.into_iter().enumerate() {
         if class == Class::Ordinary {
             continue;
@@ -270,6 +278,12 @@ pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError>
         }
     }
     Ok(all)
+}
+
+/// Whether a kernel reads textures, with a sampler or without.
+fn samples(kernel: &Kernel) -> bool {
+    let mut roles = kernel.params.iter().map(|p| &p.role);
+    roles.any(|role| matches!(role, Role::Texture { .. }))
 }
 
 /// How many cases a class has.
