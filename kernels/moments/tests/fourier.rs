@@ -45,11 +45,11 @@ fn sums_are_those_of_the_series() {
             };
             for (d, w) in depths {
                 let harmonics = OddHarmonics::<f64>::of_depth(d)[group];
-                for k in 0..4 {
+                for (k, weight) in weights.into_iter().enumerate() {
                     mean.cos[k] += w * harmonics.cos[k];
                     mean.sin[k] += w * harmonics.sin[k];
                     let angle = frequency(4 * group + k + 1) * (d - z);
-                    series += w * weights[k] * angle.sin();
+                    series += w * weight * angle.sin();
                 }
             }
             sum += query.sum(mean, weights);
