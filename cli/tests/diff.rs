@@ -113,7 +113,7 @@ fn a_scene_by_both_builds_is_compared() {
     let manifest = desk.read("one/manifest.json");
     desk.write(
         "one/manifest.json",
-        &manifest.replacen("\"binding\": 0", "\"binding\": 9", 1),
+        manifest.replacen("\"binding\": 0", "\"binding\": 9", 1),
     );
     desk.hankel("diff one two --scene s.toml --out p.png")
         .fails(2, &["one", "shade_hamburger", "binding: 9 -> 0"]);

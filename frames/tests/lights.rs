@@ -151,25 +151,8 @@ fn every_technique_of_hard_shadows_shades_from_a_lamp() {
                     map.format.name(),
                     map.depth_range.name()
                 );
+                // `frames/tests/soft.rs` has those.
                 if t.is_soft {
-                    let text = format!(
-                        "[geometry]\nprocedural = 'box'\n[camera]\neye = [1, 1, 1]\n\
-                         target = [0, 0, 0]\n{LAMP}{shadow}\n"
-                    );
-                    let error = Scene::parse(&text, Path::new("test.toml")).unwrap_err();
-                    let error = error.to_string();
-                    assert!(error.contains("light.position"), "{error}");
-                    assert!(error.contains(t.name) && error.contains("hard"), "{error}");
-                    // Also where the technique is chosen later.
-                    let mut chosen = one.clone();
-                    chosen.shadow.technique = t;
-                    let error = graph_of(&chosen, &mesh, Show::Light)
-                        .unwrap_err()
-                        .to_string();
-                    assert!(
-                        error.contains("light 1") && error.contains(t.name),
-                        "{error}"
-                    );
                     continue;
                 }
                 let (scene, mesh) = scene("box", LAMP, &shadow);

@@ -235,9 +235,9 @@ pub fn set_constants(kernel: &mut Kernel, values: &[u32]) -> BTreeMap<String, u3
 ///
 /// The edge and hostile ones of an author's function have its lengths, sizes and integers, which belong
 /// together; their floats are edge and hostile ones by the attributes.
-/// Those of a kernel that samples textures come from the attributes alone: textures have sizes of their
-/// own, and what a map of one size holds at edge coordinates is compared with depths that lie on it to
-/// the last bit.
+/// Where nothing belongs together, in a map over rows of floats, they come from the attributes alone and are
+/// as many as those say. So do those of a kernel that reads textures: these have sizes of their own, and
+/// what a map of one size holds at edge coordinates is compared with depths that lie on it to the last bit.
 ///
 /// # Errors
 /// See [`InputError`].
@@ -263,7 +263,7 @@ pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError>
         let rng = Rng::with_seed(mixed(kernel, seed) ^ ((i as u64) << 40));
         all.push(case(kernel, Class::Ordinary, rng, Some(given))?);
     }
-    if samples(kernel) {
+    if !is_tied(kernel) {
         let made = cases(kernel, seed)?;
         all.extend(made.into_iter().filter(|c| c.class != Class::Ordinary));
         return Ok(all);
@@ -280,10 +280,27 @@ pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError>
     Ok(all)
 }
 
-/// Whether a kernel reads textures, with a sampler or without.
-fn samples(kernel: &Kernel) -> bool {
-    let mut roles = kernel.params.iter().map(|p| &p.role);
-    roles.any(|role| matches!(role, Role::Texture { .. }))
+/// Whether a kernel has integers, or buffers and images with a length of their own, and reads no texture.
+fn is_tied(kernel: &Kernel) -> bool {
+    let slots = slots::slots(kernel);
+    let has_integers = |layout: &Layout| {
+        let leaves = flat::leaves(layout);
+        let mut scalars = leaves.iter().map(|leaf| leaf.scalar);
+        scalars.any(|scalar| !matches!(scalar, Scalar::F32 | Scalar::F64))
+    };
+    let tied = slots.iter().any(|slot| match slot.role {
+        Use::Storage(_)
+        | Use::StorageMut { .. }
+        | Use::StorageTexture { .. }
+        | Use::Atomic { .. } => true,
+        Use::Uniform(layout) | Use::Element(layout) | Use::ElementMut(layout) => {
+            has_integers(layout)
+        }
+        _ => false,
+    });
+    tied && !slots
+        .iter()
+        .any(|slot| matches!(slot.role, Use::Texture(_)))
 }
 
 /// How many cases a class has.

@@ -136,7 +136,7 @@ fn of_bound(
         })
         .collect();
     for direction in 0..=2 * n + 1 {
-        let (there, back, twice) = difference(n, m, eta, direction, &at);
+        let (there, back, twice) = difference(n, m, eta, direction, at);
         let rounded = if direction <= 2 * n {
             rounding.of_moment(row.m[direction])
         } else {

@@ -1,6 +1,6 @@
 //! The pictures of two builds: a scene rendered with the SPIR-V of either.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ use crate::args::{Diff, Format};
 use crate::commands::scene::{beside, files, is_exr, save};
 use crate::failure::{Failure, Result};
 use crate::progress::Progress;
-use crate::session::Session;
+use crate::session::{Session, Words};
 
 /// A scene by the shaders of either build.
 #[derive(Serialize)]
@@ -69,7 +69,7 @@ pub fn pictures(args: &Diff, quiet: bool) -> Result<Option<Pictures>> {
     let session = Session::linked(quiet);
     let own = own(&session, &scene)?;
     let all = session.all_words()?;
-    let with = |folder: &Path| -> Result<(BTreeMap<String, Vec<u32>>, BTreeSet<String>)> {
+    let with = |folder: &Path| -> Result<(Words, BTreeSet<String>)> {
         let kernels = usable(folder, &own)?;
         let mut words = all.clone();
         for kernel in &kernels {
