@@ -884,14 +884,6 @@ fn like(
             }
             Input::Bytes(made)
         }
-        Input::Texture { shape, .. }
-            if is_input(&slot.role) && shape.format.texel().numbers() == Channels::Float =>
-        {
-            Input::Texture {
-                shape: *shape,
-                bytes: values.texels(said, shape)?,
-            }
-        }
         Input::Texture { .. } | Input::Sampler(_) => own.clone(),
     })
 }
