@@ -16,10 +16,8 @@ use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Element, Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{OddHarmonics, fourier_light};
 
-use crate::depth::Transform;
-use crate::mips::{Raster, View};
 use crate::resolve::mean;
-use crate::shade::{Light, shade_with};
+use crate::shade::Light;
 
 /// What each term counts for.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -104,277 +102,118 @@ fn high(z: f32) -> Terms {
 
 /// The shadow of a receiver's depth from 0 to 1, by four terms.
 #[inline(always)]
-pub(crate) fn shadow_4(series: &Series, terms: Terms, z: f32) -> f32 {
+fn shadow_4(_: &Light, series: &Series, cosines: Vec4, sines: Vec4, z: f32) -> f32 {
     let [low, _] = OddHarmonics::of_depth(z);
+    let terms = Terms { cosines, sines };
     1.0 - fourier_light(terms.sum(series.low, low))
 }
 
 /// The same by eight.
 #[inline(always)]
-pub(crate) fn shadow_8(series: &Series, terms: [Terms; 2], z: f32) -> f32 {
+fn shadow_8(
+    _: &Light,
+    series: &Series,
+    cosines: Vec4,
+    sines: Vec4,
+    high_cosines: Vec4,
+    high_sines: Vec4,
+    z: f32,
+) -> f32 {
     let [low, high] = OddHarmonics::of_depth(z);
-    let [first, second] = terms;
+    let first = Terms { cosines, sines };
+    let second = Terms {
+        cosines: high_cosines,
+        sines: high_sines,
+    };
     1.0 - fourier_light(first.sum(series.low, low) + second.sum(series.high, high))
 }
 
-/// Means of a texel's cosines and sines of four terms, in 8 bits.
-#[kernel(
-    compute,
-    threads(8, 8),
-    outputs(rgba8unorm, rgba8unorm),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-3,
-        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_convolution_rgba8unorm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4) {
-    let terms = mean(depth, at, samples, low);
-    (terms.cosines, terms.sines)
+/// Resolves to textures of one format; drivers may round a tie either way.
+macro_rules! resolves {
+    ($format:ident, $step:literal, $why:literal;
+     $(#[$doc:meta])* $four:ident,
+     $(#[$doc_8:meta])* $eight:ident) => {
+        $(#[$doc])*
+        #[kernel(
+            compute,
+            threads(8, 8),
+            outputs($format, $format),
+            inputs = crate::inputs::maps::depths,
+            parity(ulp = 0, absolute = $step, why = $why)
+        )]
+        pub fn $four(
+            #[index] at: UVec2,
+            #[constant(id = 0, default = 4)]
+            #[values(1, 4)]
+            samples: u32,
+            #[texture] depth: Texture2dMultisampled<'_>,
+        ) -> (Vec4, Vec4) {
+            let terms = mean(depth, at, samples, low);
+            (terms.cosines, terms.sines)
+        }
+
+        $(#[$doc_8])*
+        #[kernel(
+            compute,
+            threads(8, 8),
+            outputs($format, $format, $format, $format),
+            inputs = crate::inputs::maps::depths,
+            parity(ulp = 0, absolute = $step, why = $why)
+        )]
+        pub fn $eight(
+            #[index] at: UVec2,
+            #[constant(id = 0, default = 4)]
+            #[values(1, 4)]
+            samples: u32,
+            #[texture] depth: Texture2dMultisampled<'_>,
+        ) -> (Vec4, Vec4, Vec4, Vec4) {
+            let first = mean(depth, at, samples, low);
+            let second = mean(depth, at, samples, high);
+            (first.cosines, first.sines, second.cosines, second.sines)
+        }
+    };
 }
 
-/// Means of a texel's cosines and sines of four terms, in 16 bits.
-#[kernel(
-    compute,
-    threads(8, 8),
-    outputs(rgba16unorm, rgba16unorm),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_convolution_rgba16unorm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4) {
-    let terms = mean(depth, at, samples, low);
-    (terms.cosines, terms.sines)
+resolves! {
+    rgba8unorm, 4e-3,
+    "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step";
+    /// Means of a texel's cosines and sines of four terms, in 8 bits.
+    resolve_convolution_rgba8unorm,
+    /// Means of a texel's cosines and sines of eight terms, in 8 bits: of terms 1 to 4, then of terms 5 to 8.
+    resolve_convolution_8_rgba8unorm
 }
 
-/// Means of a texel's cosines and sines of eight terms, in 8 bits: of terms 1 to 4, then of terms 5 to 8.
-#[kernel(
-    compute,
-    threads(8, 8),
-    outputs(rgba8unorm, rgba8unorm, rgba8unorm, rgba8unorm),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-3,
-        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_convolution_8_rgba8unorm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4, Vec4, Vec4) {
-    let first = mean(depth, at, samples, low);
-    let second = mean(depth, at, samples, high);
-    (first.cosines, first.sines, second.cosines, second.sines)
+resolves! {
+    rgba16unorm, 1.6e-5,
+    "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step";
+    /// Means of a texel's cosines and sines of four terms, in 16 bits.
+    resolve_convolution_rgba16unorm,
+    /// Means of a texel's cosines and sines of eight terms, in 16 bits: of terms 1 to 4, then of terms 5 to 8.
+    resolve_convolution_8_rgba16unorm
 }
 
-/// Means of a texel's cosines and sines of eight terms, in 16 bits: of terms 1 to 4, then of terms 5 to 8.
-#[kernel(
-    compute,
-    threads(8, 8),
-    outputs(rgba16unorm, rgba16unorm, rgba16unorm, rgba16unorm),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_convolution_8_rgba16unorm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4, Vec4, Vec4) {
-    let first = mean(depth, at, samples, low);
-    let second = mean(depth, at, samples, high);
-    (first.cosines, first.sines, second.cosines, second.sines)
-}
-
-/// Shading with convolution shadow mapping, by four terms.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded_convolution,
+shading! {
+    /// Shading with convolution shadow mapping, by four terms.
+    shade_convolution,
+    /// Shading with convolution shadow mapping, by four terms, with mip levels.
+    shade_convolution_mips,
+    shadow_4(cosines, sines), inputs(shaded_convolution), uniforms(series: &Series), constants(),
     parity(
         ulp = 0,
         absolute = 5e-5,
         why = "the depth in the light's view is rounded, by up to 3e-7, and the steepest slope of four terms is 16; drivers may contract products and sums: each of 8 products of numbers up to 1 with weights that add up to 1.1, doubled, is off by up to 4e-6; the light's strength is 2.5"
     )
-)]
-pub fn shade_convolution(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] series: &Series,
-    #[texture] cosines: Texture2d<'_>,
-    #[texture] sines: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        let terms = Terms {
-            cosines: cosines.sample_level(sampler, uv, 0.0),
-            sines: sines.sample_level(sampler, uv, 0.0),
-        };
-        shadow_4(series, terms, z)
-    })
 }
 
-/// Shading with convolution shadow mapping, by eight terms.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded_convolution_8,
+shading! {
+    /// Shading with convolution shadow mapping, by eight terms.
+    shade_convolution_8,
+    /// Shading with convolution shadow mapping, by eight terms, with mip levels.
+    shade_convolution_8_mips,
+    shadow_8(cosines, sines, high_cosines, high_sines), inputs(shaded_convolution_8), uniforms(series: &Series), constants(),
     parity(
         ulp = 0,
         absolute = 1e-4,
         why = "the depth in the light's view is rounded, by up to 3e-7, and the steepest slope of eight terms is 32; drivers may contract products and sums: each of 16 products of numbers up to 1 with weights that add up to 1.3, doubled, is off by up to 8e-6; the light's strength is 2.5"
     )
-)]
-pub fn shade_convolution_8(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] series: &Series,
-    #[texture] cosines: Texture2d<'_>,
-    #[texture] sines: Texture2d<'_>,
-    #[texture] high_cosines: Texture2d<'_>,
-    #[texture] high_sines: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        let first = Terms {
-            cosines: cosines.sample_level(sampler, uv, 0.0),
-            sines: sines.sample_level(sampler, uv, 0.0),
-        };
-        let second = Terms {
-            cosines: high_cosines.sample_level(sampler, uv, 0.0),
-            sines: high_sines.sample_level(sampler, uv, 0.0),
-        };
-        shadow_8(series, [first, second], z)
-    })
-}
-
-/// Shading with convolution shadow mapping, by four terms, with mip levels.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::mips::shaded_convolution,
-    parity(
-        ulp = 0,
-        absolute = 5e-5,
-        why = "the depth in the light's view is rounded, by up to 3e-7, and the steepest slope of four terms is 16; drivers may contract products and sums: each of 8 products of numbers up to 1 with weights that add up to 1.1, doubled, is off by up to 4e-6; the light's strength is 2.5"
-    )
-)]
-pub fn shade_convolution_mips(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[varying]
-    #[unit_vector]
-    plane: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] camera: &Transform,
-    #[uniform] raster: &Raster,
-    #[uniform] series: &Series,
-    #[texture] cosines: Texture2d<'_>,
-    #[texture] sines: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-) -> Vec4 {
-    let view = View {
-        light,
-        camera,
-        raster,
-        size: cosines.size(),
-    };
-    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
-        let terms = Terms {
-            cosines: footprint.mean(uv, |uv, level| cosines.sample_level(sampler, uv, level)),
-            sines: footprint.mean(uv, |uv, level| sines.sample_level(sampler, uv, level)),
-        };
-        shadow_4(series, terms, z)
-    })
-}
-
-/// Shading with convolution shadow mapping, by eight terms, with mip levels.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::mips::shaded_convolution_8,
-    parity(
-        ulp = 0,
-        absolute = 1e-4,
-        why = "the depth in the light's view is rounded, by up to 3e-7, and the steepest slope of eight terms is 32; drivers may contract products and sums: each of 16 products of numbers up to 1 with weights that add up to 1.3, doubled, is off by up to 8e-6; the light's strength is 2.5"
-    )
-)]
-pub fn shade_convolution_8_mips(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[varying]
-    #[unit_vector]
-    plane: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] camera: &Transform,
-    #[uniform] raster: &Raster,
-    #[uniform] series: &Series,
-    #[texture] cosines: Texture2d<'_>,
-    #[texture] sines: Texture2d<'_>,
-    #[texture] high_cosines: Texture2d<'_>,
-    #[texture] high_sines: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-) -> Vec4 {
-    let view = View {
-        light,
-        camera,
-        raster,
-        size: cosines.size(),
-    };
-    view.light_up(world, normal, colour, plane, |footprint, uv, z| {
-        let first = Terms {
-            cosines: footprint.mean(uv, |uv, level| cosines.sample_level(sampler, uv, level)),
-            sines: footprint.mean(uv, |uv, level| sines.sample_level(sampler, uv, level)),
-        };
-        let second = Terms {
-            cosines: footprint.mean(uv, |uv, level| {
-                high_cosines.sample_level(sampler, uv, level)
-            }),
-            sines: footprint.mean(uv, |uv, level| high_sines.sample_level(sampler, uv, level)),
-        };
-        shadow_8(series, [first, second], z)
-    })
 }

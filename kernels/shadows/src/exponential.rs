@@ -13,7 +13,7 @@ use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kerne
 use hankel_moments::{markov_1, warped_2};
 
 use crate::resolve::mean;
-use crate::shade::{Light, shade_with};
+use crate::shade::Light;
 
 /// Exponents of the two warps of exponential variance shadow maps, for depths moved to [-1, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -96,80 +96,45 @@ pub fn resolve_evsm(
     })
 }
 
-/// Shading with exponential shadow mapping.
-#[kernel(
-    fragment,
-    pinned,
-    inputs = crate::inputs::maps::shaded_exponential
-)]
-pub fn shade_esm(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform]
-    #[range(1.0..=80.0)]
-    exponent: &f32,
-    #[texture] map: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        exponential_shadow(*exponent, map.sample_level(sampler, uv, 0.0), z)
-    })
+shading! {
+    /// Shading with exponential shadow mapping.
+    shade_esm,
+    /// Shading with exponential shadow mapping, with mip levels.
+    shade_esm_mips,
+    exponential_shadow(map), inputs(shaded_exponential), uniforms(
+        #[range(1.0..=80.0)]
+        exponent: &f32
+    ), constants(),
+    pinned
 }
 
 /// The least shadow that the mean of exponentials allows for a receiver's depth from 0 to 1.
 #[inline(always)]
-pub(crate) fn exponential_shadow(exponent: f32, texel: Vec4, z: f32) -> f32 {
-    markov_1(texel.x, exponential(exponent, z))
+fn exponential_shadow(_: &Light, exponent: &f32, texel: Vec4, z: f32) -> f32 {
+    markov_1(texel.x, exponential(*exponent, z))
 }
 
-/// Shading with exponential variance shadow mapping, by the warp that grows with depth or by both: the
-/// larger of two lower bounds is one, too.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded_warps,
+shading! {
+    /// Shading with exponential variance shadow mapping, by the warp that grows with depth or by both: the
+    /// larger of two lower bounds is one, too.
+    shade_evsm,
+    /// Shading with exponential variance shadow mapping, with mip levels.
+    shade_evsm_mips,
+    warped_shadow(map), inputs(shaded_warps), uniforms(exponents: &Exponents), constants(
+        #[constant(id = 0, default = 2)]
+        #[values(1, 2)]
+        warps: u32
+    ),
     parity(
         ulp = 0,
         absolute = 5e-3,
         why = "the depth in the light's view is rounded, by up to 3e-7, and a warp 40 times as much; the bound's steepest slope with a relative variance of 1.6e-5 is 0.65 / 4e-3, and the light's strength is 2.5"
     )
-)]
-pub fn shade_evsm(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] exponents: &Exponents,
-    #[texture] map: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)]
-    #[values(1, 2)]
-    warps: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        let texel = map.sample_level(sampler, uv, 0.0);
-        warped_shadow(light, exponents, texel, z, warps)
-    })
 }
 
 /// The least shadow that a texel's warps allow for a receiver's depth from 0 to 1.
 #[inline(always)]
-pub(crate) fn warped_shadow(
-    light: &Light,
-    exponents: &Exponents,
-    texel: Vec4,
-    z: f32,
-    warps: u32,
-) -> f32 {
+fn warped_shadow(light: &Light, exponents: &Exponents, texel: Vec4, z: f32, warps: u32) -> f32 {
     let (positive, negative) = exponents.warp(z);
     let (nearer, _) = warped_2(texel.x, texel.y, positive, light.moment_bias);
     if warps == 1 {

@@ -14,10 +14,8 @@ use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{MAX_MOMENTS, bias_target, bound, mix_bias};
 
-use crate::depth::Transform;
-use crate::mips::{Raster, View};
 use crate::resolve::mean;
-use crate::shade::{Light, shade_with};
+use crate::shade::Light;
 
 /// A texel of each texture.
 #[derive(Clone, Copy)]
@@ -151,130 +149,54 @@ fn shadow_10(light: &Light, odd: Vec4, even: Vec4, last: Vec4, z: f32) -> f32 {
     shadow::<5>(light, m, z)
 }
 
-/// Shading for one number of moments, and the same with mip levels.
-macro_rules! shading {
-    (
-        $of:ident($first:ident $(, $map:ident)*), $inputs:ident, parity($($parity:tt)*);
-        $(#[$doc:meta])* $shade:ident,
-        $(#[$mips_doc:meta])* $mips:ident
-    ) => {
-        $(#[$doc])*
-        #[kernel(
-            fragment,
-            pinned,
-            inputs = crate::inputs::maps::$inputs,
-            parity($($parity)*)
-        )]
-        pub fn $shade(
-            #[varying] world: Vec3,
-            #[varying]
-            #[unit_vector]
-            normal: Vec3,
-            #[varying]
-            #[range(0.0..=1.0)]
-            colour: Vec3,
-            #[uniform] light: &Light,
-            #[texture] $first: Texture2d<'_>,
-            $(#[texture] $map: Texture2d<'_>,)*
-            #[sampler] sampler: Sampler,
-        ) -> Vec4 {
-            shade_with(light, world, normal, colour, |uv, z| {
-                $of(
-                    light,
-                    $first.sample_level(sampler, uv, 0.0),
-                    $($map.sample_level(sampler, uv, 0.0),)*
-                    z,
-                )
-            })
-        }
-
-        $(#[$mips_doc])*
-        #[kernel(
-            fragment,
-            pinned,
-            inputs = crate::inputs::mips::$inputs,
-            parity($($parity)*)
-        )]
-        pub fn $mips(
-            #[varying] world: Vec3,
-            #[varying]
-            #[unit_vector]
-            normal: Vec3,
-            #[varying]
-            #[range(0.0..=1.0)]
-            colour: Vec3,
-            #[varying]
-            #[unit_vector]
-            plane: Vec3,
-            #[uniform] light: &Light,
-            #[uniform] camera: &Transform,
-            #[uniform] raster: &Raster,
-            #[texture] $first: Texture2d<'_>,
-            $(#[texture] $map: Texture2d<'_>,)*
-            #[sampler] sampler: Sampler,
-        ) -> Vec4 {
-            let view = View {
-                light,
-                camera,
-                raster,
-                size: $first.size(),
-            };
-            view.light_up(world, normal, colour, plane, |footprint, uv, z| {
-                $of(
-                    light,
-                    footprint.mean(uv, |uv, level| $first.sample_level(sampler, uv, level)),
-                    $(footprint.mean(uv, |uv, level| $map.sample_level(sampler, uv, level)),)*
-                    z,
-                )
-            })
-        }
-    };
-}
-
 shading! {
-    shadow_4(map), moments_4, parity(
-        ulp = 0,
-        absolute = 2e-3,
-        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-7, the bound's steepest slope is 2600, and the light's strength is 2.5"
-    );
     /// Shading with the least shadow that four moments allow.
     shade_moments_4,
     /// Shading with the least shadow that four moments allow, with mip levels.
-    shade_moments_4_mips
+    shade_moments_4_mips,
+    shadow_4(map), inputs(moments_4), uniforms(), constants(),
+    pinned, parity(
+        ulp = 0,
+        absolute = 2e-3,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-7, the bound's steepest slope is 2600, and the light's strength is 2.5"
+    )
 }
 
 shading! {
-    shadow_6(first, second), moments_6, parity(
-        ulp = 0,
-        absolute = 1.7e-3,
-        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-6, the bound's steepest slope is 2200, and the light's strength is 2.5"
-    );
     /// Shading with the least shadow that six moments allow.
     shade_moments_6,
     /// Shading with the least shadow that six moments allow, with mip levels.
-    shade_moments_6_mips
+    shade_moments_6_mips,
+    shadow_6(first, second), inputs(moments_6), uniforms(), constants(),
+    pinned, parity(
+        ulp = 0,
+        absolute = 1.7e-3,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-6, the bound's steepest slope is 2200, and the light's strength is 2.5"
+    )
 }
 
 shading! {
-    shadow_8(first, second), moments_8, parity(
-        ulp = 0,
-        absolute = 8e-4,
-        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-5, the bound's steepest slope is 1000, and the light's strength is 2.5"
-    );
     /// Shading with the least shadow that eight moments allow.
     shade_moments_8,
     /// Shading with the least shadow that eight moments allow, with mip levels.
-    shade_moments_8_mips
+    shade_moments_8_mips,
+    shadow_8(first, second), inputs(moments_8), uniforms(), constants(),
+    pinned, parity(
+        ulp = 0,
+        absolute = 8e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 5e-5, the bound's steepest slope is 1000, and the light's strength is 2.5"
+    )
 }
 
 shading! {
-    shadow_10(first, second, third), moments_10, parity(
-        ulp = 0,
-        absolute = 5e-4,
-        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 1.5e-4, the bound's steepest slope is 640, and the light's strength is 2.5"
-    );
     /// Shading with the least shadow that ten moments allow.
     shade_moments_10,
     /// Shading with the least shadow that ten moments allow, with mip levels.
-    shade_moments_10_mips
+    shade_moments_10_mips,
+    shadow_10(first, second, third), inputs(moments_10), uniforms(), constants(),
+    pinned, parity(
+        ulp = 0,
+        absolute = 5e-4,
+        why = "the depth in the light's view is rounded, by up to 3e-7 of the range from -1 to 1; behind a single surface with the least bias, 1.5e-4, the bound's steepest slope is 640, and the light's strength is 2.5"
+    )
 }

@@ -255,95 +255,56 @@ pub(crate) fn variance_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> f
     variance_2(m.b1, m.b2, in_range(z, how), light.moment_bias)
 }
 
-/// Shading with Hamburger four moment shadow mapping.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded,
+shading! {
+    /// Shading with Hamburger four moment shadow mapping.
+    shade_hamburger,
+    /// Shading with Hamburger four moment shadow mapping, with mip levels.
+    shade_hamburger_mips,
+    hamburger_shadow(map), inputs(shaded), uniforms(), constants(
+        #[constant(id = 0, default = 2)]
+        #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+        encoding: u32
+    ),
     parity(
         ulp = 0,
         absolute = 5e-4,
         why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
     )
-)]
-pub fn shade_hamburger(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] map: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)]
-    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
-    encoding: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        hamburger_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
-    })
 }
 
-/// Shading with Hausdorff four moment shadow mapping.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded,
+shading! {
+    /// Shading with Hausdorff four moment shadow mapping.
+    shade_hausdorff,
+    /// Shading with Hausdorff four moment shadow mapping, with mip levels.
+    shade_hausdorff_mips,
+    hausdorff_shadow(map), inputs(shaded), uniforms(), constants(
+        #[constant(id = 0, default = 2)]
+        #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+        encoding: u32
+    ),
     parity(
         ulp = 0,
         absolute = 5e-4,
         why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
     )
-)]
-pub fn shade_hausdorff(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] map: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)]
-    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
-    encoding: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        hausdorff_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
-    })
 }
 
-/// Shading with variance shadow mapping, from the first two of four moments. The moments are as they
-/// are: against rounding, `moment_bias` is the least variance.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded,
+shading! {
+    /// Shading with variance shadow mapping, from the first two of four moments. The moments are as they
+    /// are: against rounding, `moment_bias` is the least variance.
+    shade_variance,
+    /// Shading with variance shadow mapping, with mip levels.
+    shade_variance_mips,
+    variance_shadow(map), inputs(shaded), uniforms(), constants(
+        #[constant(id = 0, default = 2)]
+        #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
+        encoding: u32
+    ),
     parity(
         ulp = 0,
         absolute = 5e-4,
         why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
     )
-)]
-pub fn shade_variance(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] map: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)]
-    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
-    encoding: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        variance_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
-    })
 }
 
 /// The mean of what `compare` gives for the texels of a square around a place in a map.

@@ -16,7 +16,7 @@ use hankel_moments::{
 
 use crate::bounds::Shadow;
 use crate::resolve::mean;
-use crate::shade::{Light, encoding, shade_with};
+use crate::shade::{Light, encoding};
 
 /// How six moments are turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -166,39 +166,23 @@ pub fn resolve_plain_6(
     (texels.first, texels.second)
 }
 
-/// Shading with Hamburger six moment shadow mapping. `target` is the moment vector that the bias mixes in;
-/// the light's own is for four.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded_6,
+shading! {
+    /// Shading with Hamburger six moment shadow mapping. `target` is the moment vector that the bias mixes in;
+    /// the light's own is for four.
+    shade_hamburger_6,
+    /// Shading with Hamburger six moment shadow mapping, with mip levels. `target` is the moment vector that the bias
+    /// mixes in; the light's own is for four.
+    shade_hamburger_6_mips,
+    hamburger_6_shadow(first, second), inputs(shaded_6), uniforms(target: &Moments6<f32>), constants(
+        #[constant(id = 0, default = 2)]
+        #[values(encoding::PLAIN, encoding::SYMMETRIC)]
+        encoding: u32
+    ),
     parity(
         ulp = 0,
         absolute = 4e-4,
         why = "the depth in the light's view is rounded, by up to 3e-7; with the least bias, 5e-6, the bound's steepest slope is 0.65 over a deviation of 1.5e-3, and the light's strength is 2.5"
     )
-)]
-pub fn shade_hamburger_6(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] target: &Moments6<f32>,
-    #[texture] first: Texture2d<'_>,
-    #[texture] second: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 2)]
-    #[values(encoding::PLAIN, encoding::SYMMETRIC)]
-    encoding: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        let odd = first.sample_level(sampler, uv, 0.0);
-        let even = second.sample_level(sampler, uv, 0.0);
-        hamburger_6_shadow(light, target, odd, even, z, encoding)
-    })
 }
 
 /// The least shadow that six moments allow for a receiver's depth from 0 to 1, of a texel of each texture.

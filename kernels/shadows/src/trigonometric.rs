@@ -6,7 +6,7 @@ use hankel_moments::{HalfAngle, TrigonometricMoments, cut_leak, trigonometric_4}
 
 use crate::bounds::Shadow;
 use crate::resolve::mean;
-use crate::shade::{Light, shade_with};
+use crate::shade::Light;
 
 /// How a map holds trigonometric moments: values of the specialisation constant `encoding`.
 pub mod encoding {
@@ -134,34 +134,21 @@ pub fn resolve_trigonometric_unorm(
     mean(depth, at, samples, |z| moments(z) * 0.5 + Vec4::splat(0.5))
 }
 
-/// Shading with trigonometric moment shadow mapping.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::shaded_trigonometric,
+shading! {
+    /// Shading with trigonometric moment shadow mapping.
+    shade_trigonometric,
+    /// Shading with trigonometric moment shadow mapping, with mip levels.
+    shade_trigonometric_mips,
+    trigonometric_shadow(map), inputs(shaded_trigonometric), uniforms(), constants(
+        #[constant(id = 0, default = 1)]
+        #[values(encoding::PLAIN, encoding::UNORM)]
+        encoding: u32
+    ),
     parity(
         ulp = 0,
         absolute = 4e-3,
         why = "the depth in the light's view is rounded, by up to 1.5e-7; with the least bias, 4e-7, the bound's steepest slope is 0.65 over a deviation of 4.5e-4 on the circle, 7.1e-5 in depth, and the light's strength is 2.5"
     )
-)]
-pub fn shade_trigonometric(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] map: Texture2d<'_>,
-    #[sampler] sampler: Sampler,
-    #[constant(id = 0, default = 1)]
-    #[values(encoding::PLAIN, encoding::UNORM)]
-    encoding: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        trigonometric_shadow(light, map.sample_level(sampler, uv, 0.0), z, encoding)
-    })
 }
 
 /// The least shadow that a texel's moments allow for a receiver's depth from 0 to 1.
