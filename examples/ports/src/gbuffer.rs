@@ -1,10 +1,5 @@
 //! A G-buffer: what a deferred renderer needs of each pixel, in four targets, one of integers.
 
-#![expect(
-    clippy::too_many_arguments,
-    reason = "the parameters of a kernel are what is bound to it"
-)]
-
 use hankel_dsl::glam::{Vec2, Vec3, Vec4};
 use hankel_dsl::{Element, Flat, Real, Sampler, Texture2d, kernel};
 

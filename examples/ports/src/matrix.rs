@@ -1,10 +1,5 @@
 //! The product of two matrices, tile by tile through workgroup memory.
 
-#![expect(
-    clippy::too_many_arguments,
-    reason = "the parameters of a kernel are what is bound to it"
-)]
-
 use hankel_dsl::glam::UVec2;
 use hankel_dsl::{Buffer, Element, Shared, barrier, kernel};
 

@@ -9,11 +9,6 @@
 //! 3. `sort_scatter`: each block is sorted in workgroup memory, and its runs of equal digits go to their
 //!    places.
 
-#![expect(
-    clippy::too_many_arguments,
-    reason = "the parameters of a kernel are what is bound to it"
-)]
-
 use hankel_dsl::{
     Buffer, Element, Shared, SharedAtomics, StorageMut, barrier, cooperative, kernel,
 };

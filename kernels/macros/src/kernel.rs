@@ -693,6 +693,7 @@ impl Kernel {
         let unused = (self.form() == Form::Cooperative).then(|| quote!(#[allow(dead_code)]));
         quote! {
             #[inline(always)]
+            #[allow(clippy::too_many_arguments, reason = "the parameters of a kernel are what is bound to it")]
             #unused
             #item
 

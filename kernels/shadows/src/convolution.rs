@@ -5,11 +5,6 @@
 //! four terms. Comparisons are as wide as the terms leave them: unlike a bound, the shadow is too dark at some
 //! places and too light at others.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};

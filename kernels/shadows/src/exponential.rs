@@ -3,11 +3,6 @@
 //! The warps are computed by [`math`]: the same bits on every device, so that a map and what is compared
 //! with it agree. They are taken of each sample's depth, and then filtered.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel, math};
 use hankel_moments::{markov_1, warped_2};

@@ -8,11 +8,6 @@
 //! pixels: they are the same on every device, and where a triangle ends, too. Places are sampled one by one,
 //! because which ones a sampler takes for an anisotropic lookup is up to the device.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Texture2d, kernel, math};
 

@@ -3,11 +3,6 @@
 //! textures as they need: four in one; of more, odd ones in the first and even ones in the second, the ninth and
 //! the tenth in a third.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};

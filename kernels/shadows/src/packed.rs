@@ -3,11 +3,6 @@
 //! all. No sampler filters integers, so lookup mixes four texels itself; and every device of WebGPU can
 //! write them, unlike textures of 16-bit channels.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use hankel_dsl::glam::{IVec2, UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{Buffer, Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
 use hankel_moments::{

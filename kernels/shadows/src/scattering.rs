@@ -10,11 +10,6 @@
 //! Prefiltered single scattering turns the map into coordinates in which rays from the camera are rows (see
 //! [`hankel_moments::rectified_bounds`]). Then a mean over a row's first texels is an integral along rays.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{
     Buffer, Element, Real, Shared, StorageMut, Texture2d, Texture2dMultisampled, barrier, kernel,

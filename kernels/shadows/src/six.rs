@@ -1,11 +1,6 @@
 //! Six moment shadow mapping: as a map over rows of moments, and from depths to shading. Six moments lie in
 //! two textures, whose fourth channels are not used: the odd ones in the first, the even ones in the second.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};

@@ -9,11 +9,6 @@
 //! w (D_r - D_b) / D_b on the receiver, and w (1 / D_b - 1 / D_r) as seen from the light. Penumbrae are
 //! therefore as wide as their blockers are far, without a division.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
     Buffer, Element, Real, Shared, StorageMut, Texture2dMultisampled, barrier, kernel, to_i32,

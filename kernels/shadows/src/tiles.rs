@@ -6,11 +6,6 @@
 //! A list of the other tiles, and how many there are, stays on the device: passes over listed tiles run
 //! as far as it says.
 
-#![expect(
-    clippy::too_many_arguments,
-    reason = "the parameters of a kernel are what is bound to it"
-)]
-
 use hankel_dsl::format::Rgba16Unorm;
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{

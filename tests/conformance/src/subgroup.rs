@@ -1,11 +1,6 @@
 //! Subgroups: votes, exchange, reductions, scans, quads; kernels whose results depend on their size,
 //! and such that do not.
 
-#![allow(
-    clippy::too_many_arguments,
-    reason = "a kernel's parameters are its bindings"
-)]
-
 use hankel_dsl::glam::{IVec2, UVec4, Vec2, Vec4};
 use hankel_dsl::{
     Shared, StorageMut, barrier, cooperative, kernel, quad_broadcast, quad_swap_diagonal,
