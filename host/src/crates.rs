@@ -42,16 +42,26 @@ pub enum Native<'a> {
 }
 
 impl Native<'_> {
+    /// How cargo is to optimise the crate and what it depends on.
+    const fn profile(self) -> &'static [&'static str] {
+        match self {
+            // Descriptions are made once: there is nothing to optimise, least of all in the mathematics that
+            // an edit compiles again. A profile of its own: settings of `release` for single packages would stay.
+            Self::Descriptions => &[
+                "--profile=describe",
+                "--config=profile.describe.inherits='dev'",
+                "--config=profile.describe.debug=0",
+            ],
+            Self::Of(_) | Self::Checked(_) | Self::All => &["--release"],
+        }
+    }
+
     /// rustc's flags for the crate itself.
     fn flags(self) -> Vec<OsString> {
         let mut flags = vec![OsString::from("--cfg"), "hankel_plugin".into()];
         let names = match self {
             Native::All => return flags,
-            // Descriptions are made once: there is nothing to optimise.
-            Native::Descriptions => {
-                flags.push("-Copt-level=0".into());
-                &[]
-            }
+            Native::Descriptions => &[],
             Native::Of(names) => names,
             Native::Checked(names) => {
                 flags.push("-Coverflow-checks=on".into());
@@ -447,7 +457,8 @@ impl Package {
         let target_dir = self.target_dir.join("hankel").join("native");
         let mut command = cargo();
         command
-            .args(["rustc", "--lib", "--release", "--crate-type", "cdylib"])
+            .args(["rustc", "--lib", "--crate-type", "cdylib"])
+            .args(native.profile())
             .args(["--message-format", "json", "--manifest-path"])
             .arg(&self.manifest)
             .arg("--target-dir")

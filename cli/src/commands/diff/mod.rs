@@ -3,9 +3,12 @@ mod numbers;
 mod pictures;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use hankel_codegen::Language;
-use hankel_codegen::diff::{Item, compare};
+use hankel_codegen::diff::{Item, compare, spirv};
+use hankel_codegen::finish::validate;
+use hankel_codegen::spirv::words;
 use hankel_host::parity::numbers::Found;
 use serde::Serialize;
 
@@ -81,4 +84,12 @@ pub fn run(args: &Diff, quiet: bool) -> Result<Outcome> {
         say!("{pictures}");
     }
     Ok(outcome)
+}
+
+/// The valid SPIR-V of a kernel in a folder.
+fn module(folder: &Path, name: &str) -> Result<Vec<u32>> {
+    let words = words(&spirv(folder, name)?, name).map_err(hankel_codegen::Error::from)?;
+    // The driver gets it as it is.
+    validate(&words, name).map_err(hankel_codegen::Error::from)?;
+    Ok(words)
 }

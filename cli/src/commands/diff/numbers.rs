@@ -1,12 +1,8 @@
 //! The numbers of two builds: their SPIR-V on the inputs of parity.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::time::Duration;
 
-use hankel_codegen::diff::spirv;
-use hankel_codegen::finish::validate;
-use hankel_codegen::spirv::words;
 use hankel_dsl::native::describe::Tolerance;
 use hankel_host::crates::KernelEntry;
 use hankel_host::device::{Device, Shader, VulkanDevice};
@@ -14,6 +10,7 @@ use hankel_host::inputs;
 use hankel_host::parity::execute;
 use hankel_host::parity::numbers::{Found, Numbers, Rules};
 
+use super::module;
 use crate::args::Diff;
 use crate::failure::{Failure, Result};
 use crate::progress::Progress;
@@ -42,14 +39,6 @@ pub fn numbers(args: &Diff, names: &[String], quiet: bool) -> Result<BTreeMap<St
         all.insert(name.clone(), found);
     }
     Ok(all)
-}
-
-/// The valid SPIR-V of a kernel in a folder.
-pub fn module(folder: &Path, name: &str) -> Result<Vec<u32>> {
-    let words = words(&spirv(folder, name)?, name).map_err(hankel_codegen::Error::from)?;
-    // The driver gets it as it is.
-    validate(&words, name).map_err(hankel_codegen::Error::from)?;
-    Ok(words)
 }
 
 /// How far the numbers of a kernel's new SPIR-V are from those of its old one.

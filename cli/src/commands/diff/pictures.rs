@@ -15,7 +15,7 @@ use hankel_host::device::Backend;
 use hankel_system::output;
 use serde::Serialize;
 
-use super::numbers::module;
+use super::module;
 use crate::args::{Diff, Format};
 use crate::commands::scene::{beside, files, is_exr, save};
 use crate::failure::{Failure, Result};
