@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         Err(help_or_misuse) => return show(&help_or_misuse),
     };
     threads();
+    print::unwrapped_in_pipes();
     let quiet = arguments.quiet;
     let outcome = session::check_lanes().and_then(|()| match arguments.command {
         Command::Build(a) => commands::build::run(&a, quiet),

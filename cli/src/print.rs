@@ -3,7 +3,7 @@
 //! terminal.
 
 use std::fmt;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 
 use hankel_system::signals;
 use hankel_system::text::visible;
@@ -66,6 +66,18 @@ pub fn finish() {
 /// A line on the standard error stream. Who closed that does not want to be told.
 pub fn note(text: fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Has errors written without line breaks of their own where no terminal shows them: a tool that reads
+/// them finds whole lines, and whole paths. To be called once.
+pub fn unwrapped_in_pipes() {
+    let wraps = io::stderr().is_terminal();
+    let handler = move |_: &(dyn miette::Diagnostic + 'static)| -> Box<dyn miette::ReportHandler> {
+        let options = miette::MietteHandlerOpts::new();
+        Box::new(options.wrap_lines(wraps).break_words(false).build())
+    };
+    // It is the only one.
+    let _ = miette::set_hook(Box::new(handler));
 }
 
 fn lost(error: &io::Error) -> ! {

@@ -5,6 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::SystemTime;
 
 use tempfile::TempDir;
 
@@ -240,6 +241,17 @@ fn main() {
     fs::remove_file(desk.path("my-kernels/src/native/deep.rs")).expect("it is removed");
     desk.write("my-kernels/src/native/deep/mod.rs", &factor(25));
     built(&mut before, "deep/mod.rs", "2");
+    // What comes with an old date is no older for that: cargo goes by dates.
+    for (path, text) in [
+        ("outside.rs", factor(42)),
+        ("patched/src/lib.rs", format!("#![no_std]\n{}", factor(41))),
+    ] {
+        desk.write(path, &text);
+        let file = fs::File::options().write(true).open(desk.path(path));
+        let dated = file.and_then(|file| file.set_modified(SystemTime::UNIX_EPOCH));
+        dated.expect("a date can be set");
+        built(&mut before, path, "2");
+    }
 }
 
 /// The example of `hankel new --help`, and the check of what it made.

@@ -21,6 +21,7 @@ use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
+use crate::overlooked::LastBuild;
 use crate::spirv::trim;
 
 /// What the modules are compiled for.
@@ -211,6 +212,8 @@ pub fn compile(
     let version = compiler.version()?;
     let sysroot = compiler.ask("rustc", &["--print", "sysroot"])?;
     let own = [target_dir.clone(), sysroot.into(), compiler.backend.clone()];
+    let last = LastBuild::of(&manifest, &target_dir);
+    last.forget_if_overlooked(folder)?;
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -241,6 +244,7 @@ pub fn compile(
         // changes while cargo runs again, this is what it read.
         let settled = inputs.newest(folder).is_none_or(|newest| newest < start);
         if settled || before.as_ref() == Some(&inputs) {
+            last.record(&inputs, start)?;
             return Ok(Compiled {
                 modules,
                 inputs,

@@ -438,6 +438,16 @@ impl Failure {
                 "Description and SPIR-V come from different sources, or a field's type has another \
                  layout on the GPU: rebuild, or use f32, u32, i32 and glam vectors."
             }
+            // No language but SPIR-V has a word for them.
+            Step::Check
+                if self.message.contains("literal is NaN")
+                    || self.message.contains("literal is infinite") =>
+            {
+                "The kernel has a constant that is infinite or NaN, which WGSL refuses. It may come from a \
+                 function: write `f32::MAX` for `f32::INFINITY`, a comparison for `signum`, `is_nan` and \
+                 `is_finite`, a division by the length for `normalize_or_zero`, and a vector that is chosen \
+                 by comparison for `any_orthonormal_pair`. Or build only `--target spirv`."
+            }
             Step::Parse | Step::Check => {
                 "naga does not read this construct: NaN and infinity literals, 64-bit atomics and \
                  `switch` fall-through are the usual ones. Write it differently, or build only \

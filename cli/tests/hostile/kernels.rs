@@ -72,7 +72,7 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
 
 const FAULTS: &str = r#"//! Test.
 #![no_std]
-use hankel_dsl::{Atomics, Buffer, Shared, StorageMut, barrier, kernel, subgroup_add};
+use hankel_dsl::{Atomics, Buffer, Shared, StorageMut, barrier, dpdx, kernel, subgroup_add};
 /// Right: its numbers do not meet.
 #[kernel(compute, threads(64))]
 pub fn fine(#[element] x: u32, #[storage(unordered)] all: StorageMut<'_, u32>, #[atomic] n: Atomics<'_>) {
@@ -146,8 +146,21 @@ pub fn parted(#[element] x: Option<u32>) -> u32 {
         0
     }
 }
+/// All fragments write the same element.
+#[kernel(fragment)]
+pub fn crowded(#[varying] x: u32, #[storage] last: StorageMut<'_, u32>) -> u32 {
+    last.set(3, x);
+    x
+}
+/// A derivative behind a write.
+#[kernel(fragment)]
+pub fn late(#[varying] x: f32, #[atomic] count: Atomics<'_>) -> f32 {
+    count.add(0, 1);
+    dpdx(x)
+}
 hankel_dsl::kernels![
-    fine, race, branch, unwritten, order, wraps, shift, divides, beyond, endless, sized, parted
+    fine, race, branch, unwritten, order, wraps, shift, divides, beyond, endless, sized, parted,
+    crowded, late
 ];
 "#;
 
@@ -189,6 +202,14 @@ fn what_no_shader_may_do_is_named_with_its_line() {
             "        subgroup_add(1)",
             ["parted", "not the same for the subgroup", "has ended"],
         ),
+        (
+            "last.set(3",
+            ["crowded", "data race", "element 3 of `last`"],
+        ),
+        (
+            "dpdx(x)",
+            ["late", "a derivative", "behind a write to memory"],
+        ),
     ] {
         says(&words);
         says(&[words[0], &line(source)]);
@@ -204,5 +225,5 @@ fn what_no_shader_may_do_is_named_with_its_line() {
         "depends(subgroup_size)",
     ]);
     says(&["endless", "was ended after 2 s"]);
-    assert!(said.contains("12 kernels: 11 with faults"), "{said}");
+    assert!(said.contains("14 kernels: 13 with faults"), "{said}");
 }

@@ -40,6 +40,17 @@ fn a_reader_that_is_gone_ends_a_command_without_a_word() {
     }
 }
 
+/// What reads a message finds whole paths in it.
+#[test]
+fn messages_are_not_wrapped_in_a_pipe() {
+    let desk = Desk::new();
+    let long = "a-folder-with-a-long-name-".repeat(8);
+    let run = desk.hankel(&format!("list --manifest-path {long}/Cargo.toml"));
+    let words = format!("{long}/Cargo.toml");
+    let said = String::from_utf8_lossy(&run.0.stderr);
+    assert!(said.lines().any(|line| line.contains(&words)), "{said}");
+}
+
 #[test]
 fn a_full_disk_is_told() {
     for line in PRINT {

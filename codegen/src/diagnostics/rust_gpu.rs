@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use super::{Diagnostic, Level, Place};
 
@@ -29,6 +29,7 @@ struct Message {
 
 #[derive(Clone, Deserialize)]
 struct Span {
+    #[serde(deserialize_with = "file_name")]
     file_name: String,
     line_start: u32,
     line_end: u32,
@@ -44,8 +45,19 @@ struct Expansion {
     span: Span,
 }
 
+/// The file of a place. What rust-gpu's linker finds comes from the debug information of SPIR-V, whose
+/// files rustc does not know: it puts their names into angle brackets.
+fn file_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
+    let name = String::deserialize(from)?;
+    let inner = name.strip_prefix('<').and_then(|it| it.strip_suffix('>'));
+    match inner.filter(|it| it.ends_with(".rs")) {
+        Some(inner) => Ok(inner.into()),
+        None => Ok(name),
+    }
+}
+
 /// What messages are known: words that they contain, and what to write instead.
-const KNOWN: [(&[&str], &str); 23] = [
+const KNOWN: [(&[&str], &str); 29] = [
     (
         &["cannot offset a pointer"],
         "a shader cannot walk through an array or a slice by pointer, as iterators, `swap` and \
@@ -62,9 +74,35 @@ const KNOWN: [(&[&str], &str); 23] = [
          each arm give a value, `y = match x { 0 => 5, _ => y }`",
     ),
     (
+        &["is not a logical pointer"],
+        "a shader cannot choose between two places and then read. It may lie in a function of `core` that \
+         takes references, as `(a..=b).contains(&x)`: compare the values, `x >= a && x <= b`",
+    ),
+    (
         &["OpPhi", "VariablePointers"],
         "a shader cannot choose between two places and then read: choose between two indices, or \
          read both and choose between the values",
+    ),
+    (
+        &["no method named `sqrt`"],
+        "`use hankel_dsl::Real;`, then `Real::sqrt(x)`: the same bits everywhere",
+    ),
+    (
+        &["no method named `floor`"],
+        "`use hankel_dsl::Real;`, then `Real::floor(x)`: the same bits everywhere",
+    ),
+    (
+        &["no method named `powi`"],
+        "multiply: `x * x * x`; for a power that is not known, `hankel_dsl::math::pow(x, n as f32)`",
+    ),
+    (
+        &["no method named `powf`"],
+        "`hankel_dsl::math::pow(x, y)`, which has the same bits everywhere, or the device's own, \
+         `math::native::pow(x, y)`",
+    ),
+    (
+        &["no method named `mul_add`"],
+        "`hankel_dsl::math::fma(a, b, c)`, which rounds once everywhere, or `a * b + c`",
     ),
     (
         &["no method named", "f32"],
@@ -324,9 +362,41 @@ mod tests {
     }
 
     #[test]
+    fn files_of_the_linker_lose_their_brackets() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("src")).unwrap();
+        std::fs::write(folder.path().join("src/bvh.rs"), "").unwrap();
+        let note = json!({
+            "message": "used from within `trace`", "level": "note",
+            "spans": [span("<src/bvh.rs>", 21, true)], "children": [],
+        });
+        let message = json!({
+            "reason": "compiler-message",
+            "message": {
+                "message": "cannot cast between pointer types",
+                "level": "error",
+                "spans": [span("</x/library/core/src/array/iter.rs>", 34, true)],
+                "children": [note],
+            },
+        });
+        let [one] = &read(&message.to_string(), folder.path())[..] else {
+            panic!("one message was expected")
+        };
+        let place = one.place.as_ref().unwrap();
+        assert!(place.file.ends_with("/src/bvh.rs"), "{one}");
+        assert_eq!(place.line, 21);
+        assert_eq!(
+            one.help.last().unwrap(),
+            "found at core/src/array/iter.rs:34:9"
+        );
+    }
+
+    #[test]
     fn known_messages_say_what_to_write() {
         let said = "no method named `sin` found for type `f32` in the current scope";
         assert!(advice(said).unwrap().contains("`math::sin(x)`"));
+        let said = "no method named `sqrt` found for type `f32` in the current scope";
+        assert!(advice(said).unwrap().contains("`Real::sqrt(x)`"));
         assert!(
             advice("saturating_sub is not implemented yet")
                 .unwrap()

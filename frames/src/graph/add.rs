@@ -49,6 +49,14 @@ impl Named {
             )));
         }
         let all = slots::drawn_slots(description);
+        // Nothing says yet what a draw does to memory: it would not be ordered with other passes.
+        let fragment = matches!(description.stage, Stage::Fragment);
+        if let Some(slot) = all.iter().find(|s| fragment && s.role.is_written()) {
+            return Err(place.argument(
+                &slot.name,
+                "a draw of a frame writes its targets alone: write memory in a compute pass",
+            ));
+        }
         let takes = &all[..all.len() - outputs(&description.stage, &description.outputs)];
         for (i, (name, _)) in self.args.iter().enumerate() {
             if !takes.iter().any(|s| s.name == *name) {

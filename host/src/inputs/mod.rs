@@ -376,7 +376,8 @@ fn case(
     let mut extents = Extents {
         elements,
         table: match kernel.stage {
-            Stage::Compute { .. } if writes || !over_texels => ELEMENTS.max(elements),
+            _ if writes => ELEMENTS.max(elements),
+            Stage::Compute { .. } if !over_texels => ELEMENTS.max(elements),
             _ => TABLE,
         },
         size: size.unwrap_or(FLAT),

@@ -82,25 +82,24 @@ fn dispatch_with(
 ) -> Result<Written, DeviceError> {
     let binds = upload(device, slots, &case.args, held)?;
     device.dispatch(program, &binds)?;
-    let mut written = Vec::new();
-    for (slot, bind) in slots
-        .iter()
-        .zip(&binds)
-        .filter(|(s, _)| s.role.is_written())
-    {
-        written.push(match bind {
-            Bind::Buffer(id) => device.read_buffer(*id)?,
-            Bind::Texture(id) => device.read_texture(*id)?,
+    read_back(device, program.kernel, slots.iter().zip(&binds))
+}
+
+/// What a kernel has written to its arguments.
+fn read_back<'a>(
+    device: &mut dyn Device,
+    kernel: &Kernel,
+    args: impl Iterator<Item = (&'a Slot<'a>, &'a Bind<'a>)>,
+) -> Result<Written, DeviceError> {
+    args.filter(|(slot, _)| slot.role.is_written())
+        .map(|(slot, bind)| match bind {
+            Bind::Buffer(id) => device.read_buffer(*id),
+            Bind::Texture(id) => device.read_texture(*id),
             Bind::Bytes(_) | Bind::Sampler(_) => {
-                return Err(slots::refuse(
-                    program.kernel,
-                    slot,
-                    "it cannot be written".into(),
-                ));
+                Err(slots::refuse(kernel, slot, "it cannot be written".into()))
             }
-        });
-    }
-    Ok(written)
+        })
+        .collect()
 }
 
 /// Makes a device's buffers and textures from inputs.
@@ -390,14 +389,15 @@ fn fragment(
         cull: Cull::None,
     };
     device.draw(&pass(&colours, depth, &[draw]))?;
-    targets
-        .into_iter()
-        .map(|(id, format)| {
-            let mut texels = device.read_texture(id)?;
-            texels.truncate(case.invocations * format.bytes());
-            Ok(texels)
-        })
-        .collect()
+    // Parameters come before what is returned, which has no binding.
+    let bound = slots.iter().zip(&all).filter(|(s, _)| s.binding.is_some());
+    let mut written = read_back(device, kernel, bound)?;
+    for (id, format) in targets {
+        let mut texels = device.read_texture(id)?;
+        texels.truncate(case.invocations * format.bytes());
+        written.push(texels);
+    }
+    Ok(written)
 }
 
 /// Draws each vertex into a pixel of its own, and reads one output after the other.

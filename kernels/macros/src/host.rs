@@ -370,9 +370,17 @@ impl Kernel {
             Stage::Compute(c) => self.run_compute(c, variant),
             _ => self.run_interface(variant),
         };
+        // Whether a fragment that is begun again has written before is found by looking.
+        let looks = matches!(self.stage, Stage::Fragment)
+            && self.params.iter().any(|p| p.role.is_written());
+        let mode = if looks {
+            quote!(call.mode.looked_at())
+        } else {
+            quote!(call.mode)
+        };
         quote! {
             fn run(call: &mut native::Call<'_>) -> Result<(), native::CallError> {
-                let (mode, _session) = native::sanitize::begin(call.mode);
+                let (mode, _session) = native::sanitize::begin(#mode);
                 let mut args = exec::Args::take(call, #count, #constants)?;
                 #(#takes)*
                 #body

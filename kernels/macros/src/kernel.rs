@@ -573,17 +573,21 @@ impl Kernel {
                 }
                 (Role::Varying(_), _) => return error(span, "only a fragment kernel has varyings"),
                 (
-                    Role::Element(_)
-                    | Role::ElementMut(_)
-                    | Role::StorageMut { .. }
-                    | Role::StorageTexture { .. }
-                    | Role::Index
-                    | Role::Atomic { .. },
+                    Role::Element(_) | Role::ElementMut(_) | Role::Index,
                     Stage::Vertex | Stage::Fragment,
                 ) => {
                     return error(
                         span,
-                        "elements, indices, atomics, buffers and textures that are written belong to compute kernels",
+                        "elements and indices belong to compute kernels: a vertex kernel has attributes and a #[vertex_index], a fragment kernel varyings and a #[frag_coord]",
+                    );
+                }
+                (
+                    Role::StorageMut { .. } | Role::StorageTexture { .. } | Role::Atomic { .. },
+                    Stage::Vertex,
+                ) => {
+                    return error(
+                        span,
+                        "a vertex kernel writes nothing but what it returns: atomics, buffers and textures that are written belong to compute and fragment kernels",
                     );
                 }
                 (Role::Shared { .. }, Stage::Vertex | Stage::Fragment) => {
@@ -1347,7 +1351,11 @@ impl Args {
                 if outputs.is_empty() {
                     return Err(syn::Error::new(
                         name.span(),
-                        "a kernel must return what it computes",
+                        if word == Word::Vertex {
+                            "a vertex kernel returns the clip-space position, a Vec4, or a tuple of it and the varyings"
+                        } else {
+                            "a fragment kernel returns a colour or a Depth: WebGPU draws into one target at least. One that only writes memory returns a colour for a target that nobody reads"
+                        },
                     ));
                 }
                 if word == Word::Vertex {

@@ -64,7 +64,7 @@ use syn::parse_macro_input;
 /// A compute kernel returns what it computes, or a tuple of it; or nothing, if it writes to its
 /// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
 /// fragment kernel one colour or a tuple of them, among which may be a `Depth`. It may
-/// `discard` the fragment and take derivatives (`dpdx`).
+/// `discard` the fragment, take derivatives (`dpdx`), and write memory behind the last of them.
 ///
 /// # Inputs
 /// What the numbers of a parameter, or of a field of a structure, are like is said by attributes

@@ -453,7 +453,7 @@ fn main_text(job: &Job, signature: &Signature) -> Result<String, Failure> {
         format!("    ::{entry}({arguments});\n")
     } else {
         format!(
-            "    auto msl_out = ::{entry}({arguments});\n    if (msl_discarded() || msl->helper)\n        return;\n{after}"
+            "    auto msl_out = ::{entry}({arguments});\n    if (msl->helper)\n        return;\n{after}"
         )
     };
     Ok(format!(

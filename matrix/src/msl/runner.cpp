@@ -9,6 +9,7 @@
 #include "runner.h"
 
 #include <math.h>
+#include <setjmp.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -588,7 +589,8 @@ float msl_lod(const msl_texture *t, const msl_place *place, const float *dx, con
 // ---- invocations ----
 
 namespace {
-bool discarded = false;
+// Where a fragment that runs alone ends.
+jmp_buf ends;
 // The stage's invocations run in quads.
 bool in_quads = false;
 
@@ -603,7 +605,6 @@ struct Fiber {
     unsigned char simd_values[2][16];
     unsigned simd_turn;
     bool done;
-    bool discarded;
     float value[4];
 };
 ucontext_t scheduler;
@@ -677,7 +678,6 @@ void run_workgroup(unsigned count) {
     for (unsigned i = 0; i < count; i++) {
         Fiber &f = fibers[i];
         f.done = false;
-        f.discarded = false;
         f.waits_at = 0;
         f.waits_in_simd = 0;
         f.simd_turn = 0;
@@ -757,12 +757,12 @@ unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (
     msl_barrier(line);
     return me;
 }
-void msl_discard() { (running == nullptr ? discarded : running->discarded) = true; }
-bool msl_discarded() {
-    bool &flag = running == nullptr ? discarded : running->discarded;
-    bool was = flag;
-    flag = false;
-    return was;
+// It is a helper from there on, which writes nothing and returns nothing: it ends.
+void msl_discard() {
+    if (running == nullptr)
+        longjmp(ends, 1);
+    running->done = true;
+    swapcontext(&running->context, &scheduler);
 }
 }
 
@@ -971,14 +971,41 @@ void place(msl_call &call, unsigned x, unsigned y) {
     call.coord[3] = 1;
 }
 
-// A fragment and its three neighbours, which have its varyings and return nothing.
-void run_quad(msl_call call, unsigned i) {
+// A vertex or a fragment without a quad.
+void run_alone(const msl_call &call) {
+    current = &call;
+    if (setjmp(ends) == 0)
+        msl_invoke(&call);
+}
+
+// What helpers are given: what is written is a copy, as helpers write nothing.
+struct Aside {
+    Slot *slots;
+    void **arguments;
+};
+
+void prepare_aside(Aside &aside, const Slot *slots, unsigned count) {
+    for (unsigned i = 0; i < count; i++) {
+        Slot &s = aside.slots[i] = slots[i];
+        if (s.written && strcmp(s.kind, "out") != 0)
+            s.data = s.texture.texels = reserve(s.name, s.bytes, align_of(i))->data;
+        aside.arguments[i] = argument(s);
+    }
+}
+
+// A fragment and its three neighbours, which have its varyings, return nothing and write nothing.
+void run_quad(msl_call call, unsigned i, const Slot *slots, unsigned count, const Aside &aside) {
     unsigned x = i % columns, y = i / columns;
     unsigned own = (x & 1) | (y & 1) << 1;
+    for (unsigned s = 0; s < count; s++)
+        if (aside.slots[s].data != slots[s].data)
+            memcpy(aside.slots[s].data, slots[s].data, slots[s].bytes);
+    void *const *arguments = call.slots;
     make_fibers(4);
     for (unsigned lane = 0; lane < 4; lane++) {
         place(call, (x & ~1u) | (lane & 1), (y & ~1u) | lane >> 1);
         call.helper = lane != own;
+        call.slots = call.helper ? aside.arguments : arguments;
         fibers[lane].call = call;
     }
     run_workgroup(4);
@@ -1004,7 +1031,10 @@ int main(int argc, char **argv) {
     auto cases = number();
     auto slots = static_cast<Slot *>(calloc(slot_count + 1, sizeof(Slot)));
     auto arguments = static_cast<void **>(calloc(slot_count + 1, sizeof(void *)));
-    if (slots == nullptr || arguments == nullptr)
+    Aside aside = {static_cast<Slot *>(calloc(slot_count + 1, sizeof(Slot))),
+                   static_cast<void **>(calloc(slot_count + 1, sizeof(void *)))};
+    if (slots == nullptr || arguments == nullptr || aside.slots == nullptr ||
+        aside.arguments == nullptr)
         msl_fail("no memory for the plan");
     for (unsigned i = 0; i < slot_count; i++) {
         word(slots[i].name);
@@ -1027,17 +1057,18 @@ int main(int argc, char **argv) {
         } else {
             bool quads = strcmp(stage, "fragment") == 0 && msl_has_derivatives;
             in_quads = quads;
+            if (quads)
+                prepare_aside(aside, slots, slot_count);
             for (unsigned i = 0; i < invocations; i++) {
                 call.invocation[0] = i;
                 // For the words of a fault.
                 call.thread_position_in_grid[0] = i;
                 if (quads) {
-                    run_quad(call, i);
+                    run_quad(call, i, slots, slot_count, aside);
                     continue;
                 }
                 place(call, i % columns, i / columns);
-                current = &call;
-                msl_invoke(&call);
+                run_alone(call);
             }
             current = nullptr;
         }

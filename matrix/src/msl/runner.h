@@ -113,7 +113,6 @@ bool msl_in_quad();
 unsigned msl_exchange(unsigned line, const float *value, unsigned count, float (*all)[4]);
 // What this fragment returns is dropped.
 void msl_discard();
-bool msl_discarded();
 [[noreturn]] void msl_fail(const char *why);
 }
 

@@ -76,6 +76,8 @@ hankel_dsl::kernels![
     stage::slopes,
     stage::grained_slopes,
     stage::sample,
+    stage::linked,
+    stage::sloped,
     texture::mirror,
     texture::spread,
     texture::corners,

@@ -1,9 +1,10 @@
 //! What vertex and fragment kernels say beyond their inputs and outputs.
 
-use hankel_dsl::glam::{IVec3, UVec4, Vec2, Vec3, Vec4};
+use hankel_dsl::format::Rgba32Float;
+use hankel_dsl::glam::{IVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    Depth, Flat, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth,
-    fwidth_fine, kernel,
+    Atomics, Depth, Element, Flat, StorageMut, StorageTexture2d, discard, dpdx, dpdx_coarse,
+    dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth, fwidth_fine, kernel,
 };
 
 /// Numbers of the vertex and of its instance, integers, and a float that is not interpolated.
@@ -105,4 +106,55 @@ pub fn grained_slopes(#[frag_coord] at: Vec3) -> (Vec4, Vec4) {
 #[kernel(fragment)]
 pub fn sample(#[varying] id: u32, #[sample_index] sample: u32) -> u32 {
     id ^ (sample + 1)
+}
+
+/// A fragment in its pixel's list.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Link {
+    /// Whose it is.
+    pub id: u32,
+    /// The link after it, counted from 1; 0 ends the list.
+    pub next: u32,
+}
+
+/// A link for each fragment that is not dropped, at the head of its pixel's list (Yang et al., Real-Time
+/// Concurrent Linked List Construction on the GPU, 2010, section 3), in whatever order.
+#[kernel(fragment)]
+pub fn linked(
+    #[varying] id: u32,
+    #[frag_coord] at: Vec3,
+    #[atomic] count: Atomics<'_>,
+    #[atomic(unordered)]
+    #[length(1024)]
+    heads: Atomics<'_>,
+    #[storage(unordered)] links: StorageMut<'_, Link>,
+) -> u32 {
+    if id & 3 == 0 {
+        discard();
+    }
+    let place = count.add(0, 1);
+    let next = heads.exchange(at.y as u32 * 64 + at.x as u32, place + 1);
+    links.set(place, Link { id, next });
+    id
+}
+
+/// Slopes to a texture, at the fragment's own texel, and how many fragments lie beyond it: memory is
+/// written behind the derivatives.
+#[kernel(fragment)]
+pub fn sloped(
+    #[varying] colour: Vec4,
+    #[frag_coord] at: Vec3,
+    #[texture] slopes: StorageTexture2d<'_, Rgba32Float>,
+    #[atomic] beyond: Atomics<'_>,
+) -> Vec4 {
+    let (x, y) = (dpdx(at.x * at.x), dpdy(at.y * at.y));
+    let place = UVec2::new(at.x as u32, at.y as u32);
+    let size = slopes.size();
+    if (place.x < size.x) & (place.y < size.y) {
+        slopes.store(place, Vec4::new(x, y, at.x, at.y));
+    } else {
+        beyond.add(0, 1);
+    }
+    colour
 }

@@ -287,6 +287,18 @@ impl Mode {
         }
     }
 
+    /// The same with every access looked at: in ascending order if none is said.
+    #[must_use]
+    pub const fn looked_at(self) -> Self {
+        Self {
+            sanitize: match self.sanitize {
+                None => Some(Order::Ascending),
+                said => said,
+            },
+            ..self
+        }
+    }
+
     /// The same with subgroups of another size.
     #[must_use]
     pub const fn in_subgroups_of(self, subgroup_size: u32) -> Self {

@@ -1,8 +1,9 @@
 //! Fragments on the host. Invocation `i` is the pixel at column `i % COLUMNS` and row `i / COLUMNS`
 //! of a target, with varyings of its own. Where a kernel takes a derivative, the other three
-//! fragments of its quad of 2 x 2 pixels are run as well, with the same varyings: fragment kernels
-//! write nothing but what they return, so each is begun again with what is known of the others, until
-//! none is left that waits.
+//! fragments of its quad of 2 x 2 pixels are run as well, with the same varyings: each is begun again
+//! with what is known of the others, until none is left that waits. What a fragment has written to
+//! memory would be written again, and the others must not write at all (SPIR-V, "Helper Invocation"), so
+//! that memory is written behind the last derivative; another order is refused.
 
 use core::cell::RefCell;
 use core::panic::Location;
@@ -11,11 +12,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::vec::Vec;
 use std::{format, thread_local};
 
-use glam::{Vec3, Vec4};
+use glam::{UVec3, Vec3, Vec4};
 
 use super::call::{CallError, Mode};
 use super::exec::{Slices, guard, some_of_range};
-use super::sanitize::refuse;
+use super::sanitize::{self, refuse};
 
 /// Columns of the target that invocations are laid out in.
 pub const COLUMNS: u32 = 64;
@@ -120,7 +121,14 @@ fn exchange(value: Vec4, place: &'static Location<'static>) -> ([Vec4; 4], usize
             }
         }
     });
-    known.unwrap_or_else(|| resume_unwind(Box::new(Waiting)))
+    known.unwrap_or_else(|| {
+        if let Some(wrote) = sanitize::wrote() {
+            refuse(format!(
+                "a derivative, at {place}, behind a write to memory, at {wrote}: take derivatives, and sample textures, before memory is written"
+            ));
+        }
+        resume_unwind(Box::new(Waiting))
+    })
 }
 
 /// What stands for [`dpdx`](crate::dpdx) and the like.
@@ -206,6 +214,11 @@ fn one<T>(i: u32, call: &impl Fn(&Fragment) -> T) -> Option<T> {
         Fragment::at(x & !1 | lane & 1, y & !1 | lane >> 1)
     };
     QUAD.with_borrow_mut(|quad| quad.taken.clear());
+    let call = |fragment: &Fragment| {
+        let pixel = fragment.coord.as_uvec3();
+        sanitize::enter_alone(UVec3::new(pixel.x, pixel.y, 0), pixel.y * COLUMNS + pixel.x);
+        call(fragment)
+    };
     loop {
         let (value, place) = match begin(own, || call(&at(own))) {
             Ended::Value(value) => return Some(value),
@@ -223,17 +236,23 @@ fn one<T>(i: u32, call: &impl Fn(&Fragment) -> T) -> Option<T> {
     }
 }
 
-/// Runs a fragment kernel over arrays of varyings. What a fragment that is dropped would write stays
-/// as it is.
+/// Runs a fragment kernel over arrays of varyings, in the order of the session if there is one. What a
+/// fragment that is dropped would return stays as it is.
 pub fn map_fragments<S: Slices>(
     mode: Mode,
-    out: S,
+    mut out: S,
     f: impl Fn(usize, &Fragment) -> S::Values + Sync,
 ) -> Result<(), CallError> {
+    let run = |i: usize| one(i as u32, &|fragment: &Fragment| f(i, fragment));
     guard(|| {
-        some_of_range(mode.parallel, 0, out, &|i| {
-            one(i as u32, &|fragment: &Fragment| f(i, fragment))
-        });
+        let Some(order) = sanitize::order(out.count()) else {
+            return some_of_range(mode.parallel, 0, out, &run);
+        };
+        for i in order.into_iter().map(|i| i as usize) {
+            if let Some(values) = run(i) {
+                out.set(i, values);
+            }
+        }
     })
 }
 
@@ -246,6 +265,7 @@ pub fn depth(depth: crate::Depth) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
     use std::string::ToString;
 
     use crate::{dpdx, dpdx_coarse, dpdy, fwidth};
@@ -311,6 +331,59 @@ mod tests {
             }
         });
         assert!(message(two).contains("not the same for a quad"));
+    }
+
+    #[test]
+    fn memory_is_written_once_by_each_fragment_and_behind_derivatives() {
+        let memory = [const { AtomicU32::new(0) }; 4];
+        let counts = crate::Atomics::<u32>::new(&memory);
+        let run = |mode: Mode, f: &(dyn Fn(&Fragment) -> f32 + Sync)| {
+            let (mode, _session) = sanitize::begin(mode.looked_at());
+            let mut out = std::vec![0.0; 4];
+            map_fragments(mode, (&mut out[..],), |_, at| (f(at),)).map_err(|e| e.to_string())
+        };
+        let after = |at: &Fragment| {
+            let slope = dpdx(at.coord.x);
+            counts.add(at.coord.x as u32, 1);
+            slope
+        };
+        for mode in [
+            Mode::REFERENCE,
+            Mode::sanitized(sanitize::Order::Descending),
+        ] {
+            run(mode, &after).unwrap();
+        }
+        assert_eq!(memory.each_ref().map(|n| n.load(Relaxed)), [2; 4]);
+        let before = |at: &Fragment| {
+            counts.add(at.coord.x as u32, 1);
+            dpdx(at.coord.x)
+        };
+        let message = run(Mode::REFERENCE, &before).unwrap_err();
+        assert!(
+            message.contains("behind a write to memory, at "),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn fragments_race() {
+        let memory = [const { AtomicU32::new(0) }; 1];
+        let all = crate::StorageMut::<u32>::new(&memory);
+        let (mode, _session) = sanitize::begin(Mode::sanitized(sanitize::Order::Ascending));
+        let mut out = std::vec![0.0; 2];
+        let result = map_fragments(mode, (&mut out[..],), |i, _| {
+            all.set(0, i as u32);
+            (0.0,)
+        });
+        let message = result.unwrap_err().to_string();
+        assert!(
+            message.contains("data race: invocation (0, 0, 0) writes"),
+            "{message}"
+        );
+        assert!(
+            message.contains("and invocation (1, 0, 0) writes it"),
+            "{message}"
+        );
     }
 
     #[test]

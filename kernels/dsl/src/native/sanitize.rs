@@ -199,6 +199,8 @@ struct Session {
     group: u32,
     /// Barriers that the workgroup has passed: for workgroup memory, for storage.
     barriers: [u32; 3],
+    /// Where the invocation wrote memory first.
+    wrote: Option<&'static Location<'static>>,
 }
 
 /// How many sessions there are, on any thread.
@@ -239,6 +241,7 @@ pub fn begin(mode: Mode) -> (Mode, Option<Open>) {
         at: UVec3::ZERO,
         group: 0,
         barriers: [0; 3],
+        wrote: None,
     }));
     SESSIONS.fetch_add(1, Relaxed);
     let mode = Mode::sanitized(order).in_subgroups_of(mode.subgroup_size);
@@ -324,7 +327,16 @@ pub(super) fn enter_alone(at: UVec3, number: u32) {
     with(|session| {
         session.at = at;
         session.group = number;
+        session.wrote = None;
     });
+}
+
+/// Where the invocation that [`enter_alone`] was called for wrote memory first, in a session.
+pub(super) fn wrote() -> Option<&'static Location<'static>> {
+    if SESSIONS.load(Relaxed) == 0 {
+        return None;
+    }
+    SESSION.with_borrow(|session| session.as_ref()?.wrote)
 }
 
 /// All invocations of the workgroup have passed a barrier, which orders `space`.
@@ -355,6 +367,9 @@ fn looked<T>(
 ) {
     let fault = SESSION.with_borrow_mut(|session| {
         let session = session.as_mut()?;
+        if access != Access::Read {
+            session.wrote.get_or_insert(place);
+        }
         let made = Made {
             access,
             at: session.at,
