@@ -710,8 +710,10 @@ fn a_scene_is_rendered_and_compared() {
     desk.write("mist.toml", &mist);
     desk.hankel("render mist.toml --out c.png").code(0);
     desk.write("mist.toml", mist + "technique = \"prefiltered\"\n");
-    desk.hankel("render mist.toml --out b.png")
-        .fails(2, &["mist.toml", "`medium.technique`", "directional lights"]);
+    desk.hankel("render mist.toml --out b.png").fails(
+        2,
+        &["mist.toml", "`medium.technique`", "directional lights"],
+    );
     desk.hankel("render nowhere.toml --out b.png")
         .fails(2, &["nowhere.toml"]);
     desk.write("bad.toml", SCENE.replace("64", "0"));
