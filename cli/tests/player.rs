@@ -155,6 +155,11 @@ fn glass_and_a_medium_are_played() {
         ("glass", "pcf", glass),
         ("medium", "hamburger", medium("prefiltered")),
         ("medium", "pcf", medium("ray-marching")),
+        (
+            "medium",
+            "pcf",
+            medium("ray-marching").replace("[light]", "[light]\nposition = [0.0, 3.0, 0.0]"),
+        ),
     ] {
         let shadow = format!("[shadow]\ntechnique = \"{shadow}\"");
         let scene = scene.replace("[shadow]", &shadow);

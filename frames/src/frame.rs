@@ -63,6 +63,18 @@ pub fn graph(scene: &Scene, mesh: &Mesh, show: Show) -> graph::Result<(Graph, Ve
     Ok((graph, given, picture))
 }
 
+/// An error if the technique of the scene's medium is not for a light; the first has the number 0.
+fn refused(scene: &Scene, number: usize, light: &Light) -> graph::Result<()> {
+    let technique = scene.medium.map(|medium| medium.technique);
+    match technique.and_then(|technique| light.refuses(technique)) {
+        Some(instead) => Err(GraphError::Light {
+            number: number + 1,
+            problem: format!("the technique of `[medium]` must be {instead}"),
+        }),
+        None => Ok(()),
+    }
+}
+
 /// The same with these of its lights.
 fn with_lights(
     scene: &Scene,
@@ -72,10 +84,7 @@ fn with_lights(
 ) -> graph::Result<(Graph, Vec<Given>, Handle)> {
     let technique = scene.shadow.technique;
     for (number, light) in scene.lights.iter().enumerate() {
-        if let Some(problem) = light.refuses(scene.medium.is_some()) {
-            let (number, problem) = (number + 1, problem.into());
-            return Err(GraphError::Light { number, problem });
-        }
+        refused(scene, number, light)?;
     }
     let camera = camera_view(scene, &scene.camera, mesh);
     let mut graph = Graph::new(hankel_shadows::entries());
@@ -144,7 +153,7 @@ fn with_lights(
                 opacities,
             }
         });
-        let space = Space::of(scene, &view, mesh, show);
+        let space = Space::of(scene, light, &view, mesh, show);
         let given = Given {
             positions,
             normals,
@@ -157,6 +166,7 @@ fn with_lights(
             light: graph.parameter(named("light"), &uniform(scene, &lit, show)),
             area: graph.parameter(named("light's area"), &area(light, &view)),
             source: light.area,
+            is_spot: light.spot().is_some(),
             volume: space.map(|space| space.add_to(&mut graph, &named)),
             shadow: scene.shadow,
             size: [scene.width, scene.height],
@@ -230,13 +240,20 @@ fn describe(graph: &mut Graph, given: &Given) {
             "How pixels look into the world; it follows from the camera.",
         ),
         (volume.medium, "What scatters between surfaces."),
+    ] {
+        graph.describe(value, meaning);
+    }
+    let Some(rectification) = volume.rectification else {
+        return;
+    };
+    for (value, meaning) in [
         (
-            volume.rectified,
+            rectification.rectified,
             "Coordinates in which rays from the camera are rows of the shadow map; they follow from the camera \
              and the light.",
         ),
         (
-            volume.rows,
+            rectification.rows,
             "What differs from row to row of the rectified map; it follows from the camera and the light.",
         ),
     ] {
@@ -349,12 +366,23 @@ impl<'d> Frame<'d> {
                 ),
             });
         };
-        if let Some(problem) = light.refuses(self.scene.medium.is_some()) {
-            let (number, problem) = (number + 1, problem.into());
-            return Err(GraphError::Light { number, problem }.into());
+        refused(&self.scene, number, light)?;
+        let given = self.given[i];
+        if self.scene.medium.is_some() && given.is_spot != light.spot().is_some() {
+            let kind = if given.is_spot {
+                "a spot light"
+            } else {
+                "a directional light"
+            };
+            return Err(GraphError::Light {
+                number: number + 1,
+                problem: format!(
+                    "it must stay {kind}: in a medium, each kind has passes of its own"
+                ),
+            }
+            .into());
         }
         self.scene.lights[number] = *light;
-        let given = self.given[i];
         let view = light_view(&self.scene, light, self.mesh);
         let lit = Lit {
             light,
@@ -381,13 +409,17 @@ impl<'d> Frame<'d> {
 
     /// What the medium's kernels take of camera and light.
     fn set_space(&mut self, i: usize, view: &LightView) -> Result<()> {
-        let space = Space::of(&self.scene, view, self.mesh, self.show);
+        let light = &self.scene.lights[self.numbers[i]];
+        let space = Space::of(&self.scene, light, view, self.mesh, self.show);
         let (Some(volume), Some(space)) = (self.given[i].volume, space) else {
             return Ok(());
         };
         self.executor.set(volume.view, &space.view)?;
-        self.executor.set(volume.rectified, &space.rectified)?;
-        self.executor.set_buffer(volume.rows, &space.rows)
+        if let (Some(of), Some((rectified, rows))) = (volume.rectification, space.rectified) {
+            self.executor.set(of.rectified, &rectified)?;
+            self.executor.set_buffer(of.rows, &rows)?;
+        }
+        Ok(())
     }
 
     /// Runs what has to run; see [`Executor::run`].

@@ -24,7 +24,11 @@ pub fn light_view(scene: &Scene, light: &Light, mesh: &Mesh) -> LightView {
         Fit::Camera => Some(camera_view(scene, &scene.camera, mesh)),
     };
     match (light.source, camera) {
-        (Source::Spot(spot), camera) => LightView::spot(&spot, mesh, size, margin, camera.as_ref()),
+        (Source::Spot(spot), camera) => {
+            // A medium scatters in all of the cone.
+            let camera = camera.filter(|_| scene.medium.is_none());
+            LightView::spot(&spot, mesh, size, margin, camera.as_ref())
+        }
         (Source::Directional { direction }, None) => LightView::new(direction, mesh, size, margin),
         (Source::Directional { direction }, Some(camera)) => {
             let fitted = match scene.medium {

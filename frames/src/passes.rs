@@ -27,15 +27,21 @@ pub struct Volume {
     pub view: Handle,
     /// What scatters, [`hankel_shadows::scattering::Medium`].
     pub medium: Handle,
-    /// Coordinates in which rays from the camera are rows of the shadow map,
-    /// [`hankel_shadows::scattering::Rectified`].
+    /// How rays from the camera are rows of the shadow map; of a directional light only.
+    pub rectification: Option<Rectification>,
+    /// Steps along a ray, where one is marched along.
+    pub steps: u32,
+}
+
+/// How rays from the camera are rows of a directional light's shadow map.
+#[derive(Clone, Copy, Debug)]
+pub struct Rectification {
+    /// The coordinates, [`hankel_shadows::scattering::Rectified`].
     pub rectified: Handle,
     /// Each row's direction, and its extinction per unit of radius.
     pub rows: Handle,
     /// Texels of a row, and rows.
     pub texels: [u32; 2],
-    /// Steps along a ray, where one is marched along.
-    pub steps: u32,
 }
 
 /// What every technique starts from.
@@ -63,6 +69,8 @@ pub struct Given {
     pub area: Handle,
     /// The light's outline.
     pub source: Area,
+    /// Whether it is a spot light.
+    pub is_spot: bool,
     /// What is between surfaces, if anything is.
     pub volume: Option<Volume>,
     /// What the scene asks for.

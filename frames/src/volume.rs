@@ -9,8 +9,8 @@ use hankel_shadows::scattering::{Medium, Rectified, View};
 
 use crate::frame::{Show, camera_view};
 use crate::graph::Graph;
-use crate::passes::Volume;
-use crate::scene::{CameraView, LightView, Mesh, Scene};
+use crate::passes::{Rectification, Volume};
+use crate::scene::{CameraView, Light, LightView, Mesh, Scene, Source};
 
 /// How much of a harmless distribution is mixed into means of moments: 32-bit sums of a few hundred of them
 /// are rounded by some 1e-6.
@@ -20,14 +20,20 @@ const MOMENT_BIAS: f32 = 5e-6;
 pub(crate) struct Space {
     pub view: View,
     pub medium: Medium,
-    pub rectified: Rectified,
-    pub rows: Vec<Vec4>,
+    /// Rays from the camera as rows of the shadow map, and what differs from row to row; of a directional light only.
+    pub rectified: Option<(Rectified, Vec<Vec4>)>,
 }
 
 impl Space {
     /// Of a scene's camera and one of its lights, with what its map holds; `None` for a scene without a medium, and
     /// where what is shown is not behind it.
-    pub fn of(scene: &Scene, light_view: &LightView, mesh: &Mesh, show: Show) -> Option<Self> {
+    pub fn of(
+        scene: &Scene,
+        light: &Light,
+        light_view: &LightView,
+        mesh: &Mesh,
+        show: Show,
+    ) -> Option<Self> {
         let medium = scene.medium.filter(|_| show != Show::Light)?;
         let camera = camera_view(scene, &scene.camera, mesh);
         let (source, anisotropy) = match show {
@@ -39,7 +45,12 @@ impl Space {
             // All that is scattered counts as 1.
             Show::Scattered | Show::Light => (4.0 * PI as f32, 0.0),
         };
-        let (rectified, rows) = rectified(scene, &camera, light_view, medium.extinction);
+        let rectified = match light.source {
+            Source::Directional { .. } => {
+                Some(rectified(scene, &camera, light_view, medium.extinction))
+            }
+            Source::Spot(_) => None,
+        };
         Some(Self {
             view: view(&camera, [scene.width, scene.height]),
             medium: Medium {
@@ -49,7 +60,6 @@ impl Space {
                 steps: medium.steps,
             },
             rectified,
-            rows,
         })
     }
 
@@ -59,12 +69,20 @@ impl Space {
         graph: &mut Graph,
         named: &dyn Fn(&'static str) -> Cow<'static, str>,
     ) -> Volume {
+        let view = graph.parameter(named("view"), &self.view);
+        let medium = graph.parameter(named("medium"), &self.medium);
+        let rectification = self
+            .rectified
+            .as_ref()
+            .map(|(rectified, rows)| Rectification {
+                rectified: graph.parameter(named("rectified"), rectified),
+                rows: graph.buffer(named("rows"), rows),
+                texels: [rectified.columns, rectified.rows],
+            });
         Volume {
-            view: graph.parameter(named("view"), &self.view),
-            medium: graph.parameter(named("medium"), &self.medium),
-            rectified: graph.parameter(named("rectified"), &self.rectified),
-            rows: graph.buffer(named("rows"), &self.rows),
-            texels: [self.rectified.columns, self.rectified.rows],
+            view,
+            medium,
+            rectification,
             steps: self.medium.steps,
         }
     }

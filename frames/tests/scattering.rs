@@ -1,14 +1,17 @@
 //! What a medium scatters: techniques against rays, and what a medium does to a frame.
 
+use std::f64::consts::PI;
 use std::path::Path;
 
+use hankel_dsl::glam::{DVec3, Vec3};
 use hankel_frames::measure::{Ask, Choices, Pictures, Session, Subject};
 use hankel_frames::plan::{Wanted, plan};
 use hankel_frames::scattering::{self, Scattering};
-use hankel_frames::scene::{Fit, Mesh, Scene};
+use hankel_frames::scene::{CameraView, Fit, Light, Mesh, Scene, Source};
 use hankel_frames::techniques::Technique;
-use hankel_frames::truth::scattering::{Scattered, Through, compare};
+use hankel_frames::truth::scattering::{Scattered, Through, compare, transmittance};
 use hankel_frames::truth::{Arriving, by_technique, scattered_by_technique};
+use hankel_frames::visibility::cast::{Caster, Lens};
 use hankel_frames::{Clock, Frame, NoShaders, Quiet, Show, graph_of, render_on};
 use hankel_host::device::NativeDevice;
 
@@ -67,6 +70,201 @@ fn a_medium_in_light_alone_has_its_analytic_picture() {
             assert!(errors.rms < limit, "{name}: {errors}");
         }
     }
+}
+
+/// What a picture's medium adds, in its first channel, where nothing casts a shadow: without the light from the sky,
+/// and without what a light sends to surfaces, as that passes the medium. And by how much that may be rounded: pictures
+/// are kept in 16-bit floats, of 11 bits.
+fn added(scene: &Scene, mesh: &Mesh) -> Vec<[f64; 2]> {
+    let drawn = |with: &dyn Fn(&mut Scene)| {
+        let mut scene = scene.clone();
+        with(&mut scene);
+        let mut device = NativeDevice::new();
+        let mut frame = Frame::still(&mut device, &NoShaders, &scene, mesh, Show::Picture).unwrap();
+        frame.run(Clock::Frame, &mut Quiet).unwrap();
+        frame.linear().unwrap()
+    };
+    let dark = |scene: &mut Scene| scene.lights[0].strength = 0.0;
+    let clear = |scene: &mut Scene| scene.medium = None;
+    let (all, without) = (drawn(&|_| ()), drawn(&dark));
+    let (surfaces, ambient) = (
+        drawn(&clear),
+        drawn(&|scene| {
+            dark(scene);
+            clear(scene);
+        }),
+    );
+    let through = transmittance(scene, mesh).values;
+    let of = |i: usize| {
+        let through = f64::from(through[i]);
+        let [all, without, surfaces, ambient] =
+            [&all, &without, &surfaces, &ambient].map(|picture| f64::from(picture[i].x));
+        [
+            all - without - through * (surfaces - ambient),
+            (all + without + through * (surfaces + ambient)) / 2048.0,
+        ]
+    };
+    (0..all.len()).map(of).collect()
+}
+
+/// The phase function of Henyey and Greenstein.
+fn phase(g: f64, cosine: f64) -> f64 {
+    (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cosine).powf(1.5))
+}
+
+/// The camera, and the segment that a pixel's middle sees, as long as it sees: to the far plane at most.
+fn rays(scene: &Scene, mesh: &Mesh) -> (DVec3, impl Fn(usize) -> DVec3 + use<>) {
+    let width = scene.width;
+    let aspect = width as f32 / scene.height as f32;
+    let view = CameraView::new(&scene.camera, mesh, aspect);
+    let lens = Lens::new(view.clip_from_world, width, scene.height);
+    let caster = Caster::of(mesh);
+    let eye = scene.camera.eye.as_dvec3();
+    let end = move |i: usize| {
+        let segment = lens.segment([i as u32 % width, i as u32 / width], [0.5, 0.5]);
+        let t = caster.first(&segment).map_or(1.0, |hit| hit.t);
+        segment.at(t) - eye
+    };
+    (eye, end)
+}
+
+/// Pixels without an edge between what they see.
+fn even(taken: &[f32], width: usize, i: usize) -> bool {
+    let inner = (width..taken.len() - width).contains(&i) && (1..width - 1).contains(&(i % width));
+    inner
+        && [i - 1, i + 1, i - width, i + width]
+            .iter()
+            .all(|&j| (taken[j] - taken[i]).abs() < 0.05)
+}
+
+/// What is scattered by an angle θ is told by the phase function: forward scattering is seen against the light.
+#[test]
+fn a_picture_has_the_phase_function_of_its_medium() {
+    for (camera, g) in [
+        ("eye = [-1.0, 0.6, -6.0]\ntarget = [0.3, 1.0, 0]", 0.6),
+        ("eye = [-1.0, 0.6, -6.0]\ntarget = [0.3, 1.0, 0]", -0.4),
+        ("eye = [1.0, 0.6, 6.0]\ntarget = [0, 0.9, 0]", 0.6),
+    ] {
+        let medium = format!("extinction = 0.2\nscattering = 0.15\nanisotropy = {g:?}");
+        let (mut scene, mesh) = open(camera, &medium);
+        let direction = DVec3::new(0.1, -0.5, -1.0).normalize();
+        scene.lights[0].source = Source::Directional {
+            direction: direction.as_vec3(),
+        };
+        let taken = Scattered::new(&scene, &mesh).unwrap().unshadowed().values;
+        let (_, end) = rays(&scene, &mesh);
+        for technique in scattering::ALL {
+            scene.medium.as_mut().unwrap().technique = technique;
+            let mut compared = 0;
+            // Moments do not tell the ground before a ray's end from what would shade the ray.
+            let limit = if technique.has_steps { 0.03 } else { 0.1 };
+            for (i, [added, rounded]) in added(&scene, &mesh).into_iter().enumerate() {
+                if !even(&taken, scene.width as usize, i) {
+                    continue;
+                }
+                let cosine = -direction.dot(end(i).normalize());
+                let wanted = 1.15 * PI * 0.75 * phase(g, cosine) * f64::from(taken[i]);
+                assert!(
+                    (added - wanted).abs() < limit * wanted + rounded,
+                    "{technique:?}, {i}: {added} {wanted}"
+                );
+                compared += 1;
+            }
+            assert!(compared > 700, "{technique:?}: {compared}");
+        }
+    }
+}
+
+/// A spot light without casters: the picture is the integral over each ray of intensity over squared distance, cone,
+/// phase function and transmittance.
+#[test]
+fn a_spot_light_in_a_medium_has_its_analytic_picture() {
+    let light = "[light]\nposition = [0.4, 2.2, -0.5]\ndirection = [0.2, -1.0, 0.3]\nangle = 70.0\n\
+                 inner = 40.0\nstrength = 60.0\n";
+    let medium = "[medium]\nextinction = 0.3\nscattering = 0.2\nanisotropy = 0.4\nsteps = 64\n";
+    for camera in [
+        // The light itself is in view.
+        "eye = [1.0, 1.8, 6.0]\ntarget = [0.2, 1.2, 0]",
+        // From within the cone, along it.
+        "eye = [0.42, 1.6, -0.4]\ntarget = [0.6, 0.0, 0.4]",
+        // From within the cone, back to the light.
+        "eye = [0.7, 0.4, 0.3]\ntarget = [0.42, 1.9, -0.45]",
+    ] {
+        let (scene, mesh) = parsed(&format!(
+            "[geometry]\nprocedural = 'empty'\n[camera]\n{camera}\n{light}{medium}[shadow]\nsize = 128\n\
+             [output]\nwidth = 48\nheight = 30\n"
+        ));
+        assert_eq!(scene.medium.unwrap().technique.name, "ray-marching");
+        let spot = *scene.lights[0].spot().unwrap();
+        let taken = Scattered::new(&scene, &mesh).unwrap().unshadowed().values;
+        let (eye, end) = rays(&scene, &mesh);
+        let position = spot.position.as_dvec3();
+        // What is added along a unit of a ray's length.
+        let density = |way: DVec3, s: f64| {
+            let toward = position - (eye + way * s);
+            let distance = toward.length();
+            let cosine = -toward.dot(spot.direction.as_dvec3()) / distance;
+            let edge = |degrees: f64| degrees.to_radians().cos();
+            let fade = ((cosine - edge(35.0)) / (edge(20.0) - edge(35.0))).clamp(0.0, 1.0);
+            let irradiance = 60.0 * 1.15 * fade * fade / (distance * distance);
+            let scattered = 0.2 * phase(0.4, toward.dot(way) / distance) * irradiance;
+            PI * scattered * (-0.3 * s).exp()
+        };
+        let integral = |way: DVec3| -> f64 {
+            const STEPS: u32 = 20_000;
+            let (length, way) = (way.length(), way.normalize());
+            let step = length / f64::from(STEPS);
+            let places = (0..STEPS).map(|k| (f64::from(k) + 0.5) * step);
+            places.map(|s| density(way, s) * step).sum()
+        };
+        let (mut lit, mut compared, mut largest) = (0, 0, 0.0_f64);
+        for (i, [added, rounded]) in added(&scene, &mesh).into_iter().enumerate() {
+            if !even(&taken, scene.width as usize, i) {
+                continue;
+            }
+            let (wanted, length) = (integral(end(i)), end(i).length());
+            let off = (added - wanted).abs();
+            // One ray stands for a pixel's samples: as far as the farthest of them it is below the ground.
+            let width = scene.width as usize;
+            let longer = [i - width, i + width].map(|j| (end(j).length() - length).abs() / 2.0);
+            let below = density(end(i).normalize(), length) * longer[0].max(longer[1]);
+            compared += 1;
+            if wanted > 20.0 * rounded {
+                lit += 1;
+                largest = largest.max(off / wanted);
+            }
+            assert!(
+                off < 0.02 * wanted + rounded + below,
+                "{camera}, {i}: {added} {wanted}"
+            );
+        }
+        println!("{camera:?}: at most {largest:.4} off, {lit} of {compared} pixels lit");
+        assert!(lit > 200 && compared > 900, "{camera}");
+    }
+}
+
+/// What of a spot light's cone is in shadow is near the rays. What is reached is measured, with a tenth on top.
+#[test]
+fn a_spot_light_scatters_near_the_rays() {
+    let (scene, mesh) = file("lantern", 512);
+    let pictures = [8, 32, 128].map(|steps| by(&scene, &mesh, "ray-marching", steps));
+    let all: Vec<&Arriving> = pictures.iter().collect();
+    let (compared, truth) = compare(&scene, &mesh, &all, &mut |_| ()).unwrap().unwrap();
+    let most = truth.values.iter().copied().fold(0.0, f32::max);
+    println!(
+        "lantern: {} steps of the truth, {most} at most",
+        compared.steps
+    );
+    let errors = compared.errors;
+    for ((errors, steps), limit) in errors
+        .iter()
+        .zip([8, 32, 128])
+        .zip([0.0205, 0.0054, 0.0024])
+    {
+        println!("lantern, {steps} steps: {errors}");
+        assert!(errors.rms < limit, "{steps}: {errors}");
+    }
+    assert!(errors.is_sorted_by(|a, b| a.rms > b.rms) && most > 0.2);
 }
 
 /// Root of the mean square error of each technique. What they reach is measured, with a tenth on top.
@@ -330,18 +528,26 @@ fn without_a_medium_nothing_of_it_is_there() {
 /// A frame whose camera and light are moved is the frame that is made there.
 #[test]
 fn a_medium_follows_camera_and_light() {
+    let directional = [
+        "direction = [0.5, -1, 0.2]",
+        "direction = [-0.7, -0.4, 0.1]",
+    ];
+    let spot = [
+        "position = [-1, 2.5, -0.4]\ndirection = [0.5, -1, 0.2]",
+        "position = [1.4, 1.5, -0.3]\ndirection = [-0.7, -0.6, 0.1]\nangle = 80",
+    ];
+    let ways = scattering::ALL.map(|technique| (technique.name, directional));
     for fit in ["scene", "camera"] {
-        for technique in scattering::ALL {
-            let text = |eye: &str, direction: &str| {
+        for (technique, lights) in ways.into_iter().chain([("ray-marching", spot)]) {
+            let text = |eye: &str, light: &str| {
                 format!(
                     "[geometry]\nprocedural = 'box'\n[camera]\neye = {eye}\ntarget = [0, 0.5, 0]\n\
-                     [light]\ndirection = {direction}\n[medium]\nextinction = 0.2\ntechnique = '{}'\n\
-                     [shadow]\nsize = 64\nfit = '{fit}'\n[output]\nwidth = 32\nheight = 20\n",
-                    technique.name
+                     [light]\n{light}\n[medium]\nextinction = 0.2\ntechnique = '{technique}'\n\
+                     [shadow]\nsize = 64\nfit = '{fit}'\n[output]\nwidth = 32\nheight = 20\n"
                 )
             };
-            let (first, mesh) = parsed(&text("[2, 2, 4]", "[0.5, -1, 0.2]"));
-            let (second, _) = parsed(&text("[-3, 1, 2]", "[-0.7, -0.4, 0.1]"));
+            let (first, mesh) = parsed(&text("[2, 2, 4]", lights[0]));
+            let (second, _) = parsed(&text("[-3, 1, 2]", lights[1]));
             let mut device = NativeDevice::new();
             let mut moved =
                 Frame::new(&mut device, &NoShaders, &first, &mesh, Show::Scattered).unwrap();
@@ -351,7 +557,48 @@ fn a_medium_follows_camera_and_light() {
             moved.run(Clock::Frame, &mut Quiet).unwrap();
             let picture: Vec<f32> = moved.linear().unwrap().iter().map(|c| c.x).collect();
             let wanted = scattered_by_technique(&second, &mesh).unwrap();
-            assert_eq!(picture, wanted.values, "{}, {fit}", technique.name);
+            assert_eq!(picture, wanted.values, "{technique}, {fit}");
+            assert!(picture.iter().any(|share| *share > 0.01));
         }
     }
+}
+
+/// Prefiltered scattering is that of directional lights; passes of one kind of light are not those of another.
+#[test]
+fn kinds_of_lights_are_told_apart() {
+    let (mut scene, mesh) = file("lantern", 64);
+    let lamp = scene.lights[0];
+    let sun = Light::directional(Vec3::new(0.8, -0.5, 0.1));
+    let mut device = NativeDevice::new();
+    let mut frame = Frame::new(&mut device, &NoShaders, &scene, &mesh, Show::Picture).unwrap();
+    let error = frame.set_light(0, &sun).unwrap_err().to_string();
+    assert!(
+        error.contains("light 1") && error.contains("stay a spot light"),
+        "{error}"
+    );
+    frame.set_light(0, &lamp).unwrap();
+    for name in ["prefiltered", "prefiltered-6"] {
+        scene.medium.as_mut().unwrap().technique = Scattering::named(name).unwrap();
+        let error = graph_of(&scene, &mesh, Show::Picture)
+            .unwrap_err()
+            .to_string();
+        let parts = [
+            "light 1",
+            "`[medium]`",
+            "`ray-marching`",
+            "directional lights",
+        ];
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+    }
+    scene.lights[0] = sun;
+    assert!(graph_of(&scene, &mesh, Show::Picture).is_ok());
+    // Of all ways to scatter, a plan takes those that are for the lights.
+    scene.lights.push(lamp);
+    let suiting = small(&[4]).configurations();
+    let suiting = suiting.iter().filter(|c| c.suits(&scene));
+    let names: Vec<String> = suiting.map(|c| c.scattering.unwrap().to_string()).collect();
+    assert!(
+        !names.is_empty() && names.iter().all(|n| n.starts_with("ray-marching")),
+        "{names:?}"
+    );
 }

@@ -274,8 +274,13 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         ),
         (
             LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nposition = [0, 2, 0]")
-                + "[medium]\nextinction = 0.1",
-            &["scene.toml:9:12", "`light.position`", "`[medium]`"],
+                + "[medium]\nextinction = 0.1\ntechnique = 'prefiltered'",
+            &[
+                "scene.toml:12:13",
+                "`medium.technique` is `prefiltered`",
+                "`ray-marching`",
+                "`position`",
+            ],
         ),
         (
             LEAST.replace("[light]", "[[light]]") + "[[light]]\ndirection = [0, 0, 0]",

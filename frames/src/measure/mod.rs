@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::executor::{Clock, Quiet, Shaders, Timing};
 use crate::frame::{Frame, Show};
 use crate::scattering::{self, Scattering};
-use crate::scene::{Fit, Medium, Mesh, Scene, Shadow};
+use crate::scene::{Fit, Light, Medium, Mesh, Scene, Shadow};
 use crate::techniques::{self, Map, Technique};
 #[cfg(doc)]
 use crate::truth;
@@ -96,7 +96,8 @@ impl Configuration {
         let is_scattered = self.scattering.is_some();
         let has_area = lights.any(|light| light.area.radius > 0.0);
         let mut lights = scene.lights.iter();
-        let is_refused = lights.any(|l| l.refuses(has_medium).is_some());
+        let refused = |l: &Light| self.scattering.and_then(|s| l.refuses(s.technique));
+        let is_refused = lights.any(|l| refused(l).is_some());
         (!self.technique.is_soft || has_area) && !is_refused && is_scattered == has_medium
     }
 

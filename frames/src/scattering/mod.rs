@@ -17,6 +17,8 @@ pub struct Scattering {
     pub summary: &'static str,
     /// Whether it looks at so many places along each ray as the scene says.
     pub has_steps: bool,
+    /// What is to be used in its place with spot lights, and why; `None` if it is for them.
+    pub not_for_spots: Option<&'static str>,
     /// Adds its passes: what the camera sees of a picture of surfaces through the medium.
     pub add: fn(&mut Graph, &Given, &Volume, Handle) -> Result<Handle>,
 }

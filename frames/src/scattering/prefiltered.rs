@@ -1,18 +1,31 @@
 //! Prefiltered single scattering with four moments, or with six: the filtered map is resampled such that rays
 //! from the camera are rows, and means along rows hold what each ray scatters up to any length.
+//!
+//! It is for directional lights, as the papers have it: their coordinates, and the bounds of these, are about the
+//! direction of the light. About the line from the camera to a spot light, rays would be rows as well, by the angle at
+//! the light. But there the transmittance to the camera and the phase function depend on a ray's inclination at each
+//! place of a row, and the weights of a row's means must not. The papers say nothing of that.
 
 use hankel_moments::bias::SYMMETRIC_6_32;
 use hankel_shadows::soft::Lines;
 
 use super::Scattering;
-use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, POWER_MOMENTS, Volume, blur, light_depth, moments, scatter};
+use crate::graph::{Graph, GraphError, Handle, Result};
+use crate::passes::{
+    Given, POWER_MOMENTS, Rectification, Volume, blur, light_depth, moments, scatter,
+};
 use crate::scene::Shadow;
+
+/// Why, and what else to use.
+const NOT_FOR_SPOTS: Option<&str> = Some(
+    "`ray-marching` with a light that has a `position`: prefiltered single scattering is that of directional lights",
+);
 
 pub const FOUR: Scattering = Scattering {
     name: "prefiltered",
     summary: "prefiltered single scattering, four moments",
     has_steps: false,
+    not_for_spots: NOT_FOR_SPOTS,
     add: add_four,
 };
 
@@ -20,6 +33,7 @@ pub const SIX: Scattering = Scattering {
     name: "prefiltered-6",
     summary: "prefiltered single scattering, six moments",
     has_steps: false,
+    not_for_spots: NOT_FOR_SPOTS,
     add: add_six,
 };
 
@@ -37,21 +51,31 @@ fn filtered(graph: &mut Graph, given: &Given) -> Result<Handle> {
     blur(graph, &given, map)
 }
 
+/// How rays are rows of the light's map.
+fn rectification(volume: &Volume) -> Result<Rectification> {
+    volume.rectification.ok_or_else(|| GraphError::Argument {
+        pass: "rectify".into(),
+        kernel: "rectify".into(),
+        parameter: "rectified".into(),
+        problem: "a spot light has no such coordinates: use ray marching".into(),
+    })
+}
+
 /// Means along rows of the rectified map: of the first four moments for `order` 0, of the others for 1.
 fn means(
     graph: &mut Graph,
     given: &Given,
-    volume: &Volume,
+    rectification: &Rectification,
     map: Handle,
     order: u32,
 ) -> Result<Handle> {
-    let [columns, rows] = volume.texels;
+    let [columns, rows] = rectification.texels;
     let table = graph
         .compute("rectify", "rectify")
         .constant("order", order)
         .arg("light", given.light)
-        .arg("rectified", volume.rectified)
-        .arg("rows", volume.rows)
+        .arg("rectified", rectification.rectified)
+        .arg("rows", rectification.rows)
         .arg("map", map)
         .elements(columns as usize * rows as usize)?;
     let lines = Lines {
@@ -64,8 +88,8 @@ fn means(
     let summed = graph
         .compute("means", "prefix_means")
         .arg("lines", lines)
-        .arg("rectified", volume.rectified)
-        .arg("rows", volume.rows)
+        .arg("rectified", rectification.rectified)
+        .arg("rows", rectification.rows)
         .arg("table", table)
         .finish()?;
     // The kernel writes its table.
@@ -73,22 +97,27 @@ fn means(
 }
 
 fn add_four(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -> Result<Handle> {
+    let rectification = rectification(volume)?;
     let map = filtered(graph, given)?;
-    let table = means(graph, given, volume, map, 0)?;
+    let table = means(graph, given, &rectification, map, 0)?;
     scatter(
         graph,
         given,
         volume,
         picture,
         "scatter_prefiltered",
-        |pass| pass.arg("rectified", volume.rectified).arg("table", table),
+        |pass| {
+            pass.arg("rectified", rectification.rectified)
+                .arg("table", table)
+        },
     )
 }
 
 fn add_six(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -> Result<Handle> {
+    let rectification = rectification(volume)?;
     let map = filtered(graph, given)?;
-    let first = means(graph, given, volume, map, 0)?;
-    let second = means(graph, given, volume, map, 1)?;
+    let first = means(graph, given, &rectification, map, 0)?;
+    let second = means(graph, given, &rectification, map, 1)?;
     let target = graph.constant("bias target", &SYMMETRIC_6_32.six());
     scatter(
         graph,
@@ -97,7 +126,7 @@ fn add_six(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -
         picture,
         "scatter_prefiltered_6",
         |pass| {
-            pass.arg("rectified", volume.rectified)
+            pass.arg("rectified", rectification.rectified)
                 .arg("target", target)
                 .arg("first", first)
                 .arg("second", second)

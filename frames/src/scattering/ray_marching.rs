@@ -1,4 +1,5 @@
-//! Ray marching: along each pixel's ray, places are lit or not by the nearest depth of the shadow map.
+//! Ray marching: along each pixel's ray, places are lit or not by the nearest depth of the shadow map. With a spot
+//! light these are places within its cone.
 
 use super::Scattering;
 use crate::graph::{Graph, Handle, Result};
@@ -8,12 +9,18 @@ pub const TECHNIQUE: Scattering = Scattering {
     name: "ray-marching",
     summary: "steps along each ray, each with a lookup in the shadow map",
     has_steps: true,
+    not_for_spots: None,
     add,
 };
 
 fn add(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -> Result<Handle> {
     let depth = light_depth(graph, given)?;
-    scatter(graph, given, volume, picture, "scatter_march", |pass| {
+    let kernel = if given.is_spot {
+        "scatter_march_spot"
+    } else {
+        "scatter_march"
+    };
+    scatter(graph, given, volume, picture, kernel, |pass| {
         pass.arg("depth", depth)
             .note(format!("{} steps", volume.steps))
     })

@@ -3,6 +3,8 @@
 use hankel_dsl::glam::{DVec3, Vec3};
 use serde::Deserialize;
 
+use crate::scattering::Scattering;
+
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
@@ -77,11 +79,10 @@ impl Light {
         }
     }
 
-    /// Why a medium is not for this light; `None` if it is.
+    /// What a medium's technique would have to be, if this one is not for the light; `None` if it is.
     #[must_use]
-    pub fn refuses(&self, has_medium: bool) -> Option<&'static str> {
-        (has_medium && self.spot().is_some())
-            .then_some("left out, or no `[medium]`: scattering is that of directional lights")
+    pub fn refuses(&self, scattering: &Scattering) -> Option<&'static str> {
+        self.spot().and(scattering.not_for_spots)
     }
 
     /// The spot light, if it is one.

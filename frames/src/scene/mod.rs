@@ -46,7 +46,7 @@
 //! extinction = 0.1                # share of light lost per unit of length
 //! scattering = 0.1                # what of it is scattered, the rest is absorbed; all of it, default
 //! anisotropy = 0.0                # mean cosine of the angle of scattering, default: to all sides alike
-//! technique = "prefiltered"       # default; or another of `scattering::ALL`
+//! technique = "prefiltered"       # or another of `scattering::ALL`; default: the first for all of the lights
 //! steps = 64                      # along a ray, where one is marched along
 //!
 //! [output]

@@ -521,30 +521,19 @@ impl Reader<'_> {
         })
     }
 
-    fn lights(&self, given: Spanned<Lights>, has_medium: bool) -> Result<Vec<Light>> {
+    fn lights(&self, given: Spanned<Lights>) -> Result<Vec<Light>> {
         let span = given.span();
         let Lights(tables) = given.into_inner();
         if !(1..=Scene::MAX_LIGHTS).contains(&tables.len()) {
             let allowed = format!("1 to {} tables `[[light]]`", Scene::MAX_LIGHTS);
             return self.refuse(span, "light", tables.len(), allowed);
         }
-        let mut lights = Vec::with_capacity(tables.len());
-        for table in tables {
-            let place = table
-                .position
-                .as_ref()
-                .map_or_else(|| span.clone(), Spanned::span);
-            let light = self.light(table)?;
-            if let Some(why) = light.refuses(has_medium) {
-                let position = light.spot().map_or(Vec3::ZERO, |spot| spot.position);
-                return self.refuse(place, "light.position", position, why);
-            }
-            lights.push(light);
-        }
-        Ok(lights)
+        tables.into_iter().map(|table| self.light(table)).collect()
     }
 
-    fn medium(&self, m: MediumText) -> Result<Medium> {
+    /// The medium, by the first technique that is for all of the scene's lights unless it names one.
+    fn medium(&self, m: MediumText, lights: &[Light]) -> Result<Medium> {
+        let refused = |technique: &Scattering| lights.iter().find_map(|l| l.refuses(technique));
         let d = Medium::default();
         let extinction = self.number("medium.extinction", Some(m.extinction), 0.0, 1e-6..=1e6)?;
         if let Some(scattering) = &m.scattering
@@ -559,7 +548,13 @@ impl Reader<'_> {
         }
         let technique = match &m.technique {
             Some(name) => match Scattering::named(name.get_ref()) {
-                Some(technique) => technique,
+                Some(technique) => {
+                    if let Some(instead) = refused(technique) {
+                        let name_given = format!("`{}`", name.get_ref());
+                        return self.refuse(name.span(), "medium.technique", name_given, instead);
+                    }
+                    technique
+                }
                 None => {
                     let names = scattering::ALL.map(|t| t.name.to_owned());
                     return self.refuse(
@@ -570,7 +565,10 @@ impl Reader<'_> {
                     );
                 }
             },
-            None => d.technique,
+            None => scattering::ALL
+                .into_iter()
+                .find(|technique| refused(technique).is_none())
+                .unwrap_or(d.technique),
         };
         Ok(Medium {
             extinction,
@@ -586,11 +584,13 @@ impl Reader<'_> {
         let [width, height] = Scene::DEFAULT_OUTPUT;
         let pixels = 1..=Scene::MAX_OUTPUT;
         let shadow = self.shadow(f.shadow)?;
+        let lights = self.lights(f.light)?;
+        let medium = f.medium.map(|m| self.medium(m, &lights)).transpose()?;
         Ok(Scene {
             geometry: self.geometry(f.geometry)?,
             camera: self.camera(&f.camera, fov)?,
-            lights: self.lights(f.light, f.medium.is_some())?,
-            medium: f.medium.map(|m| self.medium(m)).transpose()?,
+            lights,
+            medium,
             shadow,
             width: self.integer("output.width", f.output.width, width, pixels.clone())?,
             height: self.integer("output.height", f.output.height, height, pixels)?,

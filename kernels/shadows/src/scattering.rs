@@ -1,14 +1,21 @@
-//! Single scattering of a directional light in a homogeneous medium: by marching along rays, and prefiltered
-//! with four or six moments (\[BHS\], lecture, "Prefiltered single scattering"; \[PSS\]). Sources are named in
-//! [`hankel_moments`].
+//! Single scattering of a light in a homogeneous medium: of a directional light by marching along rays, and
+//! prefiltered with four or six moments (\[BHS\], lecture, "Prefiltered single scattering"; \[PSS\]); of a spot
+//! light by marching along rays. Sources are named in [`hankel_moments`].
 //!
 //! Both see of a picture what the camera does, depth by depth, and give the picture as it is behind the
 //! medium: what surfaces send to the camera is weakened, and what the medium scatters is added. The share of
 //! light that a ray's medium scatters, ∫ V(s) σ exp(-σ s) ds with the visibility V of the light and the
 //! extinction σ, is from 0 to 1; phase function and albedo are factors of all of it.
 //!
+//! Of a spot light, the radiance is ∫ V(s) σ_s exp(-σ s) p(θ(s)) E(s) ds: the phase function p differs from place
+//! to place, as does the irradiance E of a face that is turned to the light. That is what surfaces get: the intensity
+//! over the square of the distance, times what the cone leaves. The medium does not weaken a light on its way to a
+//! place, neither for surfaces nor for the medium itself.
+//!
 //! Prefiltered single scattering turns the map into coordinates in which rays from the camera are rows (see
-//! [`hankel_moments::rectified_bounds`]). Then a mean over a row's first texels is an integral along rays.
+//! [`hankel_moments::rectified_bounds`]). Then a mean over a row's first texels is an integral along rays. These
+//! coordinates are about the direction of the light, which a spot light does not have: \[BHS\] defines them for
+//! directional lights only.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{
@@ -23,7 +30,7 @@ use hankel_moments::{
 
 use crate::depth::row_times_point;
 use crate::grid::within;
-use crate::shade::Light;
+use crate::shade::{Light, within_cone};
 use crate::soft::{Lines, in_texels, nearest, texel};
 
 /// How a picture's pixels look into the world.
@@ -41,7 +48,7 @@ pub struct View {
     pub down: Vec4,
 }
 
-/// A homogeneous medium that a directional light shines through.
+/// A homogeneous medium that a light shines through.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
 pub struct Medium {
@@ -152,19 +159,46 @@ impl Ray {
         }
     }
 
-    /// The cosine of the angle between the ray and the way the light goes.
+    /// How far along the view the farthest sample ends.
+    #[inline(always)]
+    fn farthest(&self) -> f32 {
+        Real::max(
+            Real::max(self.ends.x, self.ends.y),
+            Real::max(self.ends.z, self.ends.w),
+        )
+    }
+
+    /// What passes from a place to the camera, each sample's way cut off at its surface: the mean of them. What
+    /// two places differ by in this is what the medium between them takes.
+    #[inline(always)]
+    fn remains(&self, passed: f32) -> f32 {
+        mean(Vec4::new(
+            Real::max(passed, self.passed.x),
+            Real::max(passed, self.passed.y),
+            Real::max(passed, self.passed.z),
+            Real::max(passed, self.passed.w),
+        ))
+    }
+
+    /// The cosine of the angle between the ray and the way a directional light goes.
     #[inline(always)]
     fn cosine(&self, light: &Light) -> f32 {
         -dot(light.position, self.direction) / self.length
     }
 
-    /// What is seen of a surface's colour through the medium, which scatters this share of the light, from 0
-    /// to 1. Each channel is in [0, 65504], which is the most that a 16-bit float holds.
+    /// What the medium sends to the camera of a directional light of irradiance 1, if it scatters this share of
+    /// it, from 0 to 1. What is scattered goes against the ray.
     #[inline(always)]
-    fn behind(&self, picture: Vec4, medium: &Medium, light: &Light, share: f32) -> Vec4 {
+    fn scattered(&self, medium: &Medium, light: &Light, share: f32) -> f32 {
+        let phase = henyey_greenstein(medium.anisotropy, -self.cosine(light));
+        medium.source * phase * share
+    }
+
+    /// What is seen of a surface's colour through the medium, which adds so much for a light's colour of 1. Each
+    /// channel is in [0, 65504], which is the most that a 16-bit float holds.
+    #[inline(always)]
+    fn behind(&self, picture: Vec4, light: &Light, added: f32) -> Vec4 {
         let through = mean(self.passed);
-        let phase = henyey_greenstein(medium.anisotropy, self.cosine(light));
-        let added = medium.source * phase * share;
         let seen = |c: f32, light: f32| Real::clamp(c * through + added * light, 0.0, 65504.0);
         Vec4::new(
             seen(picture.x, light.colour.x),
@@ -188,11 +222,11 @@ fn offset(at: UVec2) -> f32 {
     math::fract(52.982_918 * math::fract(x))
 }
 
-/// A picture through a medium, by marching along each pixel's ray: `steps` places as far from each other, from
-/// a start that differs from pixel to pixel but not from frame to frame, each of which is lit or not by the
-/// nearest depth of the map. A step counts as much as it scatters towards the camera, and of each sample of
-/// the pixel as far as that sample's surface. Of multisampled texels one sample is looked at, another one in
-/// each step.
+/// A picture through a medium that a directional light shines through, by marching along each pixel's ray: `steps`
+/// places as far from each other, from a start that differs from pixel to pixel but not from frame to frame, each
+/// of which is lit or not by the nearest depth of the map. A step counts as much as it scatters towards the camera,
+/// and of each sample of the pixel as far as that sample's surface. Of multisampled texels one sample is looked at,
+/// another one in each step.
 #[kernel(
     compute,
     threads(8, 8),
@@ -231,22 +265,9 @@ pub fn scatter_march(
         dot(light.row_depth, ray.direction),
     );
     let size = depth.size();
-    let far = Real::max(
-        Real::max(ray.ends.x, ray.ends.y),
-        Real::max(ray.ends.z, ray.ends.w),
-    );
-    let step = far / Real::max(medium.steps as f32, 1.0);
+    let step = ray.farthest() / Real::max(medium.steps as f32, 1.0);
     let per_step = transmittance(medium.extinction, step * ray.length);
     let offset = offset(at);
-    // What has been passed, and what of it comes from before the samples' surfaces.
-    let remains = |passed: f32| {
-        mean(Vec4::new(
-            Real::max(passed, ray.passed.x),
-            Real::max(passed, ray.passed.y),
-            Real::max(passed, ray.passed.z),
-            Real::max(passed, ray.passed.w),
-        ))
-    };
     let (mut passed, mut before, mut share) = (1.0, 1.0, 0.0);
     let mut i = 0;
     while i < medium.steps {
@@ -262,7 +283,7 @@ pub fn scatter_march(
             .load(nearest(place, size), i.checked_rem(samples).unwrap_or(0))
             .x;
         passed *= per_step;
-        let after = remains(passed);
+        let after = ray.remains(passed);
         // Nothing is beyond the map's depth.
         if found >= Real::min(z + dz * t, 1.0) {
             share += before - after;
@@ -270,7 +291,167 @@ pub fn scatter_march(
         before = after;
         i += 1;
     }
-    ray.behind(picture.load(at), medium, light, Real::saturate(share))
+    let added = ray.scattered(medium, light, Real::saturate(share));
+    ray.behind(picture.load(at), light, added)
+}
+
+/// A ray that passes a spot light nearer than this share of its own length is taken to pass it so far off, which
+/// is less than a pixel.
+const NEAREST: f32 = 1e-4;
+
+/// What a spot light's cone holds of a ray. A place of it is told by the angle that it is seen by from the light,
+/// from the ray's nearest place on: of equal angles, equal parts of the light's irradiance arrive (equi-angular
+/// sampling; C. Kulla and M. Fajardo: Importance Sampling Techniques for Path Tracing in Participating Media, 2012).
+struct Crossing {
+    /// How far along the ray the place is that is nearest to the light.
+    foot: f32,
+    /// How far that is from the light.
+    distance: f32,
+    /// The length of the ray.
+    length: f32,
+    /// The angles, above -π/2 and below π/2; both are the same if the cone holds nothing of the ray.
+    first: f32,
+    last: f32,
+}
+
+impl Crossing {
+    /// Of the ray from `eye` along `way`, which is of length 1.
+    #[inline(always)]
+    fn new(light: &Light, eye: Vec3, way: Vec3, length: f32) -> Self {
+        let toward = Vec3::new(
+            light.position.x - eye.x,
+            light.position.y - eye.y,
+            light.position.z - eye.z,
+        );
+        let foot = toward.x * way.x + toward.y * way.y + toward.z * way.z;
+        let off = Vec3::new(
+            foot * way.x - toward.x,
+            foot * way.y - toward.y,
+            foot * way.z - toward.z,
+        );
+        let square = off.x * off.x + off.y * off.y + off.z * off.z;
+        let distance = Real::max(Real::sqrt(square), Real::max(NEAREST * length, 1e-10));
+        // The way from the light to a place is cos θ off / distance + sin θ way. Its product with the cone's axis,
+        // scaled as `light.cone` is, is the cosine of θ less the angle in the middle, times the root of `most`.
+        let across = dot(light.cone, off) / distance;
+        let along = dot(light.cone, way);
+        let edge = -light.cone.w;
+        let most = across * across + along * along;
+        let beyond = most - edge * edge;
+        let half = math::atan2(Real::sqrt(Real::max(beyond, 0.0)), edge);
+        let middle = math::atan2(along, across);
+        let first = Real::max(math::atan2(-foot, distance), middle - half);
+        let last = Real::min(math::atan2(length - foot, distance), middle + half);
+        Self {
+            foot,
+            distance,
+            length,
+            first,
+            last: if beyond > 0.0 {
+                Real::max(first, last)
+            } else {
+                first
+            },
+        }
+    }
+
+    /// How far along the ray an angle's place is, and one over its distance from the light.
+    #[inline(always)]
+    fn at(&self, angle: f32) -> (f32, f32) {
+        let (sin, cos) = math::sin_cos(angle);
+        let cos = Real::max(cos, 1e-6);
+        let s = self.foot + self.distance * (sin / cos);
+        (Real::clamp(s, 0.0, self.length), cos / self.distance)
+    }
+}
+
+/// A picture through a medium that a spot light shines through, by marching along what the light's cone holds of
+/// each pixel's ray: `steps` parts that the light sees by equal angles, a place in each, which is lit or not by the
+/// nearest depth of the map. Where it lies in its part differs from pixel to pixel but not from frame to frame. A
+/// part counts as much as the medium in it scatters towards the camera: transmittance and the fall of the light with
+/// the square of the distance are integrals over the part; cone and phase function are those of its place. Samples
+/// are looked at as by [`scatter_march`].
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16float, rgba32float),
+    pinned,
+    inputs = crate::inputs::scattering::marched_spot,
+    parity(
+        ulp = 1,
+        exact(rgba32float),
+        why = "rounding to 16 bits, up or down: one step"
+    )
+)]
+pub fn scatter_march_spot(
+    #[index] at: UVec2,
+    #[constant(id = 0, default = 4)]
+    #[values(1, 4)]
+    samples: u32,
+    #[uniform] view: &View,
+    #[uniform] medium: &Medium,
+    #[uniform] light: &Light,
+    #[texture] picture: Texture2d<'_>,
+    #[texture] surfaces: Texture2dMultisampled<'_>,
+    #[texture] depth: Texture2dMultisampled<'_>,
+) -> Vec4 {
+    let ray = Ray::new(view, medium, surfaces, at, samples);
+    let eye = Vec3::new(view.eye.x, view.eye.y, view.eye.z);
+    let way = Vec3::new(
+        ray.direction.x / ray.length,
+        ray.direction.y / ray.length,
+        ray.direction.z / ray.length,
+    );
+    let crossing = Crossing::new(light, eye, way, ray.farthest() * ray.length);
+    let part = (crossing.last - crossing.first) / Real::max(medium.steps as f32, 1.0);
+    // The mean of 1 / d² between two places that are 1 / a and 1 / b off is a b part / sin(part).
+    let wide = Real::min(part, 3.0);
+    let stretch = wide / Real::max(math::sin(wide), 1e-20);
+    let offset = offset(at);
+    let size = depth.size();
+    let (mut start, mut near) = crossing.at(crossing.first);
+    let mut before = ray.remains(transmittance(medium.extinction, start));
+    let mut share = 0.0;
+    let mut i = 0;
+    while i < medium.steps {
+        let (end, far) = crossing.at(crossing.first + (i as f32 + 1.0) * part);
+        let s = start + (end - start) * offset;
+        let world = Vec3::new(eye.x + s * way.x, eye.y + s * way.y, eye.z + s * way.z);
+        // All places are before the light; the floor keeps what is beside it finite.
+        let w = Real::max(row_times_point(light.row_w, world), 1e-6);
+        let place = in_texels(
+            Vec2::new(
+                Real::clamp(row_times_point(light.row_u, world) / w, -16.0, 16.0),
+                Real::clamp(row_times_point(light.row_v, world) / w, -16.0, 16.0),
+            ),
+            size,
+        );
+        let found = depth
+            .load(nearest(place, size), i.checked_rem(samples).unwrap_or(0))
+            .x;
+        let toward = Vec3::new(
+            light.position.x - world.x,
+            light.position.y - world.y,
+            light.position.z - world.z,
+        );
+        let square = toward.x * toward.x + toward.y * toward.y + toward.z * toward.z;
+        let distance = Real::max(Real::sqrt(square), 1e-20);
+        let cosine = (toward.x * way.x + toward.y * way.y + toward.z * way.z) / distance;
+        let phase = henyey_greenstein(medium.anisotropy, cosine);
+        let fall = 1.0 - light.colour.w + light.colour.w * (near * far * stretch);
+        let within = within_cone(light, toward, distance);
+        let unshaded = (within * within) * fall * phase;
+        let after = ray.remains(transmittance(medium.extinction, end));
+        // Nothing is beyond the map's depth.
+        if found >= Real::min(row_times_point(light.row_depth, world) / w, 1.0) {
+            share += (before - after) * unshaded;
+        }
+        start = end;
+        near = far;
+        before = after;
+        i += 1;
+    }
+    ray.behind(picture.load(at), light, medium.source * share)
 }
 
 /// What lies between two texels of four numbers each.
@@ -589,7 +770,8 @@ pub fn scatter_prefiltered(
         let bounds = hamburger_4_bounds(m.lerp(TARGET, rectified.eye.w), depth);
         overestimated(bounds, ray.cosine(light))
     });
-    ray.behind(picture.load(at), medium, light, share)
+    let added = ray.scattered(medium, light, share);
+    ray.behind(picture.load(at), light, added)
 }
 
 /// The same with six moments, of which the last two stand in a second table. `target` is the moment vector that
@@ -647,5 +829,6 @@ pub fn scatter_prefiltered_6(
         let bounds = hamburger_6(m.lerp(*target, rectified.eye.w), depth);
         overestimated(bounds, ray.cosine(light))
     });
-    ray.behind(picture.load(at), medium, light, share)
+    let added = ray.scattered(medium, light, share);
+    ray.behind(picture.load(at), light, added)
 }

@@ -90,10 +90,18 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f32 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 
-/// What of the light a face gets that nothing shades: the cosine of the angle between its normal and the light,
-/// times what the cone and the distance leave. 0 for a face that is turned from the light, and outside of its cone.
+/// How far within a light's cone a place is from which the light is `toward`, so far off: from 0 to 1. The square
+/// of it is what the cone leaves of the light.
 ///
 /// The cone fades as in glTF (KHR_lights_punctual, "Inner and Outer Cone Angles").
+#[inline(always)]
+pub(crate) fn within_cone(light: &Light, toward: Vec3, distance: f32) -> f32 {
+    let axis = Vec3::new(light.cone.x, light.cone.y, light.cone.z);
+    Real::saturate(light.cone.w - dot(axis, toward) / distance)
+}
+
+/// What of the light a face gets that nothing shades: the cosine of the angle between its normal and the light,
+/// times what the cone and the distance leave. 0 for a face that is turned from the light, and outside of its cone.
 #[inline(always)]
 fn unshaded(light: &Light, world: Vec3, normal: Vec3) -> f32 {
     let toward = Vec3::new(
@@ -107,8 +115,7 @@ fn unshaded(light: &Light, world: Vec3, normal: Vec3) -> f32 {
     let distance = Real::max(Real::sqrt(square), 1e-20);
     let length = Real::max(Real::sqrt(dot(normal, normal)), 1e-20);
     let cosine = Real::max(dot(normal, toward) / length / distance, 0.0);
-    let axis = Vec3::new(light.cone.x, light.cone.y, light.cone.z);
-    let within = Real::saturate(light.cone.w - dot(axis, toward) / distance);
+    let within = within_cone(light, toward, distance);
     let fall = Real::max(1.0 - light.colour.w + light.colour.w * square, 1e-20);
     cosine * (within * within) / fall
 }

@@ -182,7 +182,7 @@ pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32)
 
 /// The same map as a spot light has one: above its middle, with a cone that fades within it, and everything divided
 /// by 2, which is exact.
-fn spot(light: &Light) -> Light {
+pub(super) fn spot(light: &Light) -> Light {
     Light {
         row_u: light.row_u * 2.0,
         row_v: light.row_v * 2.0,

@@ -232,18 +232,28 @@ fn four(all: &[[f64; 6]], first: usize) -> Vec<Vec4> {
 
 /// What every picture through a medium is made of; `of` adds what a technique looks up.
 fn pictures(request: &Request, of: impl Fn(Given, &Camera, &Medium) -> Given) -> Vec<Given> {
+    lit(request, &[light(); 3], of)
+}
+
+/// The same with lights, one for each camera.
+fn lit(
+    request: &Request,
+    lights: &[Light; 3],
+    of: impl Fn(Given, &Camera, &Medium) -> Given,
+) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     cameras()
         .iter()
         .zip(media())
-        .map(|(camera, medium)| {
+        .zip(lights)
+        .map(|((camera, medium), light)| {
             let mut colour = || s.between(0.0, 1.5) as f32;
             let mut pixel = || Vec4::new(colour(), colour(), colour(), 1.0);
             let picture: Vec<Vec4> = (0..SIZE[0] * SIZE[1]).map(|_| pixel()).collect();
             let given = Given::new(camera.what)
                 .uniform("view", &camera.view())
                 .uniform("medium", &medium)
-                .uniform("light", &light())
+                .uniform("light", light)
                 .texture("picture", SIZE, 1, TexelFormat::Rgba32Float, picture)
                 .texture(
                     "surfaces",
@@ -257,18 +267,39 @@ fn pictures(request: &Request, of: impl Fn(Given, &Camera, &Medium) -> Given) ->
         .collect()
 }
 
+/// With the map's samples.
+fn with_depth(given: Given) -> Given {
+    let map = maps::samples();
+    given.texture(
+        "depth",
+        SIZE,
+        SAMPLES as u32,
+        TexelFormat::R32Float,
+        map.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
+    )
+}
+
 /// What marching along rays reads.
 #[must_use]
 pub fn marched(request: &Request) -> Vec<Given> {
-    let map = maps::samples();
-    pictures(request, |given, _, _| {
-        given.texture(
-            "depth",
-            SIZE,
-            SAMPLES as u32,
-            TexelFormat::R32Float,
-            map.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
-        )
+    pictures(request, |given, _, _| with_depth(given))
+}
+
+/// The same with a spot light: one above the map, one that does not fall off with the distance, and one that the
+/// camera's rays pass close by.
+#[must_use]
+pub fn marched_spot(request: &Request) -> Vec<Given> {
+    let above = maps::spot(&light());
+    let even = Light {
+        colour: above.colour.truncate().extend(0.0),
+        ..above
+    };
+    let near = Light {
+        position: Vec4::new(0.33, 0.3, 0.55, 1.0),
+        ..above
+    };
+    lit(request, &[above, even, near], |given, _, _| {
+        with_depth(given)
     })
 }
 
