@@ -410,3 +410,29 @@ fn is_valid(n: usize, m: [f32; 11]) -> bool {
     }
     true
 }
+
+/// Powers of two change no digit: the derivative to the query point is in proportion to the total.
+#[test]
+fn the_derivative_to_the_query_point_is_in_proportion_to_the_total() {
+    let d = Distribution(
+        (0..7)
+            .map(|i| (0.3 * f64::from(i) - 0.95, 1.0 / 7.0))
+            .collect(),
+    );
+    let row = (moments(&d, 1.0).map(|m| m as f32), 0.21);
+    for n in 1..=5 {
+        let at_one = of_order!(n, bound_adjoint::<f32>(row.0, row.1, 0.3, 1.0));
+        assert!(at_one.eta.abs() > 1e-3, "{n} {at_one:?}");
+        for exponent in [-80, -40, 40, 84, 100, 110] {
+            let scale = 2.0_f32.powi(exponent);
+            let m = row.0.map(|m| m * scale);
+            let g = of_order!(n, bound_adjoint::<f32>(m, row.1, 0.3, 1.0));
+            assert_eq!(g.m, at_one.m, "{n} {exponent}");
+            assert_eq!(g.eta, at_one.eta * scale, "{n} {exponent}");
+        }
+        // Never infinite.
+        let m = row.0.map(|m| m * 2.0_f32.powi(110));
+        let g = of_order!(n, bound_adjoint::<f32>(m, row.1, 0.3, 1e12));
+        assert!(g.eta.abs() > 9e36 && g.eta.abs() < 1.1e37, "{n} {g:?}");
+    }
+}

@@ -32,7 +32,8 @@ pub struct Gradient<R> {
 /// derivatives to moments and query point, times `d_bound`.
 ///
 /// Takes anything that [`bound`](super::bound) takes. Each factor of a derivative is limited to
-/// 1e25, `d_bound` to 1e12.
+/// 1e25, `d_bound` to 1e12, and the derivative to the query point, which is in proportion to the total,
+/// to 1e37.
 #[inline(always)]
 pub fn bound_adjoint<R: Real, const N: usize>(
     m: [R; MAX_MOMENTS],
@@ -110,7 +111,10 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     });
     let present = recurrence.total.gt(zero);
     let factor = R::select(present, finite(d_bound, lit!(1e12)), zero);
-    let d_eta = -(kernel.own * recurrence.total).min(limit) * q[1];
+    // The total is the last factor: it may be large where the others are small.
+    let d_eta = (kernel.own * q[1]).clamp(-limit, limit) * -factor;
+    let most: R = lit!(1e37);
+    let d_eta = d_eta * recurrence.total.min(most / d_eta.abs().max(one));
 
     // In powers of x: Horner's scheme, repeated.
     let eta = finite(eta, lit!(1e12));
@@ -125,7 +129,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     });
     let mut gradient = Gradient {
         m: [zero; MAX_MOMENTS],
-        eta: d_eta.clamp(-limit, limit) * factor,
+        eta: d_eta,
     };
     unroll!(i in 0..(2 * N + 1), max 11, {
         gradient.m[i] = q[i] * factor;
