@@ -7,8 +7,8 @@ mod common;
 use common::Distribution;
 use hankel_dsl::Real;
 use hankel_moments::{
-    Bounds, Canonical, Gradient, bias_target, bound, bound_adjoint, bound_compensated, canonical,
-    mix_bias,
+    Bounds, Canonical, Gradient, bias_target, bound, bound_adjoint, bound_adjoint_compensated,
+    bound_compensated, canonical, mix_bias,
 };
 use proptest::prelude::*;
 
@@ -221,8 +221,10 @@ proptest! {
         for b in [bounds(n, m, eta), compensated(n, m, eta)] {
             prop_assert!(0.0 <= b.lower && b.lower <= b.upper && b.upper <= total, "{b:?}");
         }
-        let g = gradient(n, m, eta, 0.3);
-        prop_assert!(g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()), "{g:?}");
+        let compensated = of_order!(n, bound_adjoint_compensated::<f64>(m, eta, 0.3, 1.0));
+        for g in [gradient(n, m, eta, 0.3), compensated] {
+            prop_assert!(g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()), "{g:?}");
+        }
     }
 
     #[test]
@@ -240,11 +242,15 @@ fn check_32(n: usize, m: [f32; 11], eta: f32) -> Result<(), TestCaseError> {
             "{b:?} for {m:?} at {eta}"
         );
     }
-    let g = of_order!(n, bound_adjoint::<f32>(m, eta, 0.3, 1.0));
-    prop_assert!(
-        g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()),
-        "{g:?} for {m:?} at {eta}"
-    );
+    for g in [
+        of_order!(n, bound_adjoint::<f32>(m, eta, 0.3, 1.0)),
+        of_order!(n, bound_adjoint_compensated::<f32>(m, eta, 0.3, 1.0)),
+    ] {
+        prop_assert!(
+            g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()),
+            "{g:?} for {m:?} at {eta}"
+        );
+    }
     let c = of_order!(n, canonical::<f32>(m, eta));
     prop_assert!(
         c.own.is_finite()
