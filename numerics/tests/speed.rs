@@ -78,6 +78,7 @@ fn counts(speed: &Speed) {
     assert!(flops(Solver::Plain, 2) > flops(Solver::Plain, 1));
     assert!(flops(Solver::Compensated, 2) > flops(Solver::Plain, 2));
     assert!(flops(Solver::Adjoint, 2) > flops(Solver::Plain, 2));
+    assert!(flops(Solver::CompensatedAdjoint, 2) > flops(Solver::Adjoint, 2));
 }
 
 /// A kernel does not beat what the machine can do. Measured limits scatter on a busy machine, and

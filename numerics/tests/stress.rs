@@ -1,6 +1,7 @@
 //! Every family through every kernel, and faults that are planted to be found.
 
 use hankel_dsl::native::describe::Kernel;
+use hankel_moments::{Bounds, Moments6, hamburger_6, hamburger_6_compensated};
 use hankel_numerics::accuracy::{singularities, table_1};
 use hankel_numerics::families::{FAMILIES, Family, Precision, Row, scaled, validity};
 use hankel_numerics::numbers::DoubleDouble;
@@ -107,18 +108,23 @@ fn derivatives_are_measured_by_what_rounding_does_to_them() {
         derivative_rows: 100,
         ..options(&["paper", "generic-unit", "silhouettes-biased"], 100)
     });
+    let plain: Vec<_> = stress
+        .derivatives
+        .iter()
+        .filter(|d| d.solver == Solver::Plain)
+        .collect();
     // By family, n from 1 to 3, and format.
-    assert_eq!(stress.derivatives.len(), 18);
-    for d in &stress.derivatives {
+    assert_eq!(plain.len(), 18);
+    for d in &plain {
         let over = d.over.unwrap();
         assert_eq!((d.non_finite, d.valid), (0, 100), "{d:?}");
         // Half of the rows have no derivative that is worse than a few roundings.
         assert!(over.median < 4.0, "{d:?}");
     }
     // What digits are lost without compensation is seen.
-    assert!(stress.report("x").table("derivatives-over").is_some());
+    assert!(stress.report("x").table("derivatives-over-plain").is_some());
     let greatest = |n: usize| {
-        let of_order = stress.derivatives.iter().filter(|d| d.n == n);
+        let of_order = plain.iter().filter(|d| d.n == n);
         of_order
             .filter_map(|d| d.over)
             .map(|o| o.greatest)
@@ -138,18 +144,81 @@ fn derivatives_that_are_no_number_are_found() {
     let mut faulty = Faulty {
         inner: Native::scalar(),
         fault: |kernel: &Kernel, x: &mut [f32]| {
-            if kernel.function.contains("adjoint") {
+            if kernel.function == "moment_bound_adjoint_n2" {
                 x[7] = f32::NAN;
             }
         },
     };
     let stress = run(&options, &mut [&mut faulty], &mut |_| ()).unwrap();
-    let [found] = &stress.derivatives[..] else {
-        panic!("one order")
+    let [found, compensated] = &stress.derivatives[..] else {
+        panic!("one order, two solvers")
     };
-    assert_eq!(found.non_finite, 1);
+    assert_eq!((found.non_finite, compensated.non_finite), (1, 0));
     assert_eq!(found.over.unwrap().greatest, f64::INFINITY);
     assert!(!stress.passed());
+}
+
+#[test]
+fn compensated_derivatives_are_as_exact_as_their_inputs() {
+    let stress = native(&Options {
+        derivative_rows: 100,
+        orders: vec![1, 2, 3],
+        ..options(&[], 100)
+    });
+    let mut cells = 0;
+    let mut beyond = Vec::new();
+    let mut plain = 0.0_f64;
+    // Not promised: totals of this family are subnormal.
+    for d in stress.derivatives.iter().filter(|d| d.family != "denormal") {
+        let Some(over) = d.over else {
+            continue;
+        };
+        assert_eq!(d.non_finite, 0, "{d:?}");
+        if d.solver == Solver::Plain {
+            plain = plain.max(over.ninety);
+            continue;
+        }
+        cells += 1;
+        if over.greatest > 4.0 {
+            beyond.push(format!("{d:?}"));
+        }
+    }
+    assert!(beyond.is_empty(), "{}", beyond.join("\n"));
+    // By family, n and format; without compensation, one in ten rows of some family is far beyond that.
+    assert!(cells > 100 && plain > 100.0, "{cells} {plain}");
+}
+
+#[test]
+fn compensated_six_moment_shadows_are_as_exact_as_their_inputs() {
+    let mut rows = 0;
+    let mut plain = 0.0_f64;
+    for family in FAMILIES.iter().filter(|f| f.has(3)) {
+        for index in 0..400 {
+            let row = family.row::<f32>(3, 2, index);
+            let in_range = row.m.iter().all(|m| m.abs() <= 1.0) && row.eta.abs() <= 2.0;
+            let Some(truth) = judgement(3, &row)
+                .truth
+                .filter(|_| in_range && row.m[0] == 1.0)
+            else {
+                continue;
+            };
+            let [_, b1, b2, b3, b4, b5, b6, ..] = row.m;
+            let moments = Moments6 {
+                b1,
+                b2,
+                b3,
+                b4,
+                b5,
+                b6,
+            };
+            let over = |b: Bounds<f32>| truth.over_sensitivity([b.lower, b.upper].map(f64::from));
+            let compensated = over(hamburger_6_compensated(moments, row.eta));
+            assert!(compensated <= 4.0, "{family}, row {index}: {compensated}");
+            plain = plain.max(over(hamburger_6(moments, row.eta)));
+            rows += 1;
+        }
+    }
+    assert!(rows > 1000 && plain > 10.0, "{rows} {plain}");
 }
 
 #[test]

@@ -54,6 +54,8 @@ fn maps_over_rows_are_clean() {
         kinds.map(|kind| format!("{kind}_n{n}"))
     });
     let others = [
+        "moment_bound_adjoint_compensated_n3",
+        "hamburger_6msm_compensated",
         "hamburger_4msm",
         "hausdorff_4msm",
         "hamburger_6msm",

@@ -70,7 +70,7 @@ pub use scattering::{
     RectifiedBounds, henyey_greenstein, inclination, rectified_bounds, rectified_depth,
     row_extinction, row_inclinations, transmittance,
 };
-pub use six::{blockers_6, hamburger_6};
+pub use six::{blockers_6, hamburger_6, hamburger_6_compensated};
 pub use sparse::{TwoPoints, sparse_2};
 pub use trigonometric::{HalfAngle, TrigonometricMoments, trigonometric_4};
 pub use variance::{blockers_2, variance_2};

@@ -7,8 +7,8 @@ mod common;
 use common::Distribution;
 use hankel_dsl::Real;
 use hankel_moments::{
-    Bounds, Canonical, Gradient, bias_target, bound, bound_adjoint, bound_compensated, canonical,
-    mix_bias,
+    Bounds, Canonical, Gradient, bias_target, bound, bound_adjoint, bound_adjoint_compensated,
+    bound_compensated, canonical, mix_bias,
 };
 use proptest::prelude::*;
 
@@ -221,8 +221,10 @@ proptest! {
         for b in [bounds(n, m, eta), compensated(n, m, eta)] {
             prop_assert!(0.0 <= b.lower && b.lower <= b.upper && b.upper <= total, "{b:?}");
         }
-        let g = gradient(n, m, eta, 0.3);
-        prop_assert!(g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()), "{g:?}");
+        let compensated = of_order!(n, bound_adjoint_compensated::<f64>(m, eta, 0.3, 1.0));
+        for g in [gradient(n, m, eta, 0.3), compensated] {
+            prop_assert!(g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()), "{g:?}");
+        }
     }
 
     #[test]
@@ -240,11 +242,15 @@ fn check_32(n: usize, m: [f32; 11], eta: f32) -> Result<(), TestCaseError> {
             "{b:?} for {m:?} at {eta}"
         );
     }
-    let g = of_order!(n, bound_adjoint::<f32>(m, eta, 0.3, 1.0));
-    prop_assert!(
-        g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()),
-        "{g:?} for {m:?} at {eta}"
-    );
+    for g in [
+        of_order!(n, bound_adjoint::<f32>(m, eta, 0.3, 1.0)),
+        of_order!(n, bound_adjoint_compensated::<f32>(m, eta, 0.3, 1.0)),
+    ] {
+        prop_assert!(
+            g.eta.is_finite() && g.m.iter().all(|g| g.is_finite()),
+            "{g:?} for {m:?} at {eta}"
+        );
+    }
     let c = of_order!(n, canonical::<f32>(m, eta));
     prop_assert!(
         c.own.is_finite()
@@ -409,4 +415,30 @@ fn is_valid(n: usize, m: [f32; 11]) -> bool {
         }
     }
     true
+}
+
+/// Powers of two change no digit: the derivative to the query point is in proportion to the total.
+#[test]
+fn the_derivative_to_the_query_point_is_in_proportion_to_the_total() {
+    let d = Distribution(
+        (0..7)
+            .map(|i| (0.3 * f64::from(i) - 0.95, 1.0 / 7.0))
+            .collect(),
+    );
+    let row = (moments(&d, 1.0).map(|m| m as f32), 0.21);
+    for n in 1..=5 {
+        let at_one = of_order!(n, bound_adjoint::<f32>(row.0, row.1, 0.3, 1.0));
+        assert!(at_one.eta.abs() > 1e-3, "{n} {at_one:?}");
+        for exponent in [-80, -40, 40, 84, 100, 110] {
+            let scale = 2.0_f32.powi(exponent);
+            let m = row.0.map(|m| m * scale);
+            let g = of_order!(n, bound_adjoint::<f32>(m, row.1, 0.3, 1.0));
+            assert_eq!(g.m, at_one.m, "{n} {exponent}");
+            assert_eq!(g.eta, at_one.eta * scale, "{n} {exponent}");
+        }
+        // Never infinite.
+        let m = row.0.map(|m| m * 2.0_f32.powi(110));
+        let g = of_order!(n, bound_adjoint::<f32>(m, row.1, 0.3, 1e12));
+        assert!(g.eta.abs() > 9e36 && g.eta.abs() < 1.1e37, "{n} {g:?}");
+    }
 }

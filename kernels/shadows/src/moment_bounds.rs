@@ -1,9 +1,13 @@
 //! Bounds for two, four, six, eight and ten power moments and a free total, and their derivatives,
 //! as maps over rows of moments: `moment_bound_n2` is for N = 2, moments `m0` to `m4`.
+//!
+//! Compensated derivatives are kernels for up to six moments: there their error is what rounding the row's
+//! numbers once does, whatever the row. For more moments they are functions of the library alone.
 
 use hankel_dsl::{Element, Real, kernel};
 use hankel_moments::{
-    MAX_MOMENTS, bias_target, bound, bound_adjoint, bound_compensated, mix_bias, mix_bias_adjoint,
+    Gradient, MAX_MOMENTS, bias_target, bound, bound_adjoint, bound_adjoint_compensated,
+    bound_compensated, mix_bias, mix_bias_adjoint,
 };
 
 /// How bounds are taken.
@@ -44,6 +48,7 @@ macro_rules! order {
         $(#[$bound_doc:meta])* $bound:ident,
         $(#[$adjoint_doc:meta])* $adjoint:ident,
         $(#[$compensated_doc:meta])* $compensated:ident
+        $(, $(#[$both_doc:meta])* $both:ident)?
     ) => {
         /// Moments and a query point.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -80,6 +85,15 @@ macro_rules! order {
             pub d_bound: R,
         }
 
+        impl<R: Real> $AdjointRow<R> {
+            #[inline(always)]
+            fn moments(&self) -> [R; MAX_MOMENTS] {
+                let mut m = [R::literal::<0>(); MAX_MOMENTS];
+                $(m[$k] = self.$m;)*
+                m
+            }
+        }
+
         /// A result's derivatives.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
         #[repr(C)]
@@ -90,6 +104,19 @@ macro_rules! order {
             )*
             /// To the query point.
             pub d_eta: R,
+        }
+
+        impl<R: Real> $Derivative<R> {
+            /// From the gradient to biased moments.
+            #[inline(always)]
+            fn new(d: Gradient<R>, settings: &BoundSettings<R>) -> Self {
+                let target = bias_target::<R, $n>();
+                let d_m = mix_bias_adjoint::<R, $n>(d.m, target, settings.bias);
+                Self {
+                    $($d_m: d_m[$k],)*
+                    d_eta: d.eta,
+                }
+            }
         }
 
         $(#[$bound_doc])*
@@ -148,22 +175,43 @@ macro_rules! order {
             #[uniform] settings: &BoundSettings<R>,
             #[element] row: $AdjointRow<R>,
         ) -> $Derivative<R> {
-            let mut m = [R::literal::<0>(); MAX_MOMENTS];
-            $(m[$k] = row.$m;)*
-            let target = bias_target::<R, $n>();
-            let m = mix_bias::<R, $n>(m, target, settings.bias);
+            let m = biased::<R, $n>(row.moments(), settings);
             let d = bound_adjoint::<R, $n>(
                 m,
                 row.eta,
                 settings.overestimation,
                 row.d_bound,
             );
-            let d_m = mix_bias_adjoint::<R, $n>(d.m, target, settings.bias);
-            $Derivative {
-                $($d_m: d_m[$k],)*
-                d_eta: d.eta,
-            }
+            $Derivative::new(d, settings)
         }
+
+        $(
+            $(#[$both_doc])*
+            #[kernel(
+                compute,
+                threads(64),
+                precision(f32, f64),
+                pinned,
+                inputs = crate::inputs::$adjoint_rows,
+                parity(
+                    absolute = 1e-12,
+                    why = "factors of derivatives that are as good as 0 may underflow"
+                )
+            )]
+            pub fn $both<R: Real>(
+                #[uniform] settings: &BoundSettings<R>,
+                #[element] row: $AdjointRow<R>,
+            ) -> $Derivative<R> {
+                let m = biased::<R, $n>(row.moments(), settings);
+                let d = bound_adjoint_compensated::<R, $n>(
+                    m,
+                    row.eta,
+                    settings.overestimation,
+                    row.d_bound,
+                );
+                $Derivative::new(d, settings)
+            }
+        )?
     };
 }
 
@@ -176,7 +224,10 @@ order! {
     moment_bound_adjoint_n1,
     /// Bound on the amount below a query point, from two power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
-    moment_bound_compensated_n1
+    moment_bound_compensated_n1,
+    /// Derivatives of the bound from two power moments and their total, times `d_bound`, with what is
+    /// ill-conditioned in about twice the digits.
+    moment_bound_adjoint_compensated_n1
 }
 
 order! {
@@ -188,7 +239,10 @@ order! {
     moment_bound_adjoint_n2,
     /// Bound on the amount below a query point, from four power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
-    moment_bound_compensated_n2
+    moment_bound_compensated_n2,
+    /// Derivatives of the bound from four power moments and their total, times `d_bound`, with what is
+    /// ill-conditioned in about twice the digits.
+    moment_bound_adjoint_compensated_n2
 }
 
 order! {
@@ -200,7 +254,10 @@ order! {
     moment_bound_adjoint_n3,
     /// Bound on the amount below a query point, from six power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
-    moment_bound_compensated_n3
+    moment_bound_compensated_n3,
+    /// Derivatives of the bound from six power moments and their total, times `d_bound`, with what is
+    /// ill-conditioned in about twice the digits.
+    moment_bound_adjoint_compensated_n3
 }
 
 order! {

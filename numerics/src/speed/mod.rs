@@ -134,6 +134,8 @@ pub enum Solver {
     Compensated,
     /// The derivatives.
     Adjoint,
+    /// The derivatives, in about twice the digits; for n up to 3.
+    CompensatedAdjoint,
     /// `diffmoments`: the bound.
     Peer,
     /// `diffmoments`: the bound, with roots kept for the derivatives.
@@ -146,7 +148,12 @@ pub enum Solver {
 
 impl Solver {
     /// Those of this project.
-    pub const OWN: [Self; 3] = [Self::Plain, Self::Compensated, Self::Adjoint];
+    pub const OWN: [Self; 4] = [
+        Self::Plain,
+        Self::Compensated,
+        Self::Adjoint,
+        Self::CompensatedAdjoint,
+    ];
     /// Those of the other.
     pub const PEER: [Self; 4] = [
         Self::Peer,
@@ -162,6 +169,7 @@ impl Solver {
             Self::Plain => "bound",
             Self::Compensated => "bound, compensated",
             Self::Adjoint => "adjoint",
+            Self::CompensatedAdjoint => "adjoint, compensated",
             Self::Peer => "diffmoments bound",
             Self::PeerRetained => "diffmoments bound, roots retained",
             Self::PeerAdjoint => "diffmoments adjoint",
@@ -180,7 +188,10 @@ impl Solver {
     pub const fn is_adjoint(self) -> bool {
         matches!(
             self,
-            Self::Adjoint | Self::PeerAdjoint | Self::PeerAdjointRetained
+            Self::Adjoint
+                | Self::CompensatedAdjoint
+                | Self::PeerAdjoint
+                | Self::PeerAdjointRetained
         )
     }
 
@@ -191,6 +202,7 @@ impl Solver {
             Self::Plain => Some(format!("moment_bound_n{n}")),
             Self::Compensated => Some(format!("moment_bound_compensated_n{n}")),
             Self::Adjoint => Some(format!("moment_bound_adjoint_n{n}")),
+            Self::CompensatedAdjoint => Some(format!("moment_bound_adjoint_compensated_n{n}")),
             _ => None,
         }
     }

@@ -101,6 +101,10 @@ impl Speed {
                 Solver::Adjoint,
                 [Solver::PeerAdjoint, Solver::PeerAdjointRetained],
             ),
+            (
+                Solver::CompensatedAdjoint,
+                [Solver::PeerAdjoint, Solver::PeerAdjointRetained],
+            ),
         ] {
             for precision in [Precision::F32, Precision::F64] {
                 for n in self.orders() {

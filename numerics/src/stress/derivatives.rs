@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::reference::{Rounding, difference, gradient_of, is_in_range};
-use super::{Backend, BackendError, Map, StressError};
+use super::{Backend, BackendError, Map, Solver, StressError};
 use crate::families::{Family, Format, Precision, Row, scaled, validity};
 use crate::numbers::Wide;
 use crate::speed::Quantiles;
@@ -18,7 +18,7 @@ const MOST: f64 = 1e24;
 /// Orders that are measured: beyond, second derivatives in 300 bits take minutes for a few rows.
 const ORDERS: RangeInclusive<usize> = 1..=3;
 
-/// What came out for the derivatives of one family, order and precision.
+/// What came out for the derivatives of one family, order and precision, by one solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Derivatives {
     /// The family's name.
@@ -27,6 +27,8 @@ pub struct Derivatives {
     pub n: usize,
     /// The number format.
     pub precision: Precision,
+    /// The solver.
+    pub solver: Solver,
     /// Where it ran.
     pub backend: String,
     /// Rows with derivatives to compare with.
@@ -149,7 +151,7 @@ fn of_bound(
     (exact, sensitivities)
 }
 
-/// Measures the adjoint of an order on the first `count` rows of a family; nothing for an order that is not
+/// Measures the adjoints of an order on the first `count` rows of a family; nothing for an order that is not
 /// measured.
 pub(super) fn measure<T: Format>(
     family: &Family,
@@ -157,11 +159,11 @@ pub(super) fn measure<T: Format>(
     count: u64,
     seed: u64,
     backend: &mut dyn Backend,
-) -> Result<Option<Derivatives>, StressError> {
-    let function = format!("moment_bound_adjoint_n{n}");
-    let Some(map) = Map::find(&function, T::PRECISION)?.filter(|_| ORDERS.contains(&n)) else {
-        return Ok(None);
-    };
+) -> Result<Vec<Derivatives>, StressError> {
+    let mut all = Vec::new();
+    if !ORDERS.contains(&n) {
+        return Ok(all);
+    }
     let judged: Vec<(Row<T>, Truth)> = (0..count)
         .into_par_iter()
         .filter_map(|index| {
@@ -172,39 +174,49 @@ pub(super) fn measure<T: Format>(
         .collect();
     let (rows, truths): (Vec<Row<T>>, Vec<Truth>) = judged.into_iter().unzip();
     if rows.is_empty() {
-        return Ok(None);
+        return Ok(all);
     }
-    let mut run = |overestimation| map.run(backend, n, &rows, overestimation);
-    let (lower, upper) = match run(0.0).and_then(|lower| Ok((lower, run(1.0)?))) {
-        Err(StressError::Backend {
-            error: BackendError::Lacks(_),
-            ..
-        }) => return Ok(None),
-        both => both?,
-    };
-    let length = 2 * n + 2;
-    let results = lower.chunks_exact(length).zip(upper.chunks_exact(length));
-    let is_finite = |d: &[T]| d.iter().all(|x| x.widen().is_finite());
-    let non_finite = results
-        .clone()
-        .filter(|(l, u)| !is_finite(l) || !is_finite(u))
-        .count();
-    let over: Vec<(u64, f64)> = truths
-        .iter()
-        .zip(results)
-        .map(|(truth, (lower, upper))| (truth.index, truth.over_sensitivity([lower, upper])))
-        .collect();
-    Ok(Some(Derivatives {
-        family: family.name.into(),
-        n,
-        precision: T::PRECISION,
-        backend: backend.name(),
-        valid: rows.len() as u64,
-        non_finite: non_finite as u64,
-        worst: over
+    for solver in [Solver::Plain, Solver::Compensated] {
+        let Some(function) = solver.adjoint(n) else {
+            continue;
+        };
+        let Some(map) = Map::find(&function, T::PRECISION)? else {
+            continue;
+        };
+        let mut run = |overestimation| map.run(backend, n, &rows, overestimation);
+        let (lower, upper) = match run(0.0).and_then(|lower| Ok((lower, run(1.0)?))) {
+            Err(StressError::Backend {
+                error: BackendError::Lacks(_),
+                ..
+            }) => continue,
+            both => both?,
+        };
+        let length = 2 * n + 2;
+        let results = lower.chunks_exact(length).zip(upper.chunks_exact(length));
+        let is_finite = |d: &[T]| d.iter().all(|x| x.widen().is_finite());
+        let non_finite = results
+            .clone()
+            .filter(|(l, u)| !is_finite(l) || !is_finite(u))
+            .count();
+        let over: Vec<(u64, f64)> = truths
             .iter()
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|worst| worst.0),
-        over: (!over.is_empty()).then(|| Quantiles::of(over.iter().map(|o| o.1).collect())),
-    }))
+            .zip(results)
+            .map(|(truth, (lower, upper))| (truth.index, truth.over_sensitivity([lower, upper])))
+            .collect();
+        all.push(Derivatives {
+            family: family.name.into(),
+            n,
+            precision: T::PRECISION,
+            solver,
+            backend: backend.name(),
+            valid: rows.len() as u64,
+            non_finite: non_finite as u64,
+            worst: over
+                .iter()
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .map(|worst| worst.0),
+            over: (!over.is_empty()).then(|| Quantiles::of(over.iter().map(|o| o.1).collect())),
+        });
+    }
+    Ok(all)
 }

@@ -186,6 +186,15 @@ impl Solver {
             Self::Published | Self::Peer => None,
         }
     }
+
+    /// The kernel function of an order's derivatives, if there is one; `None` for what is no kernel.
+    fn adjoint(self, n: usize) -> Option<String> {
+        match self {
+            Self::Plain => Some(format!("moment_bound_adjoint_n{n}")),
+            Self::Compensated => Some(format!("moment_bound_adjoint_compensated_n{n}")),
+            Self::Published | Self::Peer => None,
+        }
+    }
 }
 
 /// What came out for the rows of one family, order and precision, by one solver on one backend.

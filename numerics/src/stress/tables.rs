@@ -23,8 +23,10 @@ impl Stress {
         for solver in [Solver::Compensated, Solver::Plain, Solver::Published] {
             report.tables.push(self.overview(solver));
         }
-        if !self.derivatives.is_empty() {
-            report.tables.push(self.overview_of_derivatives());
+        for solver in [Solver::Compensated, Solver::Plain] {
+            if self.derivatives.iter().any(|d| d.solver == solver) {
+                report.tables.push(self.overview_of_derivatives(solver));
+            }
         }
         report.tables.push(self.errors());
         if self.peer.is_some() {
@@ -134,16 +136,19 @@ impl Stress {
     }
 
     /// The worst row's derivative, by family and order.
-    fn overview_of_derivatives(&self) -> Table {
-        let orders: Vec<usize> = ORDERS
-            .filter(|&n| self.derivatives.iter().any(|d| d.n == n))
-            .collect();
+    fn overview_of_derivatives(&self, solver: Solver) -> Table {
+        let of_solver = || self.derivatives.iter().filter(move |d| d.solver == solver);
+        let orders: Vec<usize> = ORDERS.filter(|&n| of_solver().any(|d| d.n == n)).collect();
         let headings = orders.iter().map(|n| Column::number(format!("n = {n}")));
         let mut table = Table::new(
-            "derivatives-over",
-            "Error over sensitivity of derivatives: the greatest of all derivatives of all valid rows. The \
-             sensitivity is what rounding each number of the row and the result once does to a derivative; \
-             one that is less than epsilon times the greatest of its row counts as that",
+            format!("derivatives-over-{}", solver.name()),
+            format!(
+                "Error over sensitivity of the {} derivatives: the greatest of all derivatives of all \
+                 valid rows. The sensitivity is what rounding each number of the row and the result once \
+                 does to a derivative; one that is less than epsilon times the greatest of its row counts \
+                 as that",
+                solver.name()
+            ),
             [Column::text("family"), Column::text("precision")]
                 .into_iter()
                 .chain(headings),
@@ -151,7 +156,7 @@ impl Stress {
         for precision in [Precision::F32, Precision::F64] {
             for (family, _) in &self.agreement {
                 let of_order = |n: usize| {
-                    self.derivatives.iter().find(|d| {
+                    of_solver().find(|d| {
                         (d.family.as_str(), d.precision, d.n) == (family.as_str(), precision, n)
                     })
                 };

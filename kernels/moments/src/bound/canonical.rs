@@ -139,7 +139,10 @@ fn corrected<R: Real, const N: usize>(
                 let constant = one - s * x;
                 slope += s;
                 unroll!(l in 0..10, max 11, {
-                    q[10 - l] = constant * q[10 - l] + s * q[9 - l];
+                    // With each factor it has one coefficient more.
+                    if const { 10 - l <= j + 1 } {
+                        q[10 - l] = constant * q[10 - l] + s * q[9 - l];
+                    }
                 });
                 q[0] = constant * q[0];
             }

@@ -5,7 +5,7 @@ use hankel_dsl::{Real, lit, unroll};
 use super::MAX;
 use super::recurrence::Recurrence;
 use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_two, whole};
-use super::twofold::Arithmetic;
+use super::twofold::{Arithmetic, product};
 
 /// What a query point makes of a recurrence.
 ///
@@ -186,6 +186,64 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         }
     }
 
+    /// The coefficients `e` and the query point's weight with all digits that the recurrence has.
+    #[inline(always)]
+    pub fn fine<const N: usize>(&self) -> ([A; MAX + 1], A) {
+        let zero = A::of(lit!(0.0));
+        let one = A::of(lit!(1.0));
+        let mut y = [one; MAX + 1];
+        y[1] = self.fine_a[0].scaled(lit!(-1.0));
+        unroll!(k in 1..N, max 6, {
+            let next = self.fine_a[k].sum_of_products(y[k], self.fine_b[k], y[k - 1]);
+            y[k + 1] = next.scaled(lit!(-1.0));
+        });
+        // As `new` has it.
+        let mut p = [zero; MAX + 2];
+        let mut before = p;
+        let mut kernel = [zero; MAX + 1];
+        let mut weight = one;
+        p[0] = one;
+        kernel[0] = one;
+        unroll!(k in 0..N, max 6, {
+            let mut next = [zero; MAX + 2];
+            unroll!(i in 0..6, max 6, {
+                if const { i <= k + 1 } {
+                    let mut t = zero;
+                    if const { i <= k } {
+                        t = t.minus(self.fine_a[k].times(p[i]));
+                    }
+                    if const { k > 0 && i < k } {
+                        t = t.minus(self.fine_b[k].times(before[i]));
+                    }
+                    if const { i > 0 } {
+                        t = t.plus(p[i - 1]);
+                    }
+                    next[i] = t;
+                }
+            });
+            before = p;
+            p = next;
+            weight = weight.times(self.fine_b[k + 1]);
+            unroll!(i in 0..6, max 6, {
+                if const { i <= k } {
+                    kernel[i] = self.fine_b[k + 1].times(kernel[i]).plus(y[k + 1].times(p[i]));
+                } else if const { i == k + 1 } {
+                    kernel[i] = y[k + 1];
+                }
+            });
+        });
+        let square = kernel[0].at_least(lit!(1e-37));
+        let per_reach = one.over(A::of(self.reach));
+        let largest: R = lit!(32.0);
+        let mut e = [one; MAX + 1];
+        let mut power = per_reach;
+        unroll!(i in 1..(N + 1), max 6, {
+            e[i] = kernel[i].over(square).times_within(power, largest);
+            power = power.times(per_reach);
+        });
+        (e, weight.over(square).within(lit!(0.0), lit!(1.0)))
+    }
+
     #[inline(always)]
     fn dot<const N: usize>(&self, x: &[R; MAX + 1], y: &[R; MAX + 1]) -> R {
         let mut sum = x[N] * y[N];
@@ -273,7 +331,7 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
     let s_moves = R::select(is_near, one, zero);
     let t_moves = one - s_moves;
     let fine_s = A::of(s);
-    let (square, rest) = t.two_product(t);
+    let (square, rest) = product(t, t);
     let t_square = A::of_two(square, rest);
 
     // Value, first derivative and half the second one, in s or t.

@@ -64,7 +64,7 @@ fn farthest<R: Real, A: Arithmetic<R>, const N: usize>() -> R {
 }
 
 /// 2 to that power, of which the exponent is in `f64`'s range.
-const fn two_to(power: i32) -> f64 {
+pub(crate) const fn two_to(power: i32) -> f64 {
     f64::from_bits(((1023 + power) as u64) << 52)
 }
 
@@ -304,7 +304,12 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
                     let mean_square = raw[2].over(raw[0]);
                     raw[4].minus(mean_square.times(raw[2]))
                 };
-                let t = t.minus(slope.times(current[2]));
+                let of_slope = if const { A::TWICE } {
+                    slope.times_within(current[2], lit!(1e37))
+                } else {
+                    slope.times(current[2])
+                };
+                let t = t.minus(of_slope);
                 next[2] = t.within(-largest, largest);
             }
             let noise = raw[2 * k].rounded().abs() * floor;

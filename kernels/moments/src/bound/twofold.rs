@@ -2,6 +2,8 @@
 
 use hankel_dsl::{Real, lit};
 
+use super::recurrence::two_to;
+
 /// The arithmetic that the recurrence needs.
 pub(crate) trait Arithmetic<R: Real>: Copy {
     /// Whether it has about twice the digits of the base type.
@@ -20,6 +22,9 @@ pub(crate) trait Arithmetic<R: Real>: Copy {
     fn times(self, other: Self) -> Self;
     /// Product with a number of the base type.
     fn times_plain(self, x: R) -> Self;
+    /// Product moved between `-limit` and `limit`, which is at most 1e37, and never infinite on its way: error
+    /// terms of what is infinite are no numbers. `other` must not be above 1e37.
+    fn times_within(self, other: Self, limit: R) -> Self;
     /// Product with a power of two.
     fn scaled(self, power: R) -> Self;
     /// Sum.
@@ -35,6 +40,10 @@ pub(crate) trait Arithmetic<R: Real>: Copy {
     fn at_least(self, floor: R) -> Self;
     /// Moved between the limits.
     fn within(self, low: R, high: R) -> Self;
+    /// 1 / x, limited to 1e18.
+    fn inverse(self) -> Self;
+    /// `a` where `mask` holds, else `b`.
+    fn select(mask: R::Mask, a: Self, b: Self) -> Self;
 }
 
 /// A divisor that keeps a quotient's magnitude below 2⁸⁰.
@@ -43,6 +52,21 @@ fn divisor<R: Real>(numerator: R, positive: R) -> R {
     let smallest: R = lit!(1e-37);
     let least = numerator.abs() * lit!(1.0 / (1_u128 << 80) as f64);
     positive.max(least.max(smallest))
+}
+
+/// The product: rounded, and what that took off. Of a product that is too small for
+/// [`Real::two_product`] to be exact everywhere, nothing: so every backend has the same bits, and the same sign
+/// where that decides.
+#[inline(always)]
+pub(crate) fn product<R: Real>(a: R, b: R) -> (R, R) {
+    let least: R = if const { R::IS_WIDE } {
+        lit!(two_to(-900))
+    } else {
+        lit!(two_to(-78))
+    };
+    let (product, error) = a.two_product(b);
+    let is_small = product.abs().lt(least);
+    (product, R::select(is_small, lit!(0.0), error))
 }
 
 /// A number as it is.
@@ -80,6 +104,10 @@ impl<R: Real> Arithmetic<R> for Plain<R> {
         Self(self.0 * x)
     }
     #[inline(always)]
+    fn times_within(self, other: Self, limit: R) -> Self {
+        Self((self.0 * other.0).clamp(-limit, limit))
+    }
+    #[inline(always)]
     fn scaled(self, power: R) -> Self {
         Self(self.0 * power)
     }
@@ -107,6 +135,17 @@ impl<R: Real> Arithmetic<R> for Plain<R> {
     fn within(self, low: R, high: R) -> Self {
         Self(self.0.clamp(low, high))
     }
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        let least: R = lit!(1e-18);
+        let one: R = lit!(1.0);
+        let x = self.0;
+        Self(one / R::select(x.lt(lit!(0.0)), x.min(-least), x.max(least)))
+    }
+    #[inline(always)]
+    fn select(mask: R::Mask, a: Self, b: Self) -> Self {
+        Self(R::select(mask, a.0, b.0))
+    }
 }
 
 /// An unevaluated sum of two numbers, the second within the first's rounding error: about twice
@@ -131,7 +170,7 @@ impl<R: Real> Twofold<R> {
     /// The product: rounded, and what that took off.
     #[inline(always)]
     fn product(self, other: Self) -> (R, R) {
-        let (product, error) = self.high.two_product(other.high);
+        let (product, error) = product(self.high, other.high);
         (
             product,
             error + (self.high * other.low + self.low * other.high),
@@ -154,8 +193,8 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     }
     #[inline(always)]
     fn difference(a: R, b: R, c: R, d: R) -> Self {
-        let (first, rest) = a.two_product(b);
-        let (second, other) = c.two_product(d);
+        let (first, rest) = product(a, b);
+        let (second, other) = product(c, d);
         let (sum, error) = first.two_sum(-second);
         // Where the products cancel, their errors are all that is left.
         let (sum, left) = sum.two_sum(rest - other);
@@ -177,8 +216,15 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     }
     #[inline(always)]
     fn times_plain(self, x: R) -> Self {
-        let (product, error) = self.high.two_product(x);
+        let (product, error) = product(self.high, x);
         Self::of_parts(product, error + self.low * x)
+    }
+    #[inline(always)]
+    fn times_within(self, other: Self, limit: R) -> Self {
+        let one: R = lit!(1.0);
+        let largest: R = lit!(1e37);
+        let most = largest / other.high.abs().max(one);
+        self.within(-most, most).times(other).within(-limit, limit)
     }
     #[inline(always)]
     fn scaled(self, power: R) -> Self {
@@ -208,7 +254,7 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     fn over(self, positive: Self) -> Self {
         let by = divisor(self.high, positive.high);
         let first = self.high / by;
-        let (product, error) = first.two_product(positive.high);
+        let (product, error) = product(first, positive.high);
         let rest = ((self.high - product) - error + self.low - first * positive.low) / by;
         Self::of_parts(first, rest)
     }
@@ -227,5 +273,46 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
             high: self.high.clamp(low, high),
             low: R::select(inside, self.low, lit!(0.0)),
         }
+    }
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        let one: R = lit!(1.0);
+        let sign = R::select(self.high.lt(lit!(0.0)), -one, one);
+        let magnitude = self.scaled(sign).at_least(lit!(1e-18));
+        Self::of(one).over(magnitude).scaled(sign)
+    }
+    #[inline(always)]
+    fn select(mask: R::Mask, a: Self, b: Self) -> Self {
+        Self {
+            high: R::select(mask, a.high, b.high),
+            low: R::select(mask, a.low, b.low),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(x: Twofold<f32>) -> (f32, f32) {
+        (x.high, x.low)
+    }
+
+    #[test]
+    fn a_limited_product_is_never_infinite_on_its_way() {
+        let limit = 1e25_f32;
+        for (a, b, expected) in [
+            (1e25, 1e25, limit),
+            (-1e25, 1e25, -limit),
+            (3e24, -1e37, -limit),
+            (-1e20, -1e30, limit),
+        ] {
+            let (a, b) = (Twofold::of(a), Twofold::of(b));
+            // Not so without a limit.
+            assert!(parts(a.times(b)).1.is_nan());
+            assert_eq!(parts(a.times_within(b, limit)), (expected, 0.0));
+        }
+        let (a, b) = (Twofold::of_two(0.3, 1e-9), Twofold::of_two(-3e10, 100.0));
+        assert_eq!(parts(a.times_within(b, limit)), parts(a.times(b)));
     }
 }
