@@ -1,6 +1,6 @@
 //! Numbers of which the rounding error is kept, or is not: what Chebyshev's algorithm runs on.
 
-use hankel_dsl::{Real, lit};
+use hankel_dsl::{Real, function, lit};
 
 /// The arithmetic that the recurrence needs.
 pub(crate) trait Arithmetic<R: Real>: Copy {
@@ -38,6 +38,7 @@ pub(crate) trait Arithmetic<R: Real>: Copy {
 }
 
 /// A divisor that keeps a quotient's magnitude below 2⁸⁰.
+#[function]
 #[inline(always)]
 fn divisor<R: Real>(numerator: R, positive: R) -> R {
     let smallest: R = lit!(1e-37);
