@@ -66,7 +66,11 @@ fn a_wrong_prefix_and_a_crate_without_libraries_are_misuse() {
     ];
     let wrong = hankel(&wrong, folder.path());
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&wrong.stderr).contains("--prefix"));
+    let words = String::from_utf8_lossy(&wrong.stderr);
+    assert!(
+        words.contains("--prefix `My-Engine` cannot be used"),
+        "{words}"
+    );
     let manifest = root().join("tests/conformance/Cargo.toml");
     let manifest = manifest.to_str().unwrap();
     let none = [

@@ -211,7 +211,7 @@ pub enum Error {
         problem: String,
     },
     /// A value of an option that does not exist.
-    #[error("{option} `{value}` is not known: {expected}")]
+    #[error("{option} `{value}` cannot be used: {expected}")]
     Option {
         /// The option.
         option: &'static str,

@@ -618,3 +618,67 @@ fn types_lie_beside_the_module() {
         "{types}"
     );
 }
+
+/// What a local is stays beside its name: a long value is broken within, not before it.
+#[test]
+fn long_values_are_broken_behind_their_names() {
+    let body = "/// A long sum.\n#[function]\npub fn f(length_of_the_first: f32, length_of_the_second: f32) \
+                -> f32 {\n    let root_of_both = Real::sqrt(Real::max(length_of_the_first * \
+                length_of_the_first + length_of_the_second * length_of_the_second, 1e-20));\n    \
+                root_of_both / (root_of_both + 1.0)\n}";
+    let libraries = one(body).unwrap_or_else(|e| panic!("{e}"));
+    for form in ["hlsl", "glsl", "msl", "wgsl", "c"] {
+        let text = text(&libraries, form);
+        let broken = text
+            .lines()
+            .any(|l| l.ends_with("float") || l.ends_with("let"));
+        assert!(!broken, "{form}: {text}");
+        let line = text.lines().find(|l| l.contains(" root_of_both = "));
+        assert!(line.is_some_and(|l| l.contains("max")), "{form}: {text}");
+        assert!(text.lines().all(|l| l.len() <= 110), "{form}: {text}");
+    }
+}
+
+/// An elementary function is written once, and called; what it is made of of numbers' bits has a form.
+#[test]
+fn elementary_functions_stay_calls() {
+    let file = |path: &str, text: &str| (path.to_owned(), text.to_owned());
+    let dsl = CrateText {
+        name: "hankel_dsl".into(),
+        files: [
+            file("src/lib.rs", "pub mod math;"),
+            file(
+                "src/math/mod.rs",
+                "mod exponential; mod primitives; pub use exponential::exp;",
+            ),
+            file(
+                "src/math/exponential.rs",
+                "use super::Elementary;\n/// `e` to the power of `x`.\n#[must_use]\npub fn exp<R: \
+                 Elementary>(x: R) -> R { (x + lit!(1.0)).guard() * x.power_of_two() }",
+            ),
+            file(
+                "src/math/primitives.rs",
+                "impl Elementary for f32 { fn power_of_two(self) -> Self { \
+                 Self::from_bits(((crate::to_i32(self).wrapping_add(127)) as u32) << 23) } }",
+            ),
+        ]
+        .into(),
+        ..CrateText::default()
+    };
+    let body = "use hankel_dsl::math;\n/// A cosine.\n#[function]\npub fn f(x: f32) -> f32 { math::exp(x) + \
+                math::exp(-x) }\nhankel_dsl::library!(sample { api: 1, functions: [f] });";
+    let libraries = read(&[krate(body), dsl]).unwrap_or_else(|e| panic!("{e}"));
+    let text = text(&libraries, "hlsl");
+    let calls = "hankel_exp(x) + hankel_exp(-x)";
+    assert!(text.contains(calls), "{text}");
+    assert_eq!(
+        text.matches("float hankel_exp(float x)").count(),
+        1,
+        "{text}"
+    );
+    assert!(
+        text.contains("asfloat(uint(int(x) + 127) << 23u)"),
+        "{text}"
+    );
+    assert!(text.contains("max(x + 1.0f, -8.507059e37f)"), "{text}");
+}

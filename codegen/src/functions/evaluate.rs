@@ -24,6 +24,10 @@ enum Stop {
     Return(Value),
 }
 
+/// `Elementary::guard` takes the larger one of a number and of this, which nothing is below: -2^126. A compiler
+/// does not know that, and neither contracts nor reorders what is before.
+const LEAST_GUARDED: f32 = -85_070_591_730_234_615_865_843_651_857_942_052_864.0;
+
 impl From<Refusal> for Stop {
     fn from(refusal: Refusal) -> Self {
         Self::Refused(refusal)
@@ -447,7 +451,7 @@ impl<'a> Evaluator<'a> {
                     let name = t.ident.to_string();
                     if let Some(g) = given.next() {
                         frame.generics.insert(name, g.clone());
-                    } else if t.bounds.iter().any(|b| bound_is(b, "Real")) {
+                    } else if t.bounds.iter().any(is_number) {
                         frame.generics.insert(name, Generic::Real);
                     } else if frame.depth == 0 {
                         let reason = format!(
@@ -1141,6 +1145,7 @@ impl<'a> Evaluator<'a> {
             }
             _ => match names.join("::").as_str() {
                 "core::f64::consts::PI" => Ok(Value::Double(std::f64::consts::PI)),
+                "core::f64::consts::LOG2_E" => Ok(Value::Double(std::f64::consts::LOG2_E)),
                 "core::f32::consts::PI" => Ok(Value::Scalar(float(std::f32::consts::PI))),
                 // A variant of an enumeration, or a function that the call knows.
                 _ if names.len() > 1 => Ok(Value::Variant(names.join("::"))),
@@ -1537,7 +1542,8 @@ impl<'a> Evaluator<'a> {
 
     fn cast(&mut self, frame: &Frame, value: Value, ty: &syn::Type, span: Span) -> Done<Value> {
         let name = quote::quote!(#ty).to_string();
-        let real = frame.generics.get(&name) == Some(&Generic::Real);
+        let real = frame.generics.get(&name) == Some(&Generic::Real)
+            || name == "Self" && frame.own.as_deref() == Some("f32");
         let to = if real { "f32" } else { name.as_str() };
         let known_int = value.as_int();
         Ok(match (to, value) {
@@ -2080,7 +2086,8 @@ impl<'a> Evaluator<'a> {
             let head = &p.path.segments[names.len() - 2];
             let head_name = names[names.len() - 2].as_str();
             let is_real = frame.generics.get(head_name) == Some(&Generic::Real)
-                || matches!(head_name, "f32" | "Real" | "f64" | "Mask");
+                || matches!(head_name, "f32" | "Real" | "f64" | "Mask")
+                || head_name == "Self" && frame.own.as_deref() == Some("f32");
             if is_real && names.len() == 2 {
                 return self.number_function(frame, head_name, &name, given.as_deref(), args, span);
             }
@@ -2119,7 +2126,7 @@ impl<'a> Evaluator<'a> {
                 if in_dsl && name == "to_i32" {
                     return self.whole_number(frame, args, span);
                 }
-                if is_function(&source.attrs) {
+                if is_function(&source.attrs) || self.is_elementary(home, &source) {
                     return self.kept_call(frame, home, &source, args, span);
                 }
                 let mut inner = self.frame_for(frame, home, None);
@@ -2149,6 +2156,18 @@ impl<'a> Evaluator<'a> {
             }
             _ => Err(self.refuse(frame, span, "`to_i32` takes a float")),
         }
+    }
+
+    /// Whether a function is one of the DSL's elementary functions of one number, which are long: each is
+    /// written once, whoever calls it.
+    fn is_elementary(&self, home: ModuleId, source: &syn::ItemFn) -> bool {
+        let path = &self.tree.modules[home].path;
+        path.len() == 3
+            && path[..2] == ["hankel_dsl", "math"]
+            && matches!(source.vis, syn::Visibility::Public(_))
+            && source.attrs.iter().any(|a| a.path().is_ident("must_use"))
+            && source.sig.inputs.len() == 1
+            && matches!(&source.sig.output, syn::ReturnType::Type(_, ty) if matches!(**ty, syn::Type::Path(_)))
     }
 
     /// Calls another function of a library, which stays a call.
@@ -2381,6 +2400,9 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Done<Value> {
         // Known numbers that the shader does not see.
+        if let ("to_bits", [Value::Double(x)]) = (name, args.as_slice()) {
+            return Ok(Value::Int(i128::from(x.to_bits())));
+        }
         if let (Some(Value::Int(a)), rest) = (args.first(), &args[1..]) {
             let b = rest.first().and_then(Value::as_int);
             match (name, b) {
@@ -2461,9 +2483,21 @@ impl<'a> Evaluator<'a> {
             ("two_sum" | "two_product", [a, b]) if is_float => {
                 return self.error_free(frame, name, a, b, span);
             }
+            ("guard", [x]) if is_float => {
+                builtin(Builtin::Max, vec![x.clone(), float(LEAST_GUARDED)])
+            }
             _ => {
-                let reason = format!("`{name}` has no form here");
-                return Err(self.refuse(frame, span, reason));
+                let key = ("f32".to_owned(), name.to_owned());
+                let method = self.tree.methods.get(&key).filter(|_| is_float).cloned();
+                let Some(method) = method else {
+                    let reason = format!("`{name}` has no form here");
+                    return Err(self.refuse(frame, span, reason));
+                };
+                // A function of the DSL's elementary functions, for `f32`.
+                let mut inner = self.frame_for(frame, method.module, Some(Rc::from("f32")));
+                let (sig, block) = (&method.function.sig, &method.function.block);
+                let args = all.into_iter().map(Value::Scalar).collect();
+                return self.run(frame, &mut inner, sig, block, None, args, span);
             }
         };
         Ok(Value::Scalar(e))
@@ -2758,9 +2792,10 @@ fn last_name(identity: &str) -> String {
     identity.rsplit("::").next().unwrap_or(identity).to_owned()
 }
 
-fn bound_is(bound: &syn::TypeParamBound, name: &str) -> bool {
+/// Whether a bound makes a number of a type.
+fn is_number(bound: &syn::TypeParamBound) -> bool {
     matches!(bound, syn::TypeParamBound::Trait(t)
-        if t.path.segments.last().is_some_and(|s| s.ident == name))
+        if t.path.segments.last().is_some_and(|s| s.ident == "Real" || s.ident == "Elementary"))
 }
 
 /// Parameters and result of `Fn(…) -> …`.

@@ -81,8 +81,8 @@ impl Folder {
             return Err(Error::Option {
                 option: "--prefix",
                 value: prefix.into(),
-                expected: "lower-case letters, digits and single underscores, beginning with a \
-                           letter, and no word of a shading language",
+                expected: "a prefix is made of lower-case letters, digits and single underscores, \
+                           begins with a letter, and is no word of a shading language",
             });
         }
         let texts = super::files(libraries, prefix, sources);

@@ -433,6 +433,8 @@ fn best_break(line: &str) -> Option<usize> {
     let mut best: Option<(i32, usize)> = None;
     let mut column = 0;
     let bytes = line.as_bytes();
+    // A name stays on the line of what it gets, unless that leaves no place to break at.
+    let assigned = line.find(" = ").map_or(0, |at| at + 3);
     for (i, c) in line.char_indices() {
         column += if c == '\t' { 4 } else { 1 };
         match c {
@@ -475,6 +477,7 @@ fn best_break(line: &str) -> Option<usize> {
                     _ => 2,
                 };
                 let weight = depth * 4 + weight;
+                let weight = if i < assigned { weight + 1000 } else { weight };
                 if !after_operator && !empty_bracket && best.is_none_or(|(w, _)| weight <= w) {
                     best = Some((weight, i));
                 }
@@ -482,7 +485,14 @@ fn best_break(line: &str) -> Option<usize> {
             _ => {}
         }
     }
-    best.map(|(_, i)| i)
+    best.map(|(_, i)| i).or_else(|| {
+        // Nothing but calls within calls: behind a bracket.
+        line.char_indices()
+            .take(WIDTH)
+            .filter(|(i, c)| *c == '(' && *i > start + 12)
+            .map(|(i, _)| i + 1)
+            .last()
+    })
 }
 
 /// Lines of documentation in a language's comment, not too long.
@@ -561,6 +571,7 @@ pub fn ascii(text: &str) -> String {
 /// Documentation without what only rustdoc understands.
 pub fn reflowed(lines: &[String]) -> Vec<String> {
     let mut out = Vec::new();
+    let mut carried = String::new();
     for line in lines {
         let mut plain = ascii(line)
             .replace("\\[", "[")
@@ -576,6 +587,15 @@ pub fn reflowed(lines: &[String]) -> Vec<String> {
                 _ => break,
             }
         }
+        // What did not fit into a line of a paragraph begins the next one.
+        if !carried.is_empty() {
+            if plain.is_empty() || !plain.starts_with(|c: char| c.is_alphanumeric() || c == '`') {
+                out.push(std::mem::take(&mut carried));
+            } else {
+                plain = format!("{carried} {plain}");
+                carried.clear();
+            }
+        }
         let mut rest = plain.as_str();
         while rest.chars().count() > WIDTH - 8 {
             let cut = rest
@@ -589,8 +609,14 @@ pub fn reflowed(lines: &[String]) -> Vec<String> {
             };
             out.push(rest[..cut].to_owned());
             rest = &rest[cut + 1..];
+            carried = rest.to_owned();
         }
-        out.push(rest.to_owned());
+        if carried.is_empty() {
+            out.push(rest.to_owned());
+        }
+    }
+    if !carried.is_empty() {
+        out.push(carried);
     }
     out
 }

@@ -249,7 +249,18 @@ impl Tree {
         let syn::Type::Path(path) = block.self_ty.as_ref() else {
             return;
         };
-        let Some(identity) = self.structure(module, &segments(&path.path)) else {
+        let names = segments(&path.path);
+        // Of the number types only `f32` has a form, and of its traits' functions the DSL's own.
+        let elementary = block
+            .trait_
+            .as_ref()
+            .is_some_and(|(_, of, _)| of.segments.last().is_some_and(|s| s.ident == "Elementary"));
+        let identity = if elementary && names == ["f32"] {
+            Some("f32".to_owned())
+        } else {
+            self.structure(module, &names)
+        };
+        let Some(identity) = identity else {
             return;
         };
         for item in &block.items {

@@ -72,5 +72,5 @@ pub use scattering::{
 };
 pub use six::{blockers_6, hamburger_6, hamburger_6_compensated};
 pub use sparse::{TwoPoints, sparse_2};
-pub use trigonometric::{HalfAngle, TrigonometricMoments, trigonometric_4};
+pub use trigonometric::{HalfAngle, TrigonometricMoments, trigonometric_4, trigonometric_4_lower};
 pub use variance::{blockers_2, variance_2};

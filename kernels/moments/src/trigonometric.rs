@@ -97,6 +97,12 @@ impl<R: Real> HalfAngle<R> {
         }
     }
 
+    /// From a unit vector with `sin` >= 0.
+    #[inline(always)]
+    pub fn of_unit_vector(cos: R, sin: R) -> Self {
+        Self { cos, sin }
+    }
+
     /// For the direction of any vector with components in [-1e6, 1e6]; one in the lower half-plane
     /// is turned around. Of a vector that is 0 or not a number: some direction.
     #[inline(always)]
@@ -338,16 +344,17 @@ impl<R: Real> Kernel<R> {
 /// vector.
 #[inline(always)]
 pub fn trigonometric_4<R: Real>(m: TrigonometricMoments<R>, query: HalfAngle<R>) -> Bounds<R> {
-    let above = least_share(m.mirrored(), query.mirrored());
-    let lower = least_share(m, query);
+    let above = trigonometric_4_lower(m.mirrored(), query.mirrored());
+    let lower = trigonometric_4_lower(m, query);
     Bounds {
         lower,
         upper: (-above + lit!(1.0)).max(lower),
     }
 }
 
+/// The lower of [`trigonometric_4`]'s bounds alone.
 #[inline(always)]
-fn least_share<R: Real>(m: TrigonometricMoments<R>, query: HalfAngle<R>) -> R {
+pub fn trigonometric_4_lower<R: Real>(m: TrigonometricMoments<R>, query: HalfAngle<R>) -> R {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let kernel = Kernel::new(m);

@@ -73,7 +73,7 @@ impl Terms {
 
     /// What these terms of a map add to the series of a receiver.
     #[inline(always)]
-    fn sum(self, weights: Vec4, receiver: OddHarmonics<f32>) -> f32 {
+    pub(crate) fn sum(self, weights: Vec4, receiver: OddHarmonics<f32>) -> f32 {
         let signed = |v: Vec4| array(v * 2.0 - Vec4::ONE);
         let mean = OddHarmonics {
             cos: signed(self.cosines),
@@ -84,13 +84,13 @@ impl Terms {
 }
 
 #[inline(always)]
-fn low(z: f32) -> Terms {
+pub(crate) fn low(z: f32) -> Terms {
     let [low, _] = OddHarmonics::of_depth(z);
     Terms::held(low)
 }
 
 #[inline(always)]
-fn high(z: f32) -> Terms {
+pub(crate) fn high(z: f32) -> Terms {
     let [_, high] = OddHarmonics::of_depth(z);
     Terms::held(high)
 }

@@ -26,7 +26,7 @@ pub struct Exponents {
 impl Exponents {
     /// Both warps of a depth from 0 to 1, each above 0.
     #[inline(always)]
-    fn warp(&self, z: f32) -> (f32, f32) {
+    pub(crate) fn warp(&self, z: f32) -> (f32, f32) {
         let z = 2.0 * Real::saturate(z) - 1.0;
         let most = |exponent: f32| Real::clamp(exponent, 0.0, 42.0);
         (
@@ -38,7 +38,7 @@ impl Exponents {
 
 /// `exp(exponent * z)` of a depth from 0 to 1; the exponent is at most 80.
 #[inline(always)]
-fn exponential(exponent: f32, z: f32) -> f32 {
+pub(crate) fn exponential(exponent: f32, z: f32) -> f32 {
     math::exp(Real::clamp(exponent, 0.0, 80.0) * Real::saturate(z))
 }
 

@@ -702,7 +702,7 @@ fn scattered(ray: &Ray, rectified: &Rectified, lit: impl Fn(Vec2, f32) -> f32) -
 /// Where between the bounds a ray's shadow is taken to be: at the lower one, which is too bright, where the
 /// ray goes with the light, at the upper one where it goes against it (lecture, "Adaptive overestimation").
 #[inline(always)]
-fn overestimated(bounds: Bounds<f32>, cosine: f32) -> f32 {
+pub(crate) fn overestimated(bounds: Bounds<f32>, cosine: f32) -> f32 {
     1.0 - bounds.blend(0.5 - 0.5 * cosine)
 }
 

@@ -71,7 +71,7 @@ impl Area {
     /// Half the size in texels of what is filtered for blockers so far before a receiver, in the map's depth:
     /// at least half a texel.
     #[inline(always)]
-    fn reach(&self, distance: f32) -> Vec2 {
+    pub(crate) fn reach(&self, distance: f32) -> Vec2 {
         let d = Real::saturate(distance);
         Vec2::new(
             Real::max(self.spread.x * d, 0.5),
@@ -284,7 +284,7 @@ pub fn resolve_summed_6(
 
 /// The rectangle within `reach` texels of a place, which is given in texels.
 #[inline(always)]
-fn region(place: Vec2, reach: Vec2, size: UVec2) -> Region {
+pub(crate) fn region(place: Vec2, reach: Vec2, size: UVec2) -> Region {
     Region {
         x: Span::around(place.x, Real::min(reach.x, MOST_REACH), size.x),
         y: Span::around(place.y, Real::min(reach.y, MOST_REACH), size.y),

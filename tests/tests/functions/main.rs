@@ -6,6 +6,7 @@
 //! structure `Light` and a function `lerp` of their own, take the first registers, and say
 //! `precision mediump float;`.
 
+mod lookups;
 mod tsl;
 
 use std::collections::BTreeMap;
@@ -132,13 +133,22 @@ fn inputs_of(word: &Word) -> Inputs {
     let (least, most) = match word.name.as_str() {
         "one" => (1.0, 16_777_216.0),
         "texels" => (1.0, 1024.0),
-        "total" | "leak" | "overestimation" | "strength" => (0.0, 1.0),
-        name if ["channels", "first", "second"]
-            .iter()
-            .any(|n| name.starts_with(n)) =>
+        "total" | "leak" | "overestimation" | "strength" | "opacity" | "sine" => (0.0, 1.0),
+        "exponent" => (0.0, 90.0),
+        "positive_exponent" | "negative_exponent" => (0.0, 45.0),
+        "mean" | "distance" | "extinction" => (0.0, 10.0),
+        "inclination" => (0.0, std::f64::consts::PI),
+        name if [
+            "channels", "first", "second", "cosines", "sines", "high_", "weights", "front",
+            "behind",
+        ]
+        .iter()
+        .any(|n| name.starts_with(n)) =>
         {
             (0.0, 1.0)
         }
+        name if ["warped", "spread"].iter().any(|n| name.starts_with(n)) => (0.0, 100.0),
+        name if ["place", "reach"].iter().any(|n| name.starts_with(n)) => (-8.0, 8.0),
         _ if word.scalar == Scalar::F32 => (-1.0, 1.0),
         _ => return Inputs::default(),
     };
@@ -440,7 +450,7 @@ fn hlsl(function: &Function, library: &str) -> Code {
         "struct Light {{ float4 color; }};\n\
          float mine(float a, float b, float t) {{ return a + (b - a) * t; }}\n\
          #define saturate_of(x) clamp(x, 0.0f, 1.0f)\n\
-         {library}\n{library}\n\
+         {library}\n\
          ByteAddressBuffer rows : register(t0);\nRWByteAddressBuffer results : register(u0);\n\
          [numthreads(64, 1, 1)]\nvoid {}(uint3 id : SV_DispatchThreadID)\n{{\n\
          \x20   uint bytes;\n    results.GetDimensions(bytes);\n\
@@ -546,11 +556,22 @@ fn msl(function: &Function, library: &Path) -> Code {
 
 fn subject(function: &Function, msl_file: &Path) -> Subject {
     let none = |language: Language| Err(format!("no stub in {language}"));
-    let twice = format!("{0}\n{0}", text("glsl"));
+    let (before, after) = if looks_up(function) {
+        (lookups::HLSL, lookups::HLSL_AFTER)
+    } else {
+        ("", "")
+    };
+    let twice = |form: &str, before: &str, after: &str| {
+        let text = text(form);
+        format!("{before}{text}\n{text}{after}")
+    };
+    let in_hlsl = twice("hlsl", before, after);
+    let twice = twice("glsl", &lookups::as_glsl(before), &lookups::as_glsl(after));
     let codes = Language::ALL.map(|language| {
         let code = match language {
+            Language::Wgsl if looks_up(function) => none(language),
             Language::Wgsl => Ok(wgsl(function, &text("wgsl"))),
-            Language::Hlsl => Ok(hlsl(function, &text("hlsl"))),
+            Language::Hlsl => Ok(hlsl(function, &in_hlsl)),
             Language::Glsl => Ok(glsl(function, &twice, "450 core", MEDIUM)),
             Language::Essl310 => Ok(glsl(function, &twice, "310 es", MEDIUM)),
             Language::Msl => Ok(msl(function, msl_file)),
@@ -567,12 +588,28 @@ fn subject(function: &Function, msl_file: &Path) -> Subject {
 
 /// The library's functions; some only, where `HANKEL_FUNCTIONS` names them.
 fn natives() -> Vec<Function> {
-    let wanted = std::env::var("HANKEL_FUNCTIONS").unwrap_or_default();
     let all = shadows_library::functions();
-    assert!(all.len() > 30, "only {} functions", all.len());
+    assert!(all.len() > 50, "only {} functions", all.len());
+    wanted(all)
+}
+
+fn wanted(all: Vec<Function>) -> Vec<Function> {
+    let wanted = std::env::var("HANKEL_FUNCTIONS").unwrap_or_default();
     all.into_iter()
         .filter(|f| wanted.is_empty() || wanted.split(',').any(|w| w == f.name))
         .collect()
+}
+
+/// The library's functions, and those of a host that give their lookups to others.
+fn natives_and_lookups() -> Vec<Function> {
+    let mut all = natives();
+    all.extend(wanted(lookups::natives()));
+    all
+}
+
+/// Whether it is a host's that gives its lookups.
+fn looks_up(function: &Function) -> bool {
+    function.name.starts_with("host_")
 }
 
 const COLUMNS: [Column; 10] = [
@@ -593,8 +630,25 @@ fn every_function_computes_the_native_bits_in_every_language() {
     let folder = tempfile::tempdir().expect("a folder");
     let msl_file = folder.path().join("hankel_shadows.h.metal");
     std::fs::write(&msl_file, text("msl")).expect("the header can be written");
+    let with_lookups = folder.path().join("host.h.metal");
+    let file = msl_file.display();
+    let host = format!(
+        "#pragma once\n#include \"{file}\"\n#include \"{file}\"\n{}",
+        lookups::MSL_AFTER
+    );
+    std::fs::write(&with_lookups, host).expect("the header can be written");
     let tools = tools();
-    let mut subjects: Vec<Subject> = natives().iter().map(|f| subject(f, &msl_file)).collect();
+    let mut subjects: Vec<Subject> = natives_and_lookups()
+        .iter()
+        .map(|f| {
+            let header = if looks_up(f) {
+                &with_lookups
+            } else {
+                &msl_file
+            };
+            subject(f, header)
+        })
+        .collect();
     subjects.extend(tsl::subjects(&tools));
     let wanted = std::env::var("HANKEL_COLUMNS").unwrap_or_default();
     let columns: Vec<Column> = COLUMNS
@@ -641,7 +695,7 @@ fn on_the_processor(name: &str, program: &str, compile: impl FnOnce(&Path, &Path
     let binary = folder.path().join("program");
     std::fs::write(&source, program).expect("the program can be written");
     let mut expected = BTreeMap::new();
-    for f in natives() {
+    for f in natives_and_lookups() {
         let rows = rows(&f);
         std::fs::write(folder.path().join(format!("{}.in", f.name)), &rows).expect("rows");
         expected.insert(f.name, mapped(f.run, &rows, arguments(&f).len()));
@@ -696,7 +750,8 @@ fn the_c_header_computes_the_native_bits_and_has_no_warnings() {
         "struct Light { float color[4]; };\n#include \"hankel_shadows.h\"\n\
          #include \"hankel_shadows.h\"\n#include <stdio.h>\n#include <stdlib.h>\n",
     );
-    for f in natives() {
+    program.push_str(lookups::C_AFTER);
+    for f in natives_and_lookups() {
         let words = arguments(&f);
         let line = |ty: &str, name: &str| format!("    {ty} {name};\n");
         let (kind, size) = parts(&f.result);
@@ -720,7 +775,7 @@ fn the_c_header_computes_the_native_bits_and_has_no_warnings() {
         );
     }
     program.push_str("int main(void) {\n    return 0");
-    for f in natives() {
+    for f in natives_and_lookups() {
         let _ = write!(program, " | {}()", f.name);
     }
     program.push_str(";\n}\n");
@@ -768,7 +823,7 @@ fn the_rust_module_computes_the_native_bits() {
     };
     let mut program = String::from("#[path = \"hankel_shadows.rs\"]\nmod library;\nuse std::fs;\n");
     let mut main = String::from("fn main() {\n");
-    for f in natives() {
+    for f in natives_and_lookups() {
         let words = arguments(&f);
         let mut at = 0;
         let args: Vec<String> = f
@@ -822,7 +877,8 @@ fn the_rust_module_computes_the_native_bits() {
     program.push_str(&main);
     on_the_processor("program.rs", &program, |source, binary| {
         let folder = source.parent().expect("a folder");
-        std::fs::write(folder.join("hankel_shadows.rs"), text("rust")).expect("the module");
+        let module = format!("{}{}", text("rust"), lookups::RUST_AFTER);
+        std::fs::write(folder.join("hankel_shadows.rs"), module).expect("the module");
         let mut rustc = Command::new("rustc");
         rustc.args(["--edition", "2024", "-O", "-Dwarnings", "-Adead_code", "-o"]);
         rustc.arg(binary).arg(source);
@@ -882,7 +938,13 @@ fn forms_of_one_language_have_the_same_functions() {
     let glsl = glsl.replace("HANKEL_PRECISE ", "");
     same_words("godot", &from(&text("godot"), start), &glsl);
     let slang = text("slang").replace("public ", "");
-    let hlsl = from(&text("hlsl"), start);
+    // A module of Slang has nothing that a macro of its host looks up.
+    let mut hlsl = from(&text("hlsl"), start);
+    while let Some(at) = hlsl.find("#if defined(") {
+        let end = "#endif ";
+        let length = hlsl[at..].find(end).expect(end) + end.len();
+        hlsl.replace_range(at..at + length, "");
+    }
     same_words("slang", &format!("{} #endif", from(&slang, start)), &hlsl);
 }
 

@@ -10,7 +10,7 @@
 //! moments. The compensated variant computes them with twice the digits, and the first row of
 //! differences, of products of two moments each, with all that are left.
 
-use hankel_dsl::{Real, lit, unroll};
+use hankel_dsl::{Real, function, lit, unroll};
 
 use super::twofold::Arithmetic;
 use super::{MAX, MAX_MOMENTS};
@@ -130,6 +130,7 @@ fn halve<R: Real>(square: &mut R, unit: &mut R, below: R, squared: R, by: R) {
 }
 
 /// A power of two from half the root of `square` to twice that, for squares from 1e-24 to 1e24.
+#[function]
 #[inline(always)]
 fn power_of_two<R: Real>(square: R) -> R {
     let mut square = square;

@@ -1,6 +1,6 @@
 //! Numbers of which the rounding error is kept, or is not: what Chebyshev's algorithm runs on.
 
-use hankel_dsl::{Real, lit};
+use hankel_dsl::{Real, function, lit};
 
 use super::recurrence::two_to;
 
@@ -47,6 +47,7 @@ pub(crate) trait Arithmetic<R: Real>: Copy {
 }
 
 /// A divisor that keeps a quotient's magnitude below 2⁸⁰.
+#[function]
 #[inline(always)]
 fn divisor<R: Real>(numerator: R, positive: R) -> R {
     let smallest: R = lit!(1e-37);

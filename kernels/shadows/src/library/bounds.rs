@@ -3,8 +3,8 @@
 use hankel_dsl::glam::{Vec2, Vec3, Vec4};
 use hankel_dsl::{Real, function};
 use hankel_moments::{
-    Bounds, HalfAngle, Moments4, Moments6, TrigonometricMoments, hamburger_4, hamburger_6,
-    hausdorff_4, hausdorff_4_symmetric, trigonometric_4, variance_2,
+    Bounds, HalfAngle, Moments4, Moments6, TrigonometricMoments, hamburger_4, hamburger_4_bounds,
+    hamburger_6, hausdorff_4, hausdorff_4_symmetric, trigonometric_4_lower, variance_2,
 };
 
 /// Moments from a vector.
@@ -39,6 +39,13 @@ pub(super) fn six(low: Vec3, high: Vec3) -> Moments6<f32> {
 #[function]
 pub fn hamburger_bound(moments: Vec4, depth: f32) -> f32 {
     hamburger_4(four(moments), depth)
+}
+
+/// The least (x) and the greatest (y) share of the filter region that is nearer than `depth`, for depths
+/// anywhere: `hamburger_bound`, and what it leaves out; both in [0, 1].
+#[function]
+pub fn hamburger_bounds(moments: Vec4, depth: f32) -> Vec2 {
+    pair(hamburger_4_bounds(four(moments), depth))
 }
 
 /// Hausdorff four moment shadow mapping: the least share of the filter region that is nearer than
@@ -81,6 +88,19 @@ pub fn hamburger_six_bounds(low: Vec3, high: Vec3, depth: f32) -> Vec2 {
     pair(hamburger_6(six(low, high), depth))
 }
 
+/// The least share of the filter region that is nearer than the depth z with cosine and sine of pi z, for
+/// `trigonometric_bounds`: the greatest is 1 minus the least of the mirrored moments at the mirrored depth.
+#[function]
+pub fn least_trigonometric_share(moments: Vec4, cosine: f32, sine: f32) -> f32 {
+    let m = TrigonometricMoments {
+        c1: moments.x,
+        s1: moments.y,
+        c2: moments.z,
+        s2: moments.w,
+    };
+    trigonometric_4_lower(m, HalfAngle::of_unit_vector(cosine, sine))
+}
+
 /// Trigonometric moment shadow mapping: the least (x) and the greatest (y) share of the filter region
 /// that is nearer than `depth`, for depths in [0, 1]; both in [0, 1].
 ///
@@ -88,13 +108,11 @@ pub fn hamburger_six_bounds(low: Vec3, high: Vec3, depth: f32) -> Vec2 {
 /// clamped to [-1, 1]. The bias scales them by 1 - strength.
 #[function]
 pub fn trigonometric_bounds(moments: Vec4, depth: f32) -> Vec2 {
-    let m = TrigonometricMoments {
-        c1: moments.x,
-        s1: moments.y,
-        c2: moments.z,
-        s2: moments.w,
-    };
-    pair(trigonometric_4(m, HalfAngle::of_depth(depth)))
+    let angle = HalfAngle::of_depth(depth);
+    let mirrored = Vec4::new(moments.x, -moments.y, moments.z, -moments.w);
+    let above = least_trigonometric_share(mirrored, -angle.cos(), angle.sin());
+    let least = least_trigonometric_share(moments, angle.cos(), angle.sin());
+    Vec2::new(least, Real::max(-above + 1.0, least))
 }
 
 /// Between the least share (x) and the greatest (y): the least for `overestimation` 0, the greatest

@@ -6,6 +6,9 @@
 //! | the least shadow that moments allow | [`bounds`] |
 //! | what is nearer than a receiver, for soft shadows | [`blockers`] |
 //! | bounds from two to ten moments with a free total | [`totals`] |
+//! | exponential and convolution shadow maps | [`exponential`], [`convolution`] |
+//! | translucent casters, single scattering | [`translucent`], [`scattering`] |
+//! | resolves and filters that look a map up more than once | [`lookups`] |
 //! | what a map stores | [`store`] |
 //! | published and measured biases | [`biases`] |
 //! | the few depths that have given moments | [`depths`] |
@@ -13,9 +16,14 @@
 pub mod biases;
 pub mod blockers;
 pub mod bounds;
+pub mod convolution;
 pub mod depths;
+pub mod exponential;
+pub mod lookups;
+pub mod scattering;
 pub mod store;
 pub mod totals;
+pub mod translucent;
 
 hankel_dsl::library! {
     /// Moment shadow mapping. Depths are in [0, 1] ("unit") or [-1, 1] ("symmetric"); the j-th moment
@@ -24,6 +32,7 @@ hankel_dsl::library! {
         api: 1,
         functions: [
             bounds::hamburger_bound,
+            bounds::hamburger_bounds,
             bounds::hausdorff_bound,
             bounds::hausdorff_symmetric_bound,
             bounds::variance_bound,
@@ -36,6 +45,23 @@ hankel_dsl::library! {
             blockers::blockers_of_two,
             blockers::blockers_of_four,
             blockers::blockers_of_six,
+            lookups::penumbra_reach,
+            exponential::exponential_of_depth,
+            exponential::exponential_bound,
+            exponential::exponential_moments_of_depth,
+            exponential::exponential_variance_bound,
+            convolution::convolution_cosines_of_depth,
+            convolution::convolution_sines_of_depth,
+            convolution::convolution_high_cosines_of_depth,
+            convolution::convolution_high_sines_of_depth,
+            convolution::convolution_shadow,
+            convolution::convolution_shadow_of_eight,
+            translucent::blend_translucent,
+            translucent::blend_translucent_six,
+            scattering::henyey_greenstein,
+            scattering::transmittance,
+            scattering::rectified_depth,
+            scattering::lit_share,
             totals::bounds_of_two,
             totals::bounds_of_four,
             totals::bounds_of_six,
@@ -60,6 +86,9 @@ hankel_dsl::library! {
             store::to_fixed_four,
             store::mean_of_fixed_four,
             store::rectangle_of_fixed_four,
+            lookups::resolve_four,
+            lookups::resolve_quantized_four,
+            lookups::mean_of_table_four,
             depths::two_depths,
             depths::three_depths,
             depths::three_shares,

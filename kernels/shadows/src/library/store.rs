@@ -15,7 +15,7 @@ fn moments(m: Moments4<f32>) -> Vec4 {
 }
 
 #[inline(always)]
-fn channels(q: Quantized4<f32>) -> Vec4 {
+pub(super) fn channels(q: Quantized4<f32>) -> Vec4 {
     Vec4::new(q.r, q.g, q.b, q.a)
 }
 
@@ -149,7 +149,7 @@ pub fn to_fixed_four(channels: Vec4, one: u32) -> UVec4 {
 }
 
 #[inline(always)]
-fn fixed(entry: UVec4) -> Fixed4 {
+pub(super) fn fixed(entry: UVec4) -> Fixed4 {
     Fixed4 {
         r: entry.x,
         g: entry.y,

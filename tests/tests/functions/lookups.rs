@@ -1,0 +1,201 @@
+//! Functions that look something up themselves: each is called with a lookup of the host's, in HLSL and GLSL by
+//! its macro, in MSL by a functor, in C by a function with a context, in Rust by a closure. WGSL has no such
+//! functions; what three.js makes of a lookup is in `tsl.rs`.
+
+use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec4};
+use hankel_dsl::native::describe::{Scalar, Type};
+use hankel_dsl::native::function::Function;
+use hankel_shadows::library::lookups::{mean_of_table_four, resolve_four, resolve_quantized_four};
+
+/// The sample of a texel with these depths.
+fn sample(channels: Vec4, i: u32) -> f32 {
+    [channels.x, channels.y, channels.z, channels.w][(i & 3) as usize]
+}
+
+/// A summed-area table of 4 x 3 entries.
+fn sum(columns: u32, rows: u32) -> UVec4 {
+    let texels = columns * rows;
+    UVec4::new(texels * 7, texels * columns, texels * rows, texels * 3)
+}
+
+/// The functions of the host, whose words are numbers.
+pub fn natives() -> Vec<Function> {
+    let scalar = |scalar| Type::Scalar { scalar };
+    let vector = |size| Type::Vector {
+        scalar: Scalar::F32,
+        size,
+    };
+    vec![
+        Function {
+            name: "host_resolve_four",
+            params: vec![("channels", vector(4)), ("count", scalar(Scalar::U32))],
+            result: vector(4),
+            run: |words, out| {
+                let channels = read_four(words);
+                let given = resolve_four(1 + (words[4] & 3), |i| sample(channels, i));
+                write_four(given, out);
+            },
+        },
+        Function {
+            name: "host_resolve_quantized_four",
+            params: vec![("channels", vector(4)), ("count", scalar(Scalar::U32))],
+            result: vector(4),
+            run: |words, out| {
+                let channels = read_four(words);
+                let given = resolve_quantized_four(1 + (words[4] & 3), |i| sample(channels, i));
+                write_four(given, out);
+            },
+        },
+        Function {
+            name: "host_mean_of_table_four",
+            params: vec![("place", vector(2)), ("reach", vector(2))],
+            result: vector(4),
+            run: |words, out| {
+                let size = UVec2::new(4, 3);
+                let (place, reach) = (read_pair(words, 0), read_pair(words, 2));
+                write_four(mean_of_table_four(place, reach, size, 16, sum), out);
+            },
+        },
+    ]
+}
+
+fn read_pair(words: &[u32], at: usize) -> Vec2 {
+    Vec2::new(f32::from_bits(words[at]), f32::from_bits(words[at + 1]))
+}
+
+fn read_four(words: &[u32]) -> Vec4 {
+    let (a, b) = (read_pair(words, 0), read_pair(words, 2));
+    Vec4::new(a.x, a.y, b.x, b.y)
+}
+
+fn write_four(v: Vec4, out: &mut Vec<u32>) {
+    out.extend([v.x, v.y, v.z, v.w].map(f32::to_bits));
+}
+
+/// Before the library in HLSL: the host's lookups, and the macros that name them.
+pub const HLSL: &str = "
+static float4 host_depths;
+uint4 host_sum(uint columns, uint rows)
+{
+    uint texels = columns * rows;
+    return uint4(texels * 7u, texels * columns, texels * rows, texels * 3u);
+}
+#define HANKEL_SAMPLE_DEPTH(i) host_depths[(i) & 3u]
+#define HANKEL_SUM_BEFORE(columns, rows) host_sum(columns, rows)
+";
+
+/// After the library in HLSL: the host's functions.
+pub const HLSL_AFTER: &str = "
+float4 hankel_host_resolve_four(float4 depths, uint count)
+{
+    host_depths = depths;
+    return hankel_resolve_four(1u + (count & 3u));
+}
+float4 hankel_host_resolve_quantized_four(float4 depths, uint count)
+{
+    host_depths = depths;
+    return hankel_resolve_quantized_four(1u + (count & 3u));
+}
+float4 hankel_host_mean_of_table_four(float2 place, float2 reach)
+{
+    return hankel_mean_of_table_four(place, reach, uint2(4u, 3u), 16u);
+}
+";
+
+/// HLSL's words in GLSL.
+pub fn as_glsl(hlsl: &str) -> String {
+    let words = [
+        ("static float4", "highp vec4"),
+        ("uint4", "uvec4"),
+        ("uint2", "uvec2"),
+        ("float4", "vec4"),
+        ("float2", "vec2"),
+    ];
+    let mut text = hlsl.to_owned();
+    for (from, to) in words {
+        text = text.replace(from, to);
+    }
+    // What has no precision of its own would have the host's.
+    for ty in ["float", "vec2", "vec4", "uint", "uvec2", "uvec4"] {
+        for before in ["(", ", ", "\n", "    "] {
+            let (from, to) = (format!("{before}{ty} "), format!("{before}highp {ty} "));
+            text = text.replace(&from, &to);
+        }
+    }
+    text
+}
+
+/// After the library's header in MSL.
+pub const MSL_AFTER: &str = "
+namespace hankel {
+namespace shadows {
+struct HostDepths {
+    metal::float4 depths;
+    float operator()(uint i) const { return depths[i & 3u]; }
+};
+struct HostSum {
+    metal::uint4 operator()(uint columns, uint rows) const
+    {
+        uint texels = columns * rows;
+        return metal::uint4(texels * 7u, texels * columns, texels * rows, texels * 3u);
+    }
+};
+inline metal::float4 host_resolve_four(metal::float4 depths, uint count)
+{
+    return resolve_four(1u + (count & 3u), HostDepths{depths});
+}
+inline metal::float4 host_resolve_quantized_four(metal::float4 depths, uint count)
+{
+    return resolve_quantized_four(1u + (count & 3u), HostDepths{depths});
+}
+inline metal::float4 host_mean_of_table_four(metal::float2 place, metal::float2 reach)
+{
+    return mean_of_table_four(place, reach, metal::uint2(4u, 3u), 16u, HostSum());
+}
+}
+}
+";
+
+/// After the library's header in C.
+pub const C_AFTER: &str = "
+static float host_depth(void *context, uint32_t i)
+{
+    const hankel_float4 depths = *(const hankel_float4 *)context;
+    const uint32_t at = i & 3u;
+    return at == 0u ? depths.x : at == 1u ? depths.y : at == 2u ? depths.z : depths.w;
+}
+static hankel_uint4 host_sum(void *context, uint32_t columns, uint32_t rows)
+{
+    const uint32_t texels = columns * rows;
+    (void)context;
+    return hankel_make_uint4(texels * 7u, texels * columns, texels * rows, texels * 3u);
+}
+static hankel_float4 hankel_host_resolve_four(hankel_float4 depths, uint32_t count)
+{
+    return hankel_resolve_four(1u + (count & 3u), host_depth, &depths);
+}
+static hankel_float4 hankel_host_resolve_quantized_four(hankel_float4 depths, uint32_t count)
+{
+    return hankel_resolve_quantized_four(1u + (count & 3u), host_depth, &depths);
+}
+static hankel_float4 hankel_host_mean_of_table_four(hankel_float2 place, hankel_float2 reach)
+{
+    return hankel_mean_of_table_four(place, reach, hankel_make_uint2(4u, 3u), 16u, host_sum, 0);
+}
+";
+
+/// After the library in Rust.
+pub const RUST_AFTER: &str = "
+pub fn host_resolve_four(depths: [f32; 4], count: u32) -> [f32; 4] {
+    resolve_four(1 + (count & 3), &|i| depths[(i & 3) as usize])
+}
+pub fn host_resolve_quantized_four(depths: [f32; 4], count: u32) -> [f32; 4] {
+    resolve_quantized_four(1 + (count & 3), &|i| depths[(i & 3) as usize])
+}
+pub fn host_mean_of_table_four(place: [f32; 2], reach: [f32; 2]) -> [f32; 4] {
+    mean_of_table_four(place, reach, [4, 3], 16, &|columns, rows| {
+        let texels = columns * rows;
+        [texels * 7, texels * columns, texels * rows, texels * 3]
+    })
+}
+";
