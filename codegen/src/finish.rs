@@ -11,7 +11,7 @@ use spirv_tools::val::Validator;
 
 use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
-use crate::spirv::uniform::Memory;
+use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
     self, bounds, canonical, exact, libm, names, order, parts, refused, split, trim, uniform,
 };
@@ -56,17 +56,24 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let words = optimise(module, name)?;
     let mut module = spirv::load(&words, name)?;
     order::mend(&mut module);
-    if uniform::divides_at_barrier(&module, Memory::Trusted) {
+    let divided = if uniform::divides_at_barrier(&module, Memory::Trusted) {
+        Some(("workgroup", "barrier"))
+    } else if uniform::divides_at_subgroup(&module, Memory::Trusted, Group::Subgroup) {
+        Some(("subgroup", "operation of it"))
+    } else {
+        None
+    };
+    if let Some((group, what)) = divided {
         return Err(Failure {
             kernel: name.into(),
             step: Step::Meaning,
             construct: place,
-            message: "not every invocation of a workgroup reaches each barrier. A barrier in a \
-                      branch, or a loop, that some do not take; or a division, an index or an \
-                      `unwrap` before it, which ends an invocation where it fails: write \
-                      `x.checked_div(y)`, an index that is masked (`t[(i & 7) as usize]`), \
-                      `unwrap_or`"
-                .into(),
+            message: format!(
+                "not every invocation of a {group} reaches each {what}. One in a branch, or a loop, \
+                 that some do not take; or a division, an index or an `unwrap` before it, which ends \
+                 an invocation where it fails: write `x.checked_div(y)`, an index that is masked \
+                 (`t[(i & 7) as usize]`), `unwrap_or`"
+            ),
             panicked: false,
         });
     }

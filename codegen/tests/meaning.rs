@@ -272,3 +272,42 @@ fn a_barrier_that_some_do_not_reach_is_refused() {
     let together = support::assemble(&BARRIER.replace("BUILT_IN", "WorkgroupId"));
     finish(&together, &compute()).unwrap_or_else(|e| panic!("{e}"));
 }
+
+#[test]
+fn an_operation_of_a_subgroup_that_some_do_not_reach_is_refused() {
+    let subgroup = BARRIER
+        .replace(
+            "OpCapability Shader",
+            "OpCapability Shader\n OpCapability GroupNonUniformArithmetic",
+        )
+        .replace(
+            "%main = OpFunction",
+            "%place = OpTypePointer Workgroup %uint\n %sums = OpVariable %place Workgroup\n \
+             %subgroup = OpConstant %uint 3\n %main = OpFunction",
+        )
+        .replace(
+            "OpControlBarrier %workgroup %workgroup %release",
+            "%sum = OpGroupNonUniformIAdd %uint %subgroup Reduce %x\n \
+             %before = OpAtomicIAdd %uint %sums %workgroup %release %sum",
+        );
+    let divided = support::assemble(&subgroup.replace("BUILT_IN", "LocalInvocationId"));
+    let error = finish(&divided, &compute()).unwrap_err();
+    assert_eq!(error.step, Step::Meaning);
+    let told = error.to_string();
+    assert!(told.contains("of a subgroup"), "{told}");
+    // Whole subgroups take the one way or the other.
+    let together = support::assemble(&subgroup.replace("BUILT_IN", "WorkgroupId"));
+    finish(&together, &compute()).unwrap_or_else(|e| panic!("{e}"));
+    // A vote is the same for all of a subgroup, and not for the workgroup.
+    let voted = subgroup
+        .replace(
+            "OpCapability GroupNonUniformArithmetic",
+            "OpCapability GroupNonUniformArithmetic\n OpCapability GroupNonUniformVote",
+        )
+        .replace(
+            "%first = OpIEqual %bool %x %zero",
+            "%mine = OpIEqual %bool %x %zero\n %first = OpGroupNonUniformAny %bool %subgroup %mine",
+        )
+        .replace("BUILT_IN", "LocalInvocationId");
+    finish(&support::assemble(&voted), &compute()).unwrap_or_else(|e| panic!("{e}"));
+}

@@ -1,17 +1,18 @@
-//! Whether every invocation of a workgroup reaches every barrier.
+//! Whether every invocation of a workgroup reaches every barrier, and every one of a subgroup every operation of
+//! the subgroup.
 //!
-//! A barrier that some invocations do not reach hangs a device or does nothing. That happens where a
-//! barrier stands in a branch, and also where an invocation has left before: rust-gpu makes of a
-//! panic (of a division, an index, an `unwrap`) that the invocation does nothing more, so that all
-//! that follows is in a branch.
+//! A barrier that some invocations do not reach hangs a device or does nothing; an operation of a subgroup is one
+//! of those that reach it. That happens where it stands in a branch, and also where an invocation has left before:
+//! rust-gpu makes of a panic (of a division, an index, an `unwrap`) that the invocation does nothing more, so that
+//! all that follows is in a branch.
 //!
-//! What is the same for a whole workgroup is told from where it comes: constants, uniforms, the
-//! workgroup's own number, and what is computed from these where all invocations are together.
+//! What is the same for a whole group is told from where it comes: constants, uniforms, the group's own number, and
+//! what is computed from these where all invocations are together.
 
 use std::collections::{HashMap, HashSet};
 
 use rspirv::dr::{Function, Instruction, Module, Operand};
-use rspirv::spirv::{BuiltIn, Decoration, Op, StorageClass, Word};
+use rspirv::spirv::{BuiltIn, Decoration, GroupOperation, Op, StorageClass, Word};
 
 use super::{id, op};
 
@@ -24,26 +25,41 @@ pub enum Memory {
     Doubted,
 }
 
-/// Whether there is a barrier that only some invocations may reach.
+/// The invocations that are to be together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// All of a workgroup.
+    Workgroup,
+    /// All of a subgroup.
+    Subgroup,
+}
+
+/// Whether there is a barrier that only some invocations of a workgroup may reach.
 #[must_use]
 pub fn divides_at_barrier(module: &Module, memory: Memory) -> bool {
-    let has_barrier = |function: &&Function| {
-        function
-            .all_inst_iter()
-            .any(|it| op(it) == Op::ControlBarrier)
-    };
-    module
-        .functions
-        .iter()
-        .filter(has_barrier)
-        .any(|function| Analysis::of(module, function, memory).barrier_in_branch())
+    divides(module, memory, Group::Workgroup, |op| {
+        op == Op::ControlBarrier
+    })
+}
+
+/// Whether there is an operation of a subgroup that only some invocations of the group may reach.
+#[must_use]
+pub fn divides_at_subgroup(module: &Module, memory: Memory, group: Group) -> bool {
+    divides(module, memory, group, is_of_subgroup)
+}
+
+fn divides(module: &Module, memory: Memory, group: Group, together: fn(Op) -> bool) -> bool {
+    let concerned = |function: &&Function| function.all_inst_iter().any(|it| together(op(it)));
+    let mut functions = module.functions.iter().filter(concerned);
+    functions.any(|function| Analysis::of(module, function, memory, group).has_in_branch(together))
 }
 
 struct Analysis<'a> {
     function: &'a Function,
     memory: Memory,
+    group: Group,
     variables: HashMap<Word, StorageClass>,
-    /// Inputs that are the same for a workgroup.
+    /// Inputs that are the same for the group.
     shared_inputs: HashSet<Word>,
     /// Buffers and textures that nobody writes.
     read_only: HashSet<Word>,
@@ -57,7 +73,7 @@ struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    fn of(module: &Module, function: &'a Function, memory: Memory) -> Self {
+    fn of(module: &Module, function: &'a Function, memory: Memory, group: Group) -> Self {
         let variables: HashMap<Word, StorageClass> = module
             .types_global_values
             .iter()
@@ -72,12 +88,7 @@ impl<'a> Analysis<'a> {
             .annotations
             .iter()
             .filter(|note| {
-                matches!(
-                    note.operands.get(2),
-                    Some(Operand::BuiltIn(
-                        BuiltIn::WorkgroupId | BuiltIn::NumWorkgroups | BuiltIn::WorkgroupSize
-                    ))
-                )
+                matches!(note.operands.get(2), Some(Operand::BuiltIn(it)) if is_shared(*it, group))
             })
             .filter_map(|note| id(note, 0))
             .collect();
@@ -105,6 +116,7 @@ impl<'a> Analysis<'a> {
         let mut analysis = Self {
             function,
             memory,
+            group,
             variables,
             shared_inputs,
             read_only: read_only(module),
@@ -213,7 +225,9 @@ impl<'a> Analysis<'a> {
             | Op::AtomicXor
             | Op::AtomicFAddEXT => true,
             // A subgroup is not the workgroup.
-            other if is_of_subgroup(other) => true,
+            other if is_of_subgroup(other) => {
+                self.group == Group::Workgroup || !is_same_for_subgroup(it)
+            }
             Op::ImageRead => any || self.memory == Memory::Doubted,
             _ => any,
         }
@@ -259,12 +273,40 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    fn barrier_in_branch(&self) -> bool {
+    fn has_in_branch(&self, together: fn(Op) -> bool) -> bool {
         self.divided.iter().any(|block| {
             let mut all = self.function.blocks[*block].instructions.iter();
-            all.any(|it| op(it) == Op::ControlBarrier)
+            all.any(|it| together(op(it)))
         })
     }
+}
+
+/// Whether an input is the same for all of a group.
+fn is_shared(input: BuiltIn, group: Group) -> bool {
+    let of_workgroup = matches!(
+        input,
+        BuiltIn::WorkgroupId | BuiltIn::NumWorkgroups | BuiltIn::WorkgroupSize
+    );
+    let of_subgroup = matches!(
+        input,
+        BuiltIn::SubgroupId | BuiltIn::NumSubgroups | BuiltIn::SubgroupSize
+    );
+    of_workgroup || of_subgroup && group == Group::Subgroup
+}
+
+/// Whether all invocations of a subgroup get the same of one of its operations.
+fn is_same_for_subgroup(it: &Instruction) -> bool {
+    let reduces = Operand::GroupOperation(GroupOperation::Reduce);
+    it.operands.contains(&reduces)
+        || matches!(
+            op(it),
+            Op::GroupNonUniformAll
+                | Op::GroupNonUniformAny
+                | Op::GroupNonUniformAllEqual
+                | Op::GroupNonUniformBallot
+                | Op::GroupNonUniformBroadcast
+                | Op::GroupNonUniformBroadcastFirst
+        )
 }
 
 /// SPIR-V numbers them in a row.

@@ -49,7 +49,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Failure, Step, guarded};
 use crate::lint::Finding;
 use crate::placement::Placement;
-use crate::spirv::uniform::{self, Memory};
+use crate::spirv::uniform::{self, Group, Memory};
 use crate::{Error, Language, VERSION, spirv};
 use reading::Dropped;
 
@@ -544,6 +544,15 @@ impl Ir {
             return Some(
                 "WGSL lets an implementation refuse a barrier in a branch or a loop that depends on \
                  memory that others write"
+                    .into(),
+            );
+        }
+        if language == Language::Wgsl
+            && uniform::divides_at_subgroup(&self.spirv, Memory::Doubted, Group::Workgroup)
+        {
+            return Some(
+                "WGSL refuses an operation of a subgroup in a branch or a loop that may not be the same for the \
+                 workgroup"
                     .into(),
             );
         }

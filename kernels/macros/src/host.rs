@@ -40,6 +40,7 @@ impl Kernel {
             }
         });
         let uniforms = self.uniform_checks();
+        let buffers = self.buffer_checks();
         let twin = (self.form() == Form::Cooperative).then(|| {
             let twin = twin::twin(&self.item, &format_ident!("twin"), &self.helpers);
             // As the native code that calls it.
@@ -67,6 +68,7 @@ impl Kernel {
                 pub fn entries() -> ::hankel_dsl::native::Entries {
                     use ::hankel_dsl::native::{self, describe, exec, fragment, layout, workgroup};
                     #uniforms
+                    #buffers
                     #twin
                     let mut all = native::Entries::new();
                     #(#entries)*
@@ -74,6 +76,41 @@ impl Kernel {
                 }
             }
         }
+    }
+
+    /// What lies in a buffer, element after element, has a stride that every language has.
+    fn buffer_checks(&self) -> TokenStream {
+        let params = self.params.iter().filter_map(|p| match &p.role {
+            Role::Element(ty)
+            | Role::ElementMut(ty)
+            | Role::Storage(ty)
+            | Role::StorageMut { ty, .. } => Some((p.name.to_string(), ty)),
+            _ => None,
+        });
+        let compute = matches!(self.stage, Stage::Compute(_));
+        let outputs = self.outputs.iter().enumerate().filter_map(|(i, ty)| {
+            let texels = self
+                .variants
+                .iter()
+                .any(|v| self.output_format(i, v).is_some());
+            (compute && !texels).then(|| (self.output_text(i), ty))
+        });
+        params
+            .chain(outputs)
+            .flat_map(|(name, ty)| self.variants.iter().map(move |v| (name.clone(), ty, v)))
+            .map(|(name, ty, v)| {
+                let concrete = self.concrete(ty, v);
+                let message = format!(
+                    "buffer `{name}`: a vector of three numbers takes 12 bytes in Rust and 16 in shaders: take a PackedVec3, a vector of four, or a structure"
+                );
+                quote_spanned! {ty.span()=>
+                    const _: () = assert!(
+                        size_of::<#concrete>().is_multiple_of(<#concrete as layout::Element>::ALIGN),
+                        #message
+                    );
+                }
+            })
+            .collect()
     }
 
     fn uniform_checks(&self) -> TokenStream {
