@@ -280,6 +280,7 @@ fn an_operation_of_a_subgroup_that_some_do_not_reach_is_refused() {
             "OpCapability Shader",
             "OpCapability Shader\n OpCapability GroupNonUniformArithmetic",
         )
+        .replace("%main \"main\" %number", "%main \"main\" %number %sums")
         .replace(
             "%main = OpFunction",
             "%place = OpTypePointer Workgroup %uint\n %sums = OpVariable %place Workgroup\n \
