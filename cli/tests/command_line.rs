@@ -102,6 +102,17 @@ fn a_build_can_be_narrowed() {
     assert!(!desk.path("s/wgsl").exists());
 }
 
+#[test]
+fn nothing_is_built_for_a_dependency_file_that_cannot_be_written() {
+    let desk = Desk::new();
+    desk.hankel("build --out s --kernel vsm --depfile nowhere/s.d")
+        .code(2);
+    assert!(!desk.path("s").exists());
+    desk.hankel("build --out s --kernel vsm --depfile s/s.d")
+        .code(0);
+    assert!(desk.path("s/s.d").is_file());
+}
+
 /// Places of bindings and open constants are in the texts, in what a build depends on, and in what a
 /// folder must be checked with.
 #[test]

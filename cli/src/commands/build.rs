@@ -16,6 +16,14 @@ use crate::session::Session;
 use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
+    // Whether it can be written, before anything is; a folder within the output's may be made by the build.
+    if let Some(file) = args
+        .depfile
+        .as_ref()
+        .filter(|it| !it.starts_with(&args.out))
+    {
+        drop(Output::create(file, &[])?);
+    }
     #[cfg(feature = "frames")]
     match &args.frame.scene {
         Some(scene) => return super::frame::build(args, scene, quiet),
