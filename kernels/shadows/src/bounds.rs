@@ -2,11 +2,7 @@
 //! `hankel eval`, and for parity in both precisions.
 
 use hankel_dsl::{Element, Real, kernel};
-use hankel_moments::{
-    Moments4, cut_leak, hamburger_4, hamburger_6_compensated, hausdorff_4, variance_2,
-};
-
-use crate::six::{Receiver6, Settings6};
+use hankel_moments::{Moments4, cut_leak, hamburger_4, hausdorff_4, variance_2};
 
 /// How a bound is turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -108,32 +104,6 @@ pub fn hausdorff_4msm<R: Real>(
 ) -> Shadow<R> {
     let (m, z) = biased(settings, receiver);
     cut(hausdorff_4(m, z), settings)
-}
-
-/// `hamburger_6msm` with what is ill-conditioned in about twice the digits.
-#[kernel(
-    compute,
-    threads(64),
-    precision(f32, f64),
-    pinned,
-    inputs = crate::inputs::receivers_6,
-    parity(
-        absolute = 2e-45,
-        why = "shaders take a product's error from partial products, which may underflow: one subnormal step"
-    )
-)]
-pub fn hamburger_6msm_compensated<R: Real>(
-    #[uniform] settings: &Settings6<R>,
-    #[element] receiver: Receiver6<R>,
-) -> Shadow<R> {
-    let m = receiver.moments.clamped().lerp(
-        settings.bias_target.clamped(),
-        settings.moment_bias.saturate(),
-    );
-    let bounds = hamburger_6_compensated(m, receiver.depth - settings.depth_bias);
-    Shadow {
-        shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
-    }
 }
 
 /// Variance shadow mapping: the least shadow that two moments allow.

@@ -171,7 +171,7 @@ hankel_dsl::kernels![
     moment_bounds::moment_bound_adjoint_compensated_n2,
     moment_bounds::moment_bound_adjoint_compensated_n3,
     six::hamburger_6msm,
-    bounds::hamburger_6msm_compensated,
+    six::hamburger_6msm_compensated,
     trigonometric::trigonometric_4msm,
     trigonometric::trigonometric_moments,
     points::sparse_2point,

@@ -6,7 +6,8 @@ use core::ops::{AddAssign, Div};
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{
-    Moments6, Quantized6, cut_leak, dequantize_symmetric_6, hamburger_6, quantize_symmetric_6,
+    Bounds, Moments6, Quantized6, cut_leak, dequantize_symmetric_6, hamburger_6,
+    hamburger_6_compensated, quantize_symmetric_6,
 };
 
 use crate::bounds::Shadow;
@@ -48,6 +49,22 @@ pub struct Receiver6<R> {
     pub depth: R,
 }
 
+#[inline(always)]
+fn shadow<R: Real>(
+    settings: &Settings6<R>,
+    receiver: Receiver6<R>,
+    bounds: impl FnOnce(Moments6<R>, R) -> Bounds<R>,
+) -> Shadow<R> {
+    let m = receiver.moments.clamped().lerp(
+        settings.bias_target.clamped(),
+        settings.moment_bias.saturate(),
+    );
+    let bounds = bounds(m, receiver.depth - settings.depth_bias);
+    Shadow {
+        shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
+    }
+}
+
 /// Hamburger six moment shadow mapping: the shadow that the moments allow, for depths anywhere in
 /// [-1, 1].
 #[kernel(
@@ -60,14 +77,26 @@ pub fn hamburger_6msm<R: Real>(
     #[uniform] settings: &Settings6<R>,
     #[element] receiver: Receiver6<R>,
 ) -> Shadow<R> {
-    let m = receiver.moments.clamped().lerp(
-        settings.bias_target.clamped(),
-        settings.moment_bias.saturate(),
-    );
-    let bounds = hamburger_6(m, receiver.depth - settings.depth_bias);
-    Shadow {
-        shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
-    }
+    shadow(settings, receiver, hamburger_6)
+}
+
+/// `hamburger_6msm` with what is ill-conditioned in about twice the digits.
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    pinned,
+    inputs = crate::inputs::receivers_6,
+    parity(
+        absolute = 2e-45,
+        why = "shaders take a product's error from partial products, which may underflow: one subnormal step"
+    )
+)]
+pub fn hamburger_6msm_compensated<R: Real>(
+    #[uniform] settings: &Settings6<R>,
+    #[element] receiver: Receiver6<R>,
+) -> Shadow<R> {
+    shadow(settings, receiver, hamburger_6_compensated)
 }
 
 /// A texel of each texture.
