@@ -568,6 +568,16 @@ pub fn ascii(text: &str) -> String {
     out
 }
 
+/// Whether a line of Markdown does not go on with the paragraph before it: a list, a heading, a table, a quote
+/// or code.
+fn begins_a_block(line: &str) -> bool {
+    let numbered = line.trim_start_matches(|c: char| c.is_ascii_digit());
+    ["- ", "* ", "#", "|", ">", "```", "    "]
+        .iter()
+        .any(|mark| line.starts_with(mark))
+        || numbered.len() < line.len() && numbered.starts_with(". ")
+}
+
 /// Documentation without what only rustdoc understands.
 pub fn reflowed(lines: &[String]) -> Vec<String> {
     let mut out = Vec::new();
@@ -589,7 +599,7 @@ pub fn reflowed(lines: &[String]) -> Vec<String> {
         }
         // What did not fit into a line of a paragraph begins the next one.
         if !carried.is_empty() {
-            if plain.is_empty() || !plain.starts_with(|c: char| c.is_alphanumeric() || c == '`') {
+            if plain.is_empty() || begins_a_block(&plain) {
                 out.push(std::mem::take(&mut carried));
             } else {
                 plain = format!("{carried} {plain}");

@@ -75,11 +75,12 @@ macro_rules! shading {
                 size: $first.size(),
             };
             view.light_up(world, normal, colour, plane, |footprint, uv, z| {
+                let level = footprint.level();
                 $of(
                     light,
                     $($uniform,)*
-                    footprint.mean(uv, |uv, level| $first.sample_level(sampler, uv, level)),
-                    $(footprint.mean(uv, |uv, level| $map.sample_level(sampler, uv, level)),)*
+                    footprint.mean(uv, |uv| $first.sample_level(sampler, uv, level)),
+                    $(footprint.mean(uv, |uv| $map.sample_level(sampler, uv, level)),)*
                     z,
                     $($constant,)*
                 )

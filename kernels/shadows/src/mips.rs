@@ -9,7 +9,7 @@
 //! because which ones a sampler takes for an anisotropic lookup is up to the device.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Element, Real, Texture2d, kernel, math};
+use hankel_dsl::{Element, Real, Texture2d, kernel, math, to_i32};
 
 use crate::depth::{Transform, row_times_point};
 use crate::grid::within;
@@ -167,8 +167,8 @@ pub(crate) struct Footprint {
     length: f32,
     /// From a place to the next, in coordinates of the map.
     step: Vec2,
-    /// The level whose texels are as wide as it is.
-    level: f32,
+    /// Its shorter axis in texels, 1 or more.
+    pub(crate) width: f32,
 }
 
 #[inline(always)]
@@ -235,13 +235,25 @@ impl Footprint {
             near(dot(u, down) * scale_y) * columns,
             near(dot(v, down) * scale_y) * rows,
         );
+        let steps = [Vec2::new(xu, xv), Vec2::new(yu, yv)];
+        Self::of_steps(steps, Vec2::new(columns, rows), raster.anisotropy)
+    }
+
+    /// Of a pixel whose steps to its neighbours, along x and along y, are `steps` in a map of `size` texels.
+    #[inline(always)]
+    pub(crate) fn of_steps(steps: [Vec2; 2], size: Vec2, anisotropy: f32) -> Self {
+        let [x, y] = steps;
         // The squares of the axes are the eigenvalues of [[uu, uv], [uv, vv]].
-        let (uu, uv, vv) = (xu * xu + yu * yu, xu * xv + yu * yv, xv * xv + yv * yv);
+        let (uu, uv, vv) = (
+            x.x * x.x + y.x * y.x,
+            x.x * x.y + y.x * y.y,
+            x.y * x.y + y.y * y.y,
+        );
         let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
         let root = Real::sqrt(half * half + uv * uv);
         let long = Real::sqrt(mean + root);
-        let short = Real::abs(xu * yv - xv * yu) / Real::max(long, 1e-6);
-        let anisotropy = Real::clamp(raster.anisotropy, 1.0, 16.0);
+        let short = Real::abs(x.x * y.y - x.y * y.x) / Real::max(long, 1e-6);
+        let anisotropy = Real::clamp(anisotropy, 1.0, 16.0);
         let width = Real::max(Real::max(short, long / anisotropy), 1.0);
         let length = Real::max(long / width, 1.0);
         // The longer axis; of a circle none.
@@ -253,23 +265,33 @@ impl Footprint {
         let step = long / (length * Real::max(Real::sqrt(u * u + v * v), 1e-12));
         Self {
             length,
-            step: Vec2::new(u * step / columns, v * step / rows),
-            level: math::log2(width),
+            step: Vec2::new(u * step / size.x, v * step / size.y),
+            width,
         }
     }
 
-    /// The mean over the footprint of what `sample` gives for a place and a level. Places have distances as
+    /// The level whose texels are as wide as it is.
+    #[inline(always)]
+    pub(crate) fn level(self) -> f32 {
+        math::log2(self.width)
+    }
+
+    /// The mean over the footprint of what `sample` gives for a place. Places have distances as
     /// large as the footprint is wide; those that stick out count in part, so that nothing jumps where there is
     /// one more.
     #[inline(always)]
-    pub(crate) fn mean(self, uv: Vec2, sample: impl Fn(Vec2, f32) -> Vec4) -> Vec4 {
+    pub(crate) fn mean(self, uv: Vec2, sample: impl Fn(Vec2) -> Vec4) -> Vec4 {
         let reach = 0.5 * (self.length + 1.0);
-        let mut sum = sample(uv, self.level);
-        let mut i = 1;
-        while (i as f32) < reach {
-            let away = self.step * i as f32;
-            let weight = Real::min(reach - i as f32, 1.0);
-            sum += (sample(uv + away, self.level) + sample(uv - away, self.level)) * weight;
+        // How many places there are on each side.
+        let whole = to_i32(reach);
+        let count = (if (whole as f32) < reach { whole } else { whole - 1 }) as u32;
+        let mut sum = sample(uv);
+        let mut i = 0;
+        while i < count {
+            let distance = (i + 1) as f32;
+            let away = self.step * distance;
+            let weight = Real::min(reach - distance, 1.0);
+            sum += (sample(uv + away) + sample(uv - away)) * weight;
             i += 1;
         }
         sum / self.length

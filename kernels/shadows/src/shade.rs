@@ -322,73 +322,91 @@ pub(crate) fn percentage(
     uv: Vec2,
     compare: impl Fn(UVec2) -> f32,
 ) -> f32 {
-    let radius = radius as i32;
     let nearest = |t: f32, size: u32| {
         let last = (size - 1) as f32;
         // Not negative, so that cutting the fraction off is rounding down.
         to_i32(Real::clamp(t * size as f32, 0.0, last))
     };
-    let (x, y) = (nearest(uv.x, size.x), nearest(uv.y, size.y));
+    let (left, top) = (
+        nearest(uv.x, size.x) - radius as i32,
+        nearest(uv.y, size.y) - radius as i32,
+    );
+    let width = 2 * radius + 1;
     let mut shadowed = 0.0;
-    let mut dy = -radius;
-    while dy <= radius {
-        let mut dx = -radius;
-        while dx <= radius {
-            let at = UVec2::new(within(x + dx, size.x), within(y + dy, size.y));
-            shadowed += compare(at);
-            dx += 1;
+    let mut row = 0;
+    while row < width {
+        let y = within(top + row as i32, size.y);
+        let mut column = 0;
+        while column < width {
+            shadowed += compare(UVec2::new(within(left + column as i32, size.x), y));
+            column += 1;
         }
-        dy += 1;
+        row += 1;
     }
-    let width = (2 * radius + 1) as f32;
+    let width = width as f32;
     shadowed / (width * width)
 }
 
-/// The weight of the depths that are nearer than `z`, by a separable filter and bilinear lookup, over
-/// all samples of each texel.
+/// The mean of what `compare` gives for the texels around a place in a map of `size` texels, by a separable filter
+/// and bilinear lookup: `weight` gives the filter's weight of a texel from 0 to `count - 1` texels away.
 #[inline(always)]
 pub(crate) fn weighted(
+    size: UVec2,
+    count: u32,
+    uv: Vec2,
+    weight: impl Fn(u32) -> f32,
+    compare: impl Fn(UVec2) -> f32,
+) -> f32 {
+    // In texels from the first one's centre; beyond the edge as at it.
+    let place = |t: f32, size: u32| Real::clamp(t * size as f32 - 0.5, 0.0, (size - 1) as f32);
+    let (x, y) = (place(uv.x, size.x), place(uv.y, size.y));
+    let (left, top) = (to_i32(x), to_i32(y));
+    let (right_share, low_share) = (x - left as f32, y - top as f32);
+    let count = count as i32;
+    let weight_at = |d: i32| {
+        let d = if d < 0 { -d } else { d };
+        if d < count { weight(d as u32) } else { 0.0 }
+    };
+    let width = 2 * count as u32;
+    let mut shadowed = 0.0;
+    let mut row = 0;
+    while row < width {
+        let dy = row as i32 + 1 - count;
+        let mut of_row = 0.0;
+        let mut column = 0;
+        while column < width {
+            let dx = column as i32 + 1 - count;
+            let at = UVec2::new(within(left + dx, size.x), within(top + dy, size.y));
+            let share = weight_at(dx) * (1.0 - right_share) + weight_at(dx - 1) * right_share;
+            of_row += share * compare(at);
+            column += 1;
+        }
+        let share = weight_at(dy) * (1.0 - low_share) + weight_at(dy - 1) * low_share;
+        shadowed += share * of_row;
+        row += 1;
+    }
+    Real::saturate(shadowed)
+}
+
+/// [`weighted`] of the samples of a depth map that are nearer than `z`.
+#[inline(always)]
+pub(crate) fn weighted_depths(
     depth: Texture2dMultisampled<'_>,
     weights: Buffer<'_, f32>,
     samples: u32,
     uv: Vec2,
     z: f32,
 ) -> f32 {
-    let size = depth.size();
-    // In texels from the first one's centre; beyond the edge as at it.
-    let place = |t: f32, size: u32| Real::clamp(t * size as f32 - 0.5, 0.0, (size - 1) as f32);
-    let (x, y) = (place(uv.x, size.x), place(uv.y, size.y));
-    let (left, top) = (to_i32(x), to_i32(y));
-    let (right_share, low_share) = (x - left as f32, y - top as f32);
-    let count = weights.len() as i32;
-    let weight = |d: i32| {
-        let d = if d < 0 { -d } else { d };
-        if d < count {
-            weights.get(d as u32)
-        } else {
-            0.0
+    let weight = |i: u32| weights.get(i);
+    weighted(depth.size(), weights.len(), uv, weight, |at| {
+        let mut nearer = 0.0;
+        let mut i = 0;
+        while i < samples {
+            nearer += if depth.load(at, i).x < z { 1.0 } else { 0.0 };
+            i += 1;
         }
-    };
-    let mut shadowed = 0.0;
-    let mut dy = 1 - count;
-    while dy <= count {
-        let mut row = 0.0;
-        let mut dx = 1 - count;
-        while dx <= count {
-            let at = UVec2::new(within(left + dx, size.x), within(top + dy, size.y));
-            let mut nearer = 0.0;
-            let mut i = 0;
-            while i < samples {
-                nearer += if depth.load(at, i).x < z { 1.0 } else { 0.0 };
-                i += 1;
-            }
-            row += (weight(dx) * (1.0 - right_share) + weight(dx - 1) * right_share) * nearer;
-            dx += 1;
-        }
-        shadowed += (weight(dy) * (1.0 - low_share) + weight(dy - 1) * low_share) * row;
-        dy += 1;
-    }
-    Real::saturate(shadowed / samples as f32)
+        nearer / samples as f32
+    })
 }
 
 /// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
@@ -443,7 +461,7 @@ pub fn shade_pcf_gaussian(
     samples: u32,
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
-        weighted(depth, weights, samples, uv, z)
+        weighted_depths(depth, weights, samples, uv, z)
     })
 }
 

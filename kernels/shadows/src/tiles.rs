@@ -379,7 +379,7 @@ pub fn shade_pcf_gaussian_tiles(
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
         unless_settled(depth.size(), between, 0.0, uv, z, || {
-            weighted(depth, weights, samples, uv, z)
+            weighted_depths(depth, weights, samples, uv, z)
         })
     })
 }

@@ -252,12 +252,26 @@ fn mixed(x: u32) -> u32 {
 /// Layers of a map's depth whose surfaces have thresholds of their own.
 const LAYERS: f32 = 1024.0;
 
-/// Four depths of a translucent fragment, for blending that keeps the least: each is the fragment's depth with
+/// Four depths of a translucent fragment, for blending that keeps the least: each is the fragment's depth `z` with
 /// the probability `opacity`, and else 1 (stochastic transparency: Enderton, Sintorn, Shirley, Luebke, 2010).
 ///
 /// The four thresholds lie in the four quarters of [0, 1), in one of four orders, so that of an opacity of 0.5
 /// two of four remain. What is random is a hash of the texel and of the depth in 1024 layers (hashed
 /// alpha: Wyman, McGuire, 2017): always the same for the same surface, and another for one behind it.
+#[inline(always)]
+pub(crate) fn kept_depths(texel: UVec2, z: f32, opacity: f32) -> Vec4 {
+    let layer = to_i32(z * LAYERS) as u32;
+    let across = mixed(texel.y ^ mixed(layer));
+    let random = mixed(texel.x ^ across);
+    let within = (random >> 8) as f32 / 16_777_216.0;
+    let kept = |quarter: u32| {
+        let threshold = 0.25 * (((quarter ^ random) & 3) as f32 + within);
+        if threshold < opacity { z } else { 1.0 }
+    };
+    Vec4::new(kept(0), kept(1), kept(2), kept(3))
+}
+
+/// [`kept_depths`] of a fragment, whose place in the map is given in clip space.
 #[kernel(fragment, inputs = crate::inputs::translucent::fragments)]
 pub fn stochastic_depths(
     #[varying]
@@ -267,20 +281,12 @@ pub fn stochastic_depths(
     #[uniform] size: &UVec2,
 ) -> Vec4 {
     let place = divided(place);
-    let z = Real::saturate(place.z);
     let texel = |x: f32, size: u32| {
         let at = Real::saturate(0.5 * x + 0.5) * size as f32;
         to_i32(Real::min(at, 65536.0)) as u32
     };
-    let layer = to_i32(z * LAYERS) as u32;
-    let across = mixed(texel(place.y, size.y) ^ mixed(layer));
-    let random = mixed(texel(place.x, size.x) ^ across);
-    let within = (random >> 8) as f32 / 16_777_216.0;
-    let kept = |quarter: u32| {
-        let threshold = 0.25 * (((quarter ^ random) & 3) as f32 + within);
-        if threshold < surface.w { z } else { 1.0 }
-    };
-    Vec4::new(kept(0), kept(1), kept(2), kept(3))
+    let texel = UVec2::new(texel(place.x, size.x), texel(place.y, size.y));
+    kept_depths(texel, Real::saturate(place.z), surface.w)
 }
 
 /// Shading with percentage-closer filtering, all four samples of each texel: of each the nearer one of the

@@ -418,7 +418,7 @@ pub fn count(extent: [u32; 3]) -> Result<usize, CallError> {
 }
 
 /// Runs the loops; a kernel's panic becomes an error.
-pub(super) fn guard(f: impl FnOnce()) -> Result<(), CallError> {
+pub(super) fn guard(f: &mut dyn FnMut()) -> Result<(), CallError> {
     catch_unwind(AssertUnwindSafe(f)).map_err(|payload| {
         let message = message(payload.as_ref());
         CallError::Panic {
@@ -438,51 +438,63 @@ fn message(payload: &(dyn Any + Send)) -> String {
         .unwrap_or_else(|| "no message".to_string())
 }
 
-/// Calls `f` with consecutive parts of `out` and the index of each part's first element. A part has
-/// `chunk` elements; in a sanitized call it has the `one` elements of a single invocation, which is
-/// at `at(number)`, and the parts come in the order of that call.
-fn chunks<T: Send>(
+/// Runs `part` for consecutive parts of `out` with the index of each part's first byte. A part has
+/// `chunk` bytes; in a sanitized call it has the `one` bytes of a single invocation, which is
+/// at `at(number)`, and the parts come in the order of that call. A kernel's panic becomes an error.
+///
+/// This and [`for_ranges`] are the loops around all kernels. They are compiled once, and call a kernel's code
+/// through a pointer: as generic functions they would be compiled with each kernel, and its body several times.
+fn for_chunks(
     mode: Mode,
-    out: &mut [T],
+    out: &mut [u8],
     one: usize,
     chunk: usize,
-    at: impl Fn(u32) -> UVec3,
-    f: impl Fn(usize, &mut [T]) + Sync,
-) {
-    if let Some(order) = sanitize::order(out.len() / one) {
-        for i in order {
-            sanitize::enter_alone(at(i), i);
-            let start = i as usize * one;
-            f(start, &mut out[start..start + one]);
+    at: &dyn Fn(u32) -> UVec3,
+    part: &(dyn Fn(usize, &mut [u8]) + Sync),
+) -> Result<(), CallError> {
+    guard(&mut || {
+        if let Some(order) = sanitize::order(out.len() / one) {
+            for i in order {
+                sanitize::enter_alone(at(i), i);
+                let start = i as usize * one;
+                part(start, &mut out[start..start + one]);
+            }
+        } else if mode.parallel {
+            out.par_chunks_mut(chunk)
+                .enumerate()
+                .for_each(|(i, c)| part(i * chunk, c));
+        } else {
+            out.chunks_mut(chunk)
+                .enumerate()
+                .for_each(|(i, c)| part(i * chunk, c));
         }
-    } else if mode.parallel {
-        out.par_chunks_mut(chunk)
-            .enumerate()
-            .for_each(|(i, c)| f(i * chunk, c));
-    } else {
-        out.chunks_mut(chunk)
-            .enumerate()
-            .for_each(|(i, c)| f(i * chunk, c));
-    }
+    })
 }
 
-/// Where an invocation of one dimension is.
-fn along(i: u32) -> UVec3 {
-    UVec3::new(i, 0, 0)
+/// [`for_chunks`] of elements, by the index of each part's first one.
+fn for_elements<T: Pod>(
+    mode: Mode,
+    out: &mut [T],
+    part: &(dyn Fn(usize, &mut [T]) + Sync),
+) -> Result<(), CallError> {
+    let one = size_of::<T>();
+    let along = |i: u32| UVec3::new(i, 0, 0);
+    let out = bytemuck::cast_slice_mut(out);
+    for_chunks(mode, out, one, CHUNK * one, &along, &|start, bytes| {
+        part(start / one, bytemuck::cast_slice_mut(bytes));
+    })
 }
 
 /// A map over one dimension, invocation by invocation.
-pub fn map1<T: Send>(
+pub fn map1<T: Pod>(
     mode: Mode,
     out: &mut [T],
     f: impl Fn(usize) -> T + Sync,
 ) -> Result<(), CallError> {
-    guard(|| {
-        chunks(mode, out, 1, CHUNK, along, |start, chunk| {
-            for (i, slot) in chunk.iter_mut().enumerate() {
-                *slot = f(start + i);
-            }
-        });
+    for_elements(mode, out, &|start, chunk| {
+        for (i, slot) in chunk.iter_mut().enumerate() {
+            *slot = f(start + i);
+        }
     })
 }
 
@@ -495,32 +507,48 @@ pub fn for_each(
 ) -> Result<(), CallError> {
     let [width, height, depth] = extent.map(|n| n as usize);
     let (row, count) = (width.max(1), width * height * depth);
-    let chunk = |start: usize, end: usize| {
-        let mut i = start;
-        while i < end {
-            let line = i / row;
-            let stop = end.min((line + 1) * row);
-            let (y, z) = ((line % height) as u32, (line / height) as u32);
-            for j in i..stop {
-                f(UVec3::new((j - line * row) as u32, y, z), j as u32);
+    let at = |i: usize| {
+        let line = i / row;
+        UVec3::new(
+            (i - line * row) as u32,
+            (line % height) as u32,
+            (line / height) as u32,
+        )
+    };
+    let place = |i: u32| at(i as usize);
+    for_ranges(mode, count, &place, &|range| {
+        let mut i = range.start;
+        while i < range.end {
+            let first = at(i);
+            let stop = range.end.min(i + row - first.x as usize);
+            for (x, j) in (first.x..).zip(i..stop) {
+                f(UVec3::new(x, first.y, first.z), j as u32);
             }
             i = stop;
         }
-    };
-    guard(|| {
+    })
+}
+
+/// Calls `part` with consecutive ranges of `count` invocations; in a sanitized call with single ones, in its
+/// order, each of which is at `at(number)`. A kernel's panic becomes an error.
+fn for_ranges(
+    mode: Mode,
+    count: usize,
+    at: &dyn Fn(u32) -> UVec3,
+    part: &(dyn Fn(Range<usize>) + Sync),
+) -> Result<(), CallError> {
+    guard(&mut || {
         if let Some(order) = sanitize::order(count) {
-            for j in order {
-                let (line, x) = (j / row as u32, j % row as u32);
-                let at = UVec3::new(x, line % height as u32, line / height as u32);
-                sanitize::enter_alone(at, j);
-                chunk(j as usize, j as usize + 1);
+            for i in order {
+                sanitize::enter_alone(at(i), i);
+                part(i as usize..i as usize + 1);
             }
         } else if mode.parallel {
             (0..count.div_ceil(CHUNK))
                 .into_par_iter()
-                .for_each(|i| chunk(i * CHUNK, count.min((i + 1) * CHUNK)));
+                .for_each(|i| part(i * CHUNK..count.min((i + 1) * CHUNK)));
         } else {
-            chunk(0, count);
+            part(0..count);
         }
     })
 }
@@ -530,7 +558,7 @@ pub trait LaneBody: Sync {
     /// The scalar type.
     type Scalar: Scalar;
     /// An output element.
-    type Out: Send;
+    type Out: Pod;
     /// What is the same for all invocations, over lanes.
     type Uniforms<L: Real>;
     /// It.
@@ -549,11 +577,9 @@ pub trait LaneBody: Sync {
 /// A map over one dimension, on SIMD lanes if `mode` says so and the processor has any.
 pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Result<(), CallError> {
     let level = if mode.lanes { lanes::level() } else { None };
-    guard(|| {
-        chunks(mode, out, 1, CHUNK, along, |start, chunk| {
-            let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), 0);
-            scalar_chunk(start + done, &mut chunk[done..], body);
-        });
+    for_elements(mode, out, &|start, chunk| {
+        let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), 0);
+        scalar_chunk(start + done, &mut chunk[done..], body);
     })
 }
 
@@ -654,16 +680,14 @@ pub fn map_texels<T: Texel<Channels: Channels>>(
         let line = i / width;
         UVec3::new(i % width, line % height, line / height)
     };
-    guard(|| {
-        let row = width as usize * texel;
-        chunks(mode, bytes, texel, row, at, |start, bytes| {
-            let first = at((start / texel) as u32);
-            for (x, bytes) in (first.x..).zip(bytes.chunks_exact_mut(texel)) {
-                f(UVec3::new(x, first.y, first.z))
-                    .channels()
-                    .store(format, bytes);
-            }
-        });
+    let row = width as usize * texel;
+    for_chunks(mode, bytes, texel, row, &at, &|start, bytes| {
+        let first = at((start / texel) as u32);
+        for (x, bytes) in (first.x..).zip(bytes.chunks_exact_mut(texel)) {
+            f(UVec3::new(x, first.y, first.z))
+                .channels()
+                .store(format, bytes);
+        }
     })
 }
 
@@ -724,29 +748,38 @@ pub fn map_tuple<S: Slices>(
     out: S,
     f: impl Fn(usize) -> S::Values + Sync,
 ) -> Result<(), CallError> {
-    guard(|| some_of_range(mode.parallel, 0, out, &|i| Some(f(i))))
+    map_parts(mode, out, &|start, mut part| {
+        for i in 0..part.count() {
+            part.set(i, f(start + i));
+        }
+    })
 }
 
-/// Sets the values of those invocations from `start` on that have any.
-pub(super) fn some_of_range<S: Slices>(
-    parallel: bool,
-    start: usize,
-    mut out: S,
-    f: &(impl Fn(usize) -> Option<S::Values> + Sync),
-) {
+/// Calls `f` with parts of all slices and the index of each part's first element. A kernel's panic becomes an
+/// error.
+pub(super) fn map_parts<S: Slices>(
+    mode: Mode,
+    out: S,
+    f: &(dyn Fn(usize, S) + Sync),
+) -> Result<(), CallError> {
+    let mut out = Some(out);
+    guard(&mut || {
+        if let Some(out) = out.take() {
+            split(mode.parallel, 0, out, f);
+        }
+    })
+}
+
+fn split<S: Slices>(parallel: bool, start: usize, out: S, f: &(dyn Fn(usize, S) + Sync)) {
     let count = out.count();
     if parallel && count > CHUNK {
         let mid = count / 2;
         let (low, high) = out.split(mid);
         rayon::join(
-            || some_of_range(parallel, start, low, f),
-            || some_of_range(parallel, start + mid, high, f),
+            || split(parallel, start, low, f),
+            || split(parallel, start + mid, high, f),
         );
     } else {
-        for i in 0..count {
-            if let Some(values) = f(start + i) {
-                out.set(i, values);
-            }
-        }
+        f(start, out);
     }
 }

@@ -15,7 +15,7 @@ use std::{format, thread_local};
 use glam::{UVec3, Vec3, Vec4};
 
 use super::call::{CallError, Mode};
-use super::exec::{Slices, guard, some_of_range};
+use super::exec::{Slices, guard, map_parts};
 use super::sanitize::{self, refuse};
 
 /// Columns of the target that invocations are laid out in.
@@ -174,7 +174,7 @@ enum Ended<T> {
 }
 
 /// Runs one fragment of the quad from its beginning.
-fn begin<T>(lane: usize, call: impl FnOnce() -> T) -> Ended<T> {
+fn begin<T>(lane: usize, call: &dyn Fn() -> T) -> Ended<T> {
     QUAD.with_borrow_mut(|quad| {
         quad.lane = Some(lane);
         quad.next = 0;
@@ -205,8 +205,9 @@ fn diverged() -> ! {
     )
 }
 
-/// Runs invocation `i`; none if it is dropped.
-fn one<T>(i: u32, call: &impl Fn(&Fragment) -> T) -> Option<T> {
+/// Runs invocation `i`; none if it is dropped. The kernel's code is behind a pointer: it is compiled once,
+/// not in each of the places from which it is called.
+fn one<T>(i: u32, call: &dyn Fn(&Fragment) -> T) -> Option<T> {
     let (x, y) = (i % COLUMNS, i / COLUMNS);
     let own = (x & 1 | (y & 1) << 1) as usize;
     let at = |lane: usize| {
@@ -220,14 +221,14 @@ fn one<T>(i: u32, call: &impl Fn(&Fragment) -> T) -> Option<T> {
         call(fragment)
     };
     loop {
-        let (value, place) = match begin(own, || call(&at(own))) {
+        let (value, place) = match begin(own, &|| call(&at(own))) {
             Ended::Value(value) => return Some(value),
             Ended::Discarded => return None,
             Ended::Waits(value, place) => (value, place),
         };
         let mut values = [value; 4];
         for lane in (0..4).filter(|lane| *lane != own) {
-            match begin(lane, || call(&at(lane))) {
+            match begin(lane, &|| call(&at(lane))) {
                 Ended::Waits(value, other) if other == place => values[lane] = value,
                 _ => diverged(),
             }
@@ -243,15 +244,21 @@ pub fn map_fragments<S: Slices>(
     mut out: S,
     f: impl Fn(usize, &Fragment) -> S::Values + Sync,
 ) -> Result<(), CallError> {
-    let run = |i: usize| one(i as u32, &|fragment: &Fragment| f(i, fragment));
-    guard(|| {
-        let Some(order) = sanitize::order(out.count()) else {
-            return some_of_range(mode.parallel, 0, out, &run);
-        };
-        for i in order.into_iter().map(|i| i as usize) {
-            if let Some(values) = run(i) {
-                out.set(i, values);
+    let run = |i: usize, out: &mut S, slot: usize| {
+        if let Some(values) = one(i as u32, &|fragment: &Fragment| f(i, fragment)) {
+            out.set(slot, values);
+        }
+    };
+    let Some(order) = sanitize::order(out.count()) else {
+        return map_parts(mode, out, &|start, mut part| {
+            for i in 0..part.count() {
+                run(start + i, &mut part, i);
             }
+        });
+    };
+    guard(&mut || {
+        for i in order.iter().map(|i| *i as usize) {
+            run(i, &mut out, i);
         }
     })
 }

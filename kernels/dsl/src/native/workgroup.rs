@@ -127,6 +127,8 @@ pub fn for_each_group(
     subgroups: bool,
     f: impl Fn(Workgroup) + Sync,
 ) -> Result<(), CallError> {
+    // Compiled once, not in each of the loops.
+    let f: &(dyn Fn(Workgroup) + Sync) = &f;
     let [extent, threads] = [extent, threads].map(UVec3::from_array);
     let subgroup_size = if subgroups {
         subgroup::size(mode)?
@@ -150,16 +152,16 @@ pub fn for_each_group(
             subgroup_size,
         });
     };
-    guard(|| {
+    guard(&mut || {
         if let Some(order) = sanitize::order(all) {
             for number in order {
                 sanitize::begin_group(number);
                 one(number as usize);
             }
         } else if mode.parallel {
-            (0..all).into_par_iter().for_each(one);
+            (0..all).into_par_iter().for_each(&one);
         } else {
-            (0..all).for_each(one);
+            (0..all).for_each(&one);
         }
     })
 }

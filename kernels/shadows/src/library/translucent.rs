@@ -1,7 +1,9 @@
 //! Translucent casters.
 
-use hankel_dsl::function;
-use hankel_dsl::glam::{Vec3, Vec4};
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::{Real, function};
+
+use crate::translucent::kept_depths;
 
 /// What a map of moments stores of translucent surfaces before others (\[BHS\], lecture, "Translucent
 /// occluders"): `front` holds moments, or channels in an optimised basis, that have been blended by opacity into
@@ -26,4 +28,14 @@ pub fn blend_translucent_six(front: Vec3, opacity: f32, behind: Vec3) -> Vec3 {
         front.y + passes * behind.y,
         front.z + passes * behind.z,
     )
+}
+
+/// Four depths of a translucent fragment with depth `z` from 0 to 1, for blending that keeps the least: each is `z`
+/// with the probability `opacity`, and else 1 (E. Enderton et al., *Stochastic Transparency*, 2010). A hash of the
+/// texel and of the depth decides, so that a picture does not flicker (C. Wyman, M. McGuire, *Hashed Alpha Testing*,
+/// 2017).
+#[function]
+#[inline(always)]
+pub fn stochastic_depths(texel: UVec2, z: f32, opacity: f32) -> Vec4 {
+    kept_depths(texel, Real::saturate(z), opacity)
 }
