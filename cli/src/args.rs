@@ -116,14 +116,44 @@ pub struct Generate {
     pub placement: Placed,
     /// Bounds checks in HLSL, MSL and GLSL beyond the one guard of each invocation
     /// [unchecked, restrict, readzwrite].
-    #[arg(long, value_name = "POLICY", default_value = "unchecked")]
+    #[arg(long, value_name = "POLICY", default_value = BOUNDS_CHECKS)]
     pub bounds_checks: String,
     /// HLSL's shader model [5.1, 6.0 to 6.9].
-    #[arg(long, value_name = "VERSION", default_value = "6.0")]
+    #[arg(long, value_name = "VERSION", default_value = SHADER_MODEL)]
     pub shader_model: String,
     /// Metal's language version [1.0 to 4.0].
-    #[arg(long, value_name = "VERSION", default_value = "2.4")]
+    #[arg(long, value_name = "VERSION", default_value = MSL_VERSION)]
     pub msl_version: String,
+}
+
+const BOUNDS_CHECKS: &str = "unchecked";
+const SHADER_MODEL: &str = "6.0";
+const MSL_VERSION: &str = "2.4";
+
+impl Generate {
+    /// The first option that is not as it is by default: of what is chosen and how it is written, not of where
+    /// its source is.
+    pub fn first_option(&self) -> Option<&'static str> {
+        let placed = &self.placement;
+        [
+            ("--target", !self.targets.is_empty()),
+            ("--kernel", !self.kernels.is_empty()),
+            ("--set", !self.set.is_empty()),
+            ("--variant", !self.variants.is_empty()),
+            ("--open-constants", self.open_constants),
+            ("--hlsl-space", placed.hlsl_space != 0),
+            ("--register-base", placed.register_base != 0),
+            ("--wgsl-group", placed.wgsl_group != 0),
+            ("--msl-slot-base", placed.msl_slot_base != 0),
+            ("--glsl-binding-base", placed.glsl_binding_base != 0),
+            ("--bindings", placed.bindings.is_some()),
+            ("--bounds-checks", self.bounds_checks != BOUNDS_CHECKS),
+            ("--shader-model", self.shader_model != SHADER_MODEL),
+            ("--msl-version", self.msl_version != MSL_VERSION),
+        ]
+        .into_iter()
+        .find_map(|(option, given)| given.then_some(option))
+    }
 }
 
 /// Where bindings are in the texts.
@@ -494,6 +524,9 @@ pub struct Eval {
     /// A uniform's field or a specialisation constant; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
+    /// Run the kernel as it is, where another one computes the same in about twice the digits.
+    #[arg(long)]
+    pub fast: bool,
     /// Seconds that a kernel of another crate may run natively for 65536 rows.
     #[arg(long, value_name = "SECONDS", default_value_t = 120,
           value_parser = clap::value_parser!(u64).range(1..=3600))]

@@ -140,7 +140,7 @@ impl From<CrateError> for Failure {
     fn from(error: CrateError) -> Self {
         let blame = match &error {
             CrateError::Build { .. } => Blame::Kernel,
-            CrateError::NoCargo { .. } => Blame::Machine,
+            CrateError::NoCargo { .. } | CrateError::Record(_) => Blame::Machine,
             _ => Blame::Input,
         };
         Self::new(blame, &error, None)

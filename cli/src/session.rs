@@ -16,8 +16,10 @@ use std::time::Duration;
 use hankel_codegen::build::{Modules, Request};
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
+use hankel_codegen::diff;
 use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::inputs::{Inputs, normal};
+use hankel_codegen::manifest::WriteOptions;
 use hankel_codegen::placement::Placement;
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
@@ -218,6 +220,20 @@ impl Session {
             placement: placement(&args.placement)?,
         };
         Ok(self.request_for(args.kernels.clone(), targets, options))
+    }
+
+    /// A request for what `folder` should hold. Without options in `args`, those hold that it was built with.
+    pub fn request_again(&self, args: &Generate, folder: &Path) -> Result<Request> {
+        match diff::shaders(folder) {
+            Ok(manifest) if args.first_option().is_none() => {
+                let WriteOptions {
+                    kernels, targets, ..
+                } = manifest.options.clone();
+                Ok(self.request_for(kernels, targets, manifest.options.options()?))
+            }
+            // A manifest that cannot be read is a file that differs.
+            _ => self.request(args),
+        }
     }
 
     /// A request for some kernels (none: all) in some languages (none: all).

@@ -381,6 +381,18 @@ fn check_finds_what_does_not_follow() {
     let desk = Desk::new();
     desk.hankel("build --out s --kernel vsm").code(0);
     desk.hankel("check s --kernel vsm").code(0);
+    // What the folder was built with holds where nothing else is said.
+    desk.hankel("check s").code(0);
+    let out = desk.hankel("check s --kernel vs*m").code(1).out();
+    assert!(out.contains("manifest.json"), "{out}");
+    let every_option = "--kernel shade_hamburger --target hlsl --target wgsl --variant _unit:encoding=1 \
+        --hlsl-space 2 --wgsl-group 1 --shader-model 6.2 --msl-version 3.0 --bounds-checks \
+        restrict --open-constants";
+    desk.hankel(&format!("build --out every {every_option}"))
+        .code(0);
+    desk.hankel("check every").code(0);
+    desk.hankel(&format!("check every {every_option}")).code(0);
+    desk.hankel("check every --target hlsl").code(1);
     let file = desk.path("s/wgsl/vsm.wgsl");
     let text = fs::read_to_string(&file).expect("it was built");
     fs::write(&file, text.replacen("1f", "2f", 1)).expect("the desk can be written");
@@ -459,6 +471,31 @@ fn eval_runs_rows_alike_on_both_backends() {
     assert_eq!(
         fs::read(desk.path("f64.csv")).ok(),
         fs::read(desk.path("f64v.csv")).ok()
+    );
+}
+
+/// Where it costs a command nothing, rows get the compensated form.
+#[test]
+fn eval_computes_in_twice_the_digits_unless_it_is_to_be_fast() {
+    let desk = Desk::new();
+    // Two thin surfaces: plain elimination loses most of the digits.
+    let header = "m0,m1,m2,m3,m4,m5,m6,eta";
+    let row = "1,0.5500125,0.32506253,0.20256564,0.13189186,0.08925484,0.06247703,0.4";
+    desk.write("rows.csv", &format!("{header}\n{row}\n"));
+    let result = |kernel: &str| {
+        let line = format!("eval {kernel} --input rows.csv --output out.csv");
+        let said = desk.hankel(&line).code(0).out();
+        let rows = fs::read_to_string(desk.path("out.csv")).expect("it was written");
+        (said, rows)
+    };
+    let (said, rows) = result("moment_bound_n3");
+    assert!(said.contains("moment_bound_compensated_n3"), "{said}");
+    assert_eq!(rows, result("moment_bound_compensated_n3").1);
+    assert_ne!(rows, result("moment_bound_n3 --fast").1);
+    let of_f64 = result("moment_bound_n3 --precision f64").0;
+    assert!(
+        of_f64.contains("moment_bound_compensated_n3_f64"),
+        "{of_f64}"
     );
 }
 

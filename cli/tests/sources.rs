@@ -50,6 +50,13 @@ impl Desk {
         fs::write(path, text).expect("the desk can be written");
     }
 
+    fn write_with_an_old_date(&self, name: &str, text: &str) {
+        self.write(name, text);
+        let file = fs::File::options().write(true).open(self.path(name));
+        let dated = file.and_then(|file| file.set_modified(SystemTime::UNIX_EPOCH));
+        dated.expect("a date can be set");
+    }
+
     /// `hankel` with these words, in the crate's folder, with an environment variable.
     fn hankel_with(&self, line: &str, offset: &str) -> Run {
         let output = Command::new(env!("CARGO_BIN_EXE_hankel"))
@@ -246,11 +253,30 @@ fn main() {
         ("outside.rs", factor(42)),
         ("patched/src/lib.rs", format!("#![no_std]\n{}", factor(41))),
     ] {
-        desk.write(path, &text);
-        let file = fs::File::options().write(true).open(desk.path(path));
-        let dated = file.and_then(|file| file.set_modified(SystemTime::UNIX_EPOCH));
-        dated.expect("a date can be set");
+        desk.write_with_an_old_date(path, &text);
         built(&mut before, path, "2");
+    }
+}
+
+/// What runs natively, and what a kernel is said to be, are of the present source, too.
+#[test]
+fn native_code_follows_a_source_with_an_old_date() {
+    let desk = new_crate();
+    desk.write("my-kernels/rows.csv", "x\n1\n");
+    let line = "eval smooth_step --manifest-path Cargo.toml --input rows.csv --output out.csv";
+    let list = "list --manifest-path Cargo.toml";
+    let path = desk.path("my-kernels/src/lib.rs");
+    let text = fs::read_to_string(&path).expect("it was made");
+    let edited = text
+        .replace("lit!(3.0)", "lit!(3.5)")
+        .replace("The smooth step", "A step");
+    for (text, result, summary) in [(text, "1", "The smooth step"), (edited, "1.5", "A step")] {
+        desk.write_with_an_old_date("my-kernels/src/lib.rs", &text);
+        let out = desk.hankel(list).code(0).out();
+        assert!(out.contains(summary), "{out}");
+        desk.hankel(line).code(0);
+        let rows = fs::read_to_string(desk.path("my-kernels/out.csv")).expect("it was written");
+        assert_eq!(rows.lines().nth(1), Some(result), "{rows}");
     }
 }
 

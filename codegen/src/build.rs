@@ -209,13 +209,12 @@ impl Request {
             .iter()
             .map(|(path, bytes)| (path.as_str(), sha256(bytes)))
             .collect();
-        let options = WriteOptions::of(&self.options);
+        let options = WriteOptions::of(self);
         let versions = Versions::with(&self.rust_gpu);
         let inputs = (
             manifest::FORMAT,
             &self.crate_name,
             chosen,
-            self.targets(),
             options,
             versions,
             env!("HANKEL_CODEGEN_SHA256"),
@@ -341,7 +340,7 @@ pub(crate) fn assemble(
         made_by: Versions::with(&request.rust_gpu),
         crate_name: request.crate_name.clone(),
         inputs_sha256,
-        options: WriteOptions::of(&request.options),
+        options: WriteOptions::of(request),
         kernels,
         layouts: manifest::layouts(&layouts),
         files: files

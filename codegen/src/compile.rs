@@ -6,11 +6,13 @@
 //! prints, and reports a failure without what the compiler said.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
+use hankel_system::overlooked::LastBuild;
 use hankel_system::process::Program;
 use rspirv::spirv::Capability;
 use rustc_codegen_spirv_types::{CompileResult, ModuleResult, SpirvTarget, TargetSpecVersion};
@@ -21,7 +23,6 @@ use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
-use crate::overlooked::LastBuild;
 use crate::spirv::trim;
 
 /// What the modules are compiled for.
@@ -212,8 +213,10 @@ pub fn compile(
     let version = compiler.version()?;
     let sysroot = compiler.ask("rustc", &["--print", "sysroot"])?;
     let own = [target_dir.clone(), sysroot.into(), compiler.backend.clone()];
-    let last = LastBuild::of(&manifest, &target_dir);
-    last.forget_if_overlooked(folder)?;
+    let flags = wanted.flags();
+    let build = std::iter::once(manifest.as_os_str()).chain(flags.iter().map(OsStr::new));
+    let last = LastBuild::of(&target_dir, build);
+    last.forget_if_overlooked()?;
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -244,7 +247,8 @@ pub fn compile(
         // changes while cargo runs again, this is what it read.
         let settled = inputs.newest(folder).is_none_or(|newest| newest < start);
         if settled || before.as_ref() == Some(&inputs) {
-            last.record(&inputs, start)?;
+            let read = inputs.files.keys().chain(inputs.folders.keys());
+            last.record(read.map(|name| folder.join(name)), start)?;
             return Ok(Compiled {
                 modules,
                 inputs,

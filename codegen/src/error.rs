@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use hankel_system::overlooked::RecordError;
+
 use crate::diagnostics::Diagnostic;
 
 /// Result with this crate's [`Error`].
@@ -472,6 +474,16 @@ fn list(names: &[String]) -> String {
 /// Adds what was being done, and to which file, to an I/O error.
 pub(crate) trait During<T> {
     fn during(self, action: &'static str, path: &Path) -> Result<T>;
+}
+
+impl From<RecordError> for Error {
+    fn from(error: RecordError) -> Self {
+        Self::Io {
+            action: error.action,
+            path: error.path,
+            source: error.source,
+        }
+    }
 }
 
 impl<T> During<T> for io::Result<T> {

@@ -34,7 +34,6 @@ pub mod inputs;
 mod language;
 pub mod lint;
 pub mod manifest;
-mod overlooked;
 pub mod placement;
 mod registers;
 pub mod scaffold;

@@ -3,13 +3,15 @@
 //! JSON; the schema is `codegen/manifest.schema.json`, derived from the types below. Everything is
 //! sorted, nothing names the machine or the time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use hankel_dsl::native::describe::{self, Kernel, Output, Role, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::build::Request;
 use crate::cost::Cost;
+use crate::error;
 use crate::headers::Layouts;
 use crate::lint::Finding;
 use crate::placement::Placement;
@@ -70,6 +72,12 @@ impl Versions {
 /// Options that the files were made with.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct WriteOptions {
+    /// The choice of kernels: names of entry points or functions, `*` for any letters; none: all.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub kernels: Vec<String>,
+    /// The choice of languages; none: all.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub targets: Vec<Language>,
     /// Bounds checks in HLSL, MSL and GLSL.
     pub bounds_checks: translate::BoundsChecks,
     /// HLSL's shader model.
@@ -91,9 +99,16 @@ pub struct WriteOptions {
 }
 
 impl WriteOptions {
-    /// As the manifest shows them.
-    pub fn of(options: &Options) -> Self {
+    /// Those of a request.
+    pub fn of(request: &Request) -> Self {
+        let options = &request.options;
+        let sorted: (BTreeSet<_>, BTreeSet<_>) = (
+            request.filter.iter().cloned().collect(),
+            request.targets.iter().copied().collect(),
+        );
         Self {
+            kernels: sorted.0.into_iter().collect(),
+            targets: sorted.1.into_iter().collect(),
             bounds_checks: options.bounds_checks,
             shader_model: options.shader_model.to_string(),
             msl_version: options.msl_version.to_string(),
@@ -102,6 +117,23 @@ impl WriteOptions {
             variants: options.variants.clone(),
             placement: options.placement.without_origin(),
         }
+    }
+
+    /// How the texts are to be written.
+    ///
+    /// # Errors
+    ///
+    /// A version is none that can be written.
+    pub fn options(&self) -> error::Result<Options> {
+        Ok(Options {
+            bounds_checks: self.bounds_checks,
+            shader_model: self.shader_model.parse()?,
+            msl_version: self.msl_version.parse()?,
+            constants: self.constants.clone(),
+            open_constants: self.open_constants,
+            variants: self.variants.clone(),
+            placement: self.placement.clone(),
+        })
     }
 }
 

@@ -1,22 +1,28 @@
 //! Kernel crates: the built-in ones, and anybody's, which is built as a plug-in: with the native
 //! code of those entry points that will run, or without any, to learn what its kernels are.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use hankel_dsl::native::describe::Kernel;
 use hankel_dsl::native::inputs::{Given, Request};
 use hankel_dsl::native::plugin;
 use hankel_dsl::native::{Call, CallError, Entry};
+use hankel_system::input;
+use hankel_system::overlooked::{LastBuild, RecordError};
 use hankel_system::process::Program as Running;
 use serde::Deserialize;
 
 use crate::device::{Program, Shader};
 use crate::worker::{Worker, Workers};
+
+/// Size of the largest list of sources, in bytes.
+const MOST_BYTES_OF_RULES: u64 = 64 << 20;
 
 /// A kernel crate with its native code.
 #[derive(Clone, Debug)]
@@ -193,6 +199,9 @@ pub enum CrateError {
         /// The compiler's words.
         diagnostics: String,
     },
+    /// What cargo has read cannot be recorded.
+    #[error("{0}")]
+    Record(#[from] RecordError),
     /// What was built has no kernels, or cannot be asked for them.
     #[error("`{package}`: {problem}")]
     Plugin {
@@ -455,6 +464,13 @@ impl Package {
         progress: &mut dyn FnMut(&str),
     ) -> Result<PathBuf, CrateError> {
         let target_dir = self.target_dir.join("hankel").join("native");
+        let flags = native.flags();
+        let build = std::iter::once(self.manifest.as_os_str())
+            .chain(native.profile().iter().map(OsStr::new))
+            .chain(flags.iter().map(OsString::as_os_str));
+        let last = LastBuild::of(&target_dir, build);
+        last.forget_if_overlooked()?;
+        let began = SystemTime::now();
         let mut command = cargo();
         command
             .args(["rustc", "--lib", "--crate-type", "cdylib"])
@@ -464,7 +480,7 @@ impl Package {
             .arg("--target-dir")
             .arg(&target_dir)
             .arg("--")
-            .args(native.flags())
+            .args(flags)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         let mut cargo = Running::start(&mut command).map_err(|e| no_cargo(&e))?;
@@ -514,7 +530,11 @@ impl Package {
             }
         }
         match library {
-            Some(library) if status.success() => Ok(library),
+            Some(library) if status.success() => {
+                let sources = read_for(&library).into_iter();
+                last.record(sources.filter(|path| !path.starts_with(&target_dir)), began)?;
+                Ok(library)
+            }
             _ => Err(CrateError::Build {
                 package: self.name.clone(),
                 diagnostics: if diagnostics.is_empty() {
@@ -527,9 +547,42 @@ impl Package {
     }
 }
 
+/// What cargo read to build `library`, apart from packages of registries: the rule that it writes beside it for
+/// `make`. A space in a path follows a backslash.
+fn read_for(library: &Path) -> Vec<PathBuf> {
+    let Ok(rules) = input::read_text(&library.with_extension("d"), MOST_BYTES_OF_RULES) else {
+        return Vec::new();
+    };
+    let mut paths = Vec::new();
+    for (_, sources) in rules.lines().filter_map(|rule| rule.split_once(": ")) {
+        let mut path = String::new();
+        for word in sources.split(' ') {
+            path.push_str(word);
+            if path.ends_with('\\') {
+                path.pop();
+                path.push(' ');
+            } else {
+                paths.push(PathBuf::from(std::mem::take(&mut path)));
+            }
+        }
+    }
+    paths
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_cargo_has_read_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let library = folder.path().join("libmine.so");
+        let rule = format!("{}: /a/src/lib.rs /b\\ c/deep.rs /d\n", library.display());
+        std::fs::write(folder.path().join("libmine.d"), rule).unwrap();
+        let paths = ["/a/src/lib.rs", "/b c/deep.rs", "/d"].map(PathBuf::from);
+        assert_eq!(read_for(&library), paths);
+        assert!(read_for(&folder.path().join("libother.so")).is_empty());
+    }
 
     #[test]
     fn what_an_outer_cargo_sets_is_known() {

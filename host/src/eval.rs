@@ -45,6 +45,16 @@ pub enum EvalError {
         /// What there is.
         known: String,
     },
+    /// The kernel that is named as its compensated form does not stand for it.
+    #[error("`{kernel}` has `compensated = {compensated}`: {problem}")]
+    Compensated {
+        /// The plain kernel.
+        kernel: String,
+        /// The other one's function.
+        compensated: String,
+        /// Why not.
+        problem: String,
+    },
     /// A setting that the kernel does not have, or that was given twice.
     #[error("--set {given}: {problem}")]
     Setting {
@@ -195,6 +205,34 @@ pub fn select<'a>(
                 known: known.join(", "),
             }
         })
+}
+
+/// The kernel that computes the same as `entry` in about twice the digits; `entry` where it names none.
+///
+/// # Errors
+/// [`EvalError::Compensated`].
+pub fn compensated<'a>(
+    kernels: &'a KernelCrate,
+    entry: &'a KernelEntry,
+) -> Result<&'a KernelEntry, EvalError> {
+    let plain = &entry.kernel;
+    let Some(function) = &plain.compensated else {
+        return Ok(entry);
+    };
+    let fail = |problem: &str| EvalError::Compensated {
+        kernel: plain.name.clone(),
+        compensated: function.clone(),
+        problem: problem.into(),
+    };
+    let found = kernels
+        .entries
+        .iter()
+        .find(|it| it.kernel.function == *function && it.kernel.precision == plain.precision);
+    let found = found.ok_or_else(|| fail("it is not in `kernels!`, or not in this precision"))?;
+    if found.kernel.params != plain.params || found.kernel.outputs != plain.outputs {
+        return Err(fail("it has other parameters or results"));
+    }
+    Ok(found)
 }
 
 /// A plain value's name stands for the whole; a field's stands alone where no other has it.

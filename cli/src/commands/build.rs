@@ -36,7 +36,7 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
         None => {}
     }
     if args.form == Form::Functions
-        && let Some(option) = of_shaders_alone(args)
+        && let Some(option) = args.generate.first_option()
     {
         return Err(Failure::input(
             format!("{option}: it is for shaders, and --form functions writes libraries"),
@@ -48,27 +48,6 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     }
     once(args, quiet)?;
     Ok(Outcome::Fine)
-}
-
-/// An option that was given and says nothing of libraries of functions.
-fn of_shaders_alone(args: &Build) -> Option<&'static str> {
-    let it = &args.generate;
-    let placed = &it.placement;
-    [
-        ("--target", !it.targets.is_empty()),
-        ("--kernel", !it.kernels.is_empty()),
-        ("--set", !it.set.is_empty()),
-        ("--variant", !it.variants.is_empty()),
-        ("--open-constants", it.open_constants),
-        ("--hlsl-space", placed.hlsl_space != 0),
-        ("--register-base", placed.register_base != 0),
-        ("--wgsl-group", placed.wgsl_group != 0),
-        ("--msl-slot-base", placed.msl_slot_base != 0),
-        ("--glsl-binding-base", placed.glsl_binding_base != 0),
-        ("--bindings", placed.bindings.is_some()),
-    ]
-    .into_iter()
-    .find_map(|(option, given)| given.then_some(option))
 }
 
 /// Builds after each edit, until the program is stopped.

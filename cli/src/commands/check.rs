@@ -55,7 +55,7 @@ fn expected(args: &Check, quiet: bool) -> Result<Generated> {
         super::frame::refuse_without_scene(args)?;
     }
     let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
-    let request = session.request(&args.generate)?;
+    let request = session.request_again(&args.generate, &args.folder)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
     Ok(generate(&request, &session.modules(&request)?)?)

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hankel_codegen::build::{Generated, MANIFEST_FILE, check_output, write};
+use hankel_codegen::build::{Generated, MANIFEST_FILE, Request, check_output, write};
 use hankel_codegen::frame::{self, Draft, FRAME_FILE, Frame};
 use hankel_frames::scene::Scene;
 use hankel_frames::{FrameError, export, recorded, recorded_medium};
@@ -47,7 +47,9 @@ pub fn build(args: &Build, file: &Path, quiet: bool) -> Result<Outcome> {
         return Ok(Outcome::CheckFailed);
     };
     let draft = draft(&scene, file)?;
-    let generated = generate(&args.generate, &draft, quiet)?;
+    let session = Session::linked(quiet);
+    let request = session.request(&args.generate)?;
+    let generated = generate(&session, &request, &draft)?;
     let report = write(&generated, &args.out, args.force)?;
     if args.depfile.is_some() {
         depend(args, MANIFEST_FILE, &inputs(args, file, &scene)?)?;
@@ -104,7 +106,9 @@ pub fn expected(args: &Check, file: &Path, quiet: bool) -> Result<Generated> {
         }
         Some(name) => scene.shadow = with_technique(scene.shadow, name)?,
     }
-    generate(&args.generate, &draft(&scene, file)?, quiet)
+    let session = Session::linked(quiet);
+    let request = session.request_again(&args.generate, &args.folder)?;
+    generate(&session, &request, &draft(&scene, file)?)
 }
 
 /// Refuses what a folder with a frame cannot be compared with: a build of kernels.
@@ -157,14 +161,8 @@ fn draft(scene: &Scene, file: &Path) -> Result<Draft> {
     Ok(export(scene, &name, &mesh).map_err(FrameError::from)?)
 }
 
-fn generate(args: &Generate, draft: &Draft, quiet: bool) -> Result<Generated> {
-    let session = Session::linked(quiet);
-    let request = session.request(args)?;
-    Ok(frame::generate(
-        &request,
-        draft,
-        &session.modules(&request)?,
-    )?)
+fn generate(session: &Session, request: &Request, draft: &Draft) -> Result<Generated> {
+    Ok(frame::generate(request, draft, &session.modules(request)?)?)
 }
 
 /// The files that a frame follows from beside this program, as absolute paths.

@@ -86,6 +86,9 @@ fn bindings(kernel: &Kernel) {
         }
         Rounding::Exact => say!("    exact: no contraction or reordering in any language"),
     }
+    if let Some(name) = &kernel.compensated {
+        say!("    compensated: {name}, which `hankel eval` runs without --fast");
+    }
     for p in &kernel.params {
         let what = match &p.role {
             Role::Uniform {

@@ -214,6 +214,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         },
         rounding: Rounding::Free,
         subgroups: Subgroups::Unused,
+        compensated: None,
     }
 }
 

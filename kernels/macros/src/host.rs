@@ -39,6 +39,11 @@ impl Kernel {
                 });
             }
         });
+        let compensated = self.compensated.as_ref().map(|name| {
+            quote_spanned! {name.span()=>
+                const _: fn() -> native::Entries = #name::entries;
+            }
+        });
         let uniforms = self.uniform_checks();
         let buffers = self.buffer_checks();
         let twin = (self.form() == Form::Cooperative).then(|| {
@@ -67,6 +72,7 @@ impl Kernel {
                 #[must_use]
                 pub fn entries() -> ::hankel_dsl::native::Entries {
                     use ::hankel_dsl::native::{self, describe, exec, fragment, layout, workgroup};
+                    #compensated
                     #uniforms
                     #buffers
                     #twin
@@ -184,6 +190,13 @@ impl Kernel {
         let rounding = format_ident!("{}", self.rounding.variant());
         let subgroups = self.uses_subgroups();
         let sized = self.sized_by_subgroups;
+        let compensated = match &self.compensated {
+            Some(name) => {
+                let name = name.to_string();
+                quote!(Some(#name.into()))
+            }
+            None => quote!(None),
+        };
         quote! {
             describe::Kernel {
                 name: #entry.into(),
@@ -203,6 +216,7 @@ impl Kernel {
                 },
                 rounding: describe::Rounding::#rounding,
                 subgroups: describe::Subgroups::of(#subgroups, #sized),
+                compensated: #compensated,
             }
         }
     }

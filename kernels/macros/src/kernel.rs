@@ -36,6 +36,8 @@ pub struct Kernel {
     pub rounding: Rounding,
     /// The function that makes inputs, as it is named from inside the kernel's module.
     pub inputs: Option<TokenStream>,
+    /// The kernel that computes the same in about twice the digits.
+    pub compensated: Option<Ident>,
     /// Cooperative functions that it calls.
     pub helpers: Vec<Ident>,
     /// Its result depends on the size of subgroups.
@@ -451,6 +453,7 @@ impl Kernel {
         };
         let variants = args.variants(&name, real.as_ref())?;
         let output_formats = args.output_formats(&outputs)?;
+        let compensated = args.compensated.clone();
         let rounding = args.rounding.unwrap_or(Rounding::Free);
         let inputs = args.inputs.as_ref().map(from_inside);
         let helpers = args.cooperative.clone();
@@ -479,6 +482,7 @@ impl Kernel {
             tolerance,
             rounding,
             inputs,
+            compensated,
             helpers,
             sized_by_subgroups: depends.is_some(),
         };
@@ -1033,6 +1037,7 @@ struct Args {
     tolerance: Option<Tolerance>,
     rounding: Option<Rounding>,
     inputs: Option<syn::Path>,
+    compensated: Option<Ident>,
 }
 
 impl Parse for Args {
@@ -1116,11 +1121,15 @@ impl Parse for Args {
                     input.parse::<Token![=]>()?;
                     args.inputs = Some(input.parse()?);
                 }
+                "compensated" => {
+                    input.parse::<Token![=]>()?;
+                    args.compensated = Some(input.parse()?);
+                }
                 "parity" => args.tolerance = Some(parity(input, word.span())?),
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, inputs or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, compensated, inputs or parity",
                     ));
                 }
             }

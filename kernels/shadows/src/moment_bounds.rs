@@ -71,7 +71,7 @@ macro_rules! order {
             }
         }
 
-        /// Moments, a query point, and what the bound is worth.
+        /// Moments, a query point, and the upstream gradient.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
         #[repr(C)]
         pub struct $AdjointRow<R> {
@@ -81,7 +81,7 @@ macro_rules! order {
             )*
             /// The query point.
             pub eta: R,
-            /// The derivative of a result to the bound.
+            /// The upstream gradient: the derivative of a result by the bound.
             pub d_bound: R,
         }
 
@@ -94,7 +94,7 @@ macro_rules! order {
             }
         }
 
-        /// A result's derivatives.
+        /// The gradient of a result.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
         #[repr(C)]
         pub struct $Derivative<R> {
@@ -125,6 +125,7 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
+            compensated = $compensated,
             inputs = crate::inputs::$rows
         )]
         pub fn $bound<R: Real>(
@@ -165,10 +166,11 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
+            $(compensated = $both,)?
             inputs = crate::inputs::$adjoint_rows,
             parity(
                 absolute = 1e-12,
-                why = "factors of derivatives that are as good as 0 may underflow"
+                why = "factors of derivatives close to 0 may underflow"
             )
         )]
         pub fn $adjoint<R: Real>(
@@ -195,7 +197,7 @@ macro_rules! order {
                 inputs = crate::inputs::$adjoint_rows,
                 parity(
                     absolute = 1e-12,
-                    why = "factors of derivatives that are as good as 0 may underflow"
+                    why = "factors of derivatives close to 0 may underflow"
                 )
             )]
             pub fn $both<R: Real>(

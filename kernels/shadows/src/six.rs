@@ -71,6 +71,7 @@ fn shadow<R: Real>(
     compute,
     threads(64),
     precision(f32, f64),
+    compensated = hamburger_6msm_compensated,
     inputs = crate::inputs::receivers_6
 )]
 pub fn hamburger_6msm<R: Real>(

@@ -216,6 +216,7 @@ fn entry(function: &Function) -> KernelEntry {
         },
         rounding: Rounding::Pinned,
         subgroups: Subgroups::Unused,
+        compensated: None,
     };
     let (run, words, described) = (function.run, arguments(function).len(), function.clone());
     KernelEntry::new(kernel, move |call| {

@@ -341,6 +341,7 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         },
         rounding: describe::Rounding::Free,
         subgroups: describe::Subgroups::Unused,
+        compensated: None,
     }
 }
 

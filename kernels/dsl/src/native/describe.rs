@@ -41,6 +41,9 @@ pub struct Kernel {
     /// What it does with subgroups.
     #[serde(default, skip_serializing_if = "Subgroups::is_unused")]
     pub subgroups: Subgroups,
+    /// The function of the kernel that computes the same, from the same parameters, in about twice the digits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compensated: Option<String>,
 }
 
 /// What a kernel does with subgroups.
