@@ -28,6 +28,7 @@ macro_rules! for_all_orders {
         $function::<3>();
         $function::<4>();
         $function::<5>();
+        $function::<6>();
     };
 }
 
