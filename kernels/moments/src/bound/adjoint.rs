@@ -50,7 +50,7 @@ pub fn bound_adjoint<R: Real, const N: usize>(
 /// For N up to 3, no derivative has an error of more than four times what rounding each argument and the result
 /// once does to it. That is measured, not proved, in `f32` and `f64`, for rows of the families that
 /// [`bound_compensated`](super::bound_compensated) is measured on; a derivative that is less than the number
-/// type's epsilon times the greatest of its row counts as that. For N = 4 and 5 it is not promised.
+/// type's epsilon times the greatest of its row counts as that. For N from 4 on it is not promised.
 #[inline(always)]
 pub fn bound_adjoint_compensated<R: Real, const N: usize>(
     m: [R; MAX_MOMENTS],

@@ -76,7 +76,12 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
             as_is.reciprocals[i],
         );
     });
-    corrected::<R, N>(&m, eta, recurrence.total, found)
+    let once = corrected::<R, N>(&m, eta, recurrence.total, found);
+    if const { N < 6 } {
+        once
+    } else {
+        corrected::<R, N>(&m, eta, recurrence.total, once)
+    }
 }
 
 /// One step of Newton's method for the 2N + 1 equations that the moments are in terms of weights
@@ -84,7 +89,7 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
 ///
 /// Its matrix is a confluent Vandermonde matrix, and its inverse is made of Hermite's basis
 /// polynomials, by which each unknown has a formula of its own. What is left of the moments is as
-/// inexact as their last digits, so that one step is enough. Where it would go far, moments are
+/// inexact as their last digits, so that one step is enough; roots for twelve moments are so inexact that it takes two. Where it would go far, moments are
 /// degenerate and digits have nothing to say: there all stays as it is.
 #[inline(always)]
 fn corrected<R: Real, const N: usize>(
