@@ -82,7 +82,7 @@ fn json_goes_to_the_output_stream() {
 #[test]
 fn misuse_is_explained() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    fails(folder.path(), "bench bounds --n 6", 2, &["6", "1..=5"]);
+    fails(folder.path(), "bench bounds --n 7", 2, &["7", "1..=6"]);
     fails(
         folder.path(),
         "bench bounds --samples 3",

@@ -1,6 +1,7 @@
 //! Which rows are valid, and where their queries are singular.
 
 use hankel_dsl::lit;
+use hankel_moments::MAX_MOMENTS;
 use hankel_numerics::accuracy::orthogonal_roots;
 use hankel_numerics::families::{Row, Validity, last_place, scaled, validity};
 use hankel_numerics::numbers::DoubleDouble;
@@ -62,7 +63,7 @@ fn scaling_takes_the_smallest_numbers() {
 #[test]
 fn roots_are_those_of_legendre_polynomials() {
     // Moments of the uniform distribution on [-1, 1].
-    let mut m = [lit!(0.0); 11];
+    let mut m = [lit!(0.0); MAX_MOMENTS];
     for (j, m) in m.iter_mut().enumerate().step_by(2) {
         let one: DoubleDouble = lit!(1.0);
         *m = one / DoubleDouble::from((j + 1) as f64);

@@ -77,7 +77,7 @@ proptest! {
     fn bounds_enclose_the_distribution(
         d in distribution(8),
         z in 0.0..=1.0_f64,
-        n in 1..=5_usize,
+        n in 1..=6_usize,
         is_line in any::<bool>(),
     ) {
         let range = if is_line { Range::Line } else { Range::UNIT };

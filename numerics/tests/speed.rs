@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use hankel_dsl::{Real, lit};
-use hankel_numerics::families::{Family, Precision, Row};
+use hankel_numerics::families::{Family, ORDERS, Precision, Row};
 use hankel_numerics::peer::{Peer, PeerError, Quantity, default_python};
 use hankel_numerics::report::{Cell, Report};
 use hankel_numerics::speed::count::{Counted, Operations, operations_of, per_row};
 use hankel_numerics::speed::{
     Options, Quantiles, Solver, Speed, SpeedError, Timing, measure, serve,
 };
+use hankel_numerics::stress::bounds_of;
 
 fn small() -> Options {
     Options {
@@ -251,7 +252,7 @@ fn the_peer_agrees_or_says_what_it_lacks() {
         Err(PeerError::Failed(_))
     ));
     let family = Family::named("paper").unwrap();
-    for n in 1..=5 {
+    for n in ORDERS {
         let rows: Vec<Row<f64>> = (0..64).map(|i| family.row(n, 1, i)).collect();
         peer.load(n, &rows).unwrap();
         assert!(peer.time(Quantity::Gradient, true).unwrap() >= 0.0);
@@ -260,13 +261,7 @@ fn the_peer_agrees_or_says_what_it_lacks() {
         assert_eq!((bounds.len(), gradients.len()), (64, 64));
         for (row, (bound, gradient)) in rows.iter().zip(bounds.iter().zip(&gradients)) {
             assert_eq!(gradient.len(), 2 * n + 2);
-            let own = match n {
-                1 => hankel_moments::bound::<f64, 1>(row.m, row.eta),
-                2 => hankel_moments::bound::<f64, 2>(row.m, row.eta),
-                3 => hankel_moments::bound::<f64, 3>(row.m, row.eta),
-                4 => hankel_moments::bound::<f64, 4>(row.m, row.eta),
-                _ => hankel_moments::bound::<f64, 5>(row.m, row.eta),
-            };
+            let own = bounds_of(n, row.m, row.eta);
             assert!((own.lower - bound).abs() < 1e-6 * row.m[0], "{n} {row:?}");
             // The bound scales with the moments (Euler): its derivatives say so.
             let scaled: f64 = row

@@ -45,7 +45,7 @@ fn maps_over_rows_are_clean() {
         assert!(found.is_empty(), "{name}: {found:?}");
     }
     let names: Vec<&str> = maps.iter().map(|(name, _)| name.as_str()).collect();
-    let bounds = (1..=5).flat_map(|n| {
+    let bounds = (1..=6).flat_map(|n| {
         let kinds = [
             "moment_bound",
             "moment_bound_adjoint",

@@ -87,8 +87,8 @@ Environment:
   HANKEL_PYTHON  the Python that has diffmoments, unless --python says
   HANKEL_SIMD    the instruction set of the lanes; the others are measured all the same")]
 pub struct BenchBounds {
-    /// Only these orders; several with commas between, or repeated [default: 1 to 5].
-    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=5))]
+    /// Only these orders; several with commas between, or repeated [default: 1 to 6].
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub n: Vec<u8>,
     /// Rows of each call [default: 1000000; with --quick 20000].
     #[arg(long, value_name = "NUMBER", value_parser = rows)]
@@ -213,8 +213,8 @@ Environment:
   HANKEL_PYTHON  the Python that has diffmoments, unless --python says
   HANKEL_SIMD    the instruction set of the lanes")]
 pub struct Stress {
-    /// Only these orders; several with commas between, or repeated [default: 1 to 5].
-    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=5))]
+    /// Only these orders; several with commas between, or repeated [default: 1 to 6].
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub n: Vec<u8>,
     /// Only these families of rows; several with commas between, or repeated.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]

@@ -4,7 +4,7 @@
 /// Inside, the index is a constant. There is no `break` and no `continue`.
 ///
 /// The compiler reads the block once for every index that there might be. Where such blocks stand
-/// within each other, say how far the range can go, 6 or 11: `unroll!(i in 0..N, max 6, { … })`.
+/// within each other, say how far the range can go, 7 or 13: `unroll!(i in 0..N, max 7, { … })`.
 ///
 /// A shader that indexes a local array dynamically spills it to memory, and rust-gpu's loops are
 /// ones that shader compilers rarely unroll. With this, arrays of a few numbers become plain
@@ -23,11 +23,11 @@
 /// ```
 #[macro_export]
 macro_rules! unroll {
-    ($i:ident in $from:tt .. $to:expr, max 6, $body:block) => {
-        $crate::unroll!(@each $i, $from, $to, $body, 6, 0 1 2 3 4 5)
+    ($i:ident in $from:tt .. $to:expr, max 7, $body:block) => {
+        $crate::unroll!(@each $i, $from, $to, $body, 7, 0 1 2 3 4 5 6)
     };
-    ($i:ident in $from:tt .. $to:expr, max 11, $body:block) => {
-        $crate::unroll!(@each $i, $from, $to, $body, 11, 0 1 2 3 4 5 6 7 8 9 10)
+    ($i:ident in $from:tt .. $to:expr, max 13, $body:block) => {
+        $crate::unroll!(@each $i, $from, $to, $body, 13, 0 1 2 3 4 5 6 7 8 9 10 11 12)
     };
     ($i:ident in $from:tt .. $to:expr, $body:block) => {
         $crate::unroll!(@each $i, $from, $to, $body, 16, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)

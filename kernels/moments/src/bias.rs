@@ -21,7 +21,7 @@
 //! assert!(biased[2] - biased[1] * biased[1] > 0.0);
 //! ```
 
-use crate::{Moments4, Moments6};
+use crate::{MAX_MOMENTS, Moments4, Moments6};
 
 /// What moments are means of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -46,7 +46,7 @@ pub struct Bias {
     /// optimised for it.
     pub bits: u32,
     /// The vector to be mixed in, from its zeroth moment, 1, on; what follows `count` is 0.
-    pub target: [f64; 11],
+    pub target: [f64; MAX_MOMENTS],
     /// How much of it, from 0 to 1.
     pub strength: f64,
 }
@@ -78,7 +78,7 @@ impl Bias {
 }
 
 const fn bias<const N: usize>(basis: Basis, bits: u32, moments: [f64; N], strength: f64) -> Bias {
-    let mut target = [0.0; 11];
+    let mut target = [0.0; MAX_MOMENTS];
     target[0] = 1.0;
     let mut i = 0;
     while i < N {

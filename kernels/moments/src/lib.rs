@@ -49,7 +49,7 @@ mod variance;
 pub use bias::Bias;
 pub use blockers::Blockers;
 pub use bound::{
-    Bounds, Canonical, Gradient, MAX_MOMENTS, bias_target, bound, bound_adjoint,
+    Bounds, Canonical, Gradient, MAX, MAX_MOMENTS, bias_target, bound, bound_adjoint,
     bound_adjoint_compensated, bound_compensated, canonical, canonical_compensated, mix_bias,
     mix_bias_adjoint, mix_bias_and_total,
 };

@@ -176,7 +176,9 @@ proptest! {
         let z = 2.0 * z - 1.0;
         let m = six(&d).lerp(UNIFORM, 1e-4);
         let general = bound::<f64, 3>(
-            [1.0, m.b1, m.b2, m.b3, m.b4, m.b5, m.b6, 0.0, 0.0, 0.0, 0.0],
+            [
+                1.0, m.b1, m.b2, m.b3, m.b4, m.b5, m.b6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+            ],
             z,
         );
         let special = hamburger_6(m, z);

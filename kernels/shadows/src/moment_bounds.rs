@@ -1,4 +1,4 @@
-//! Bounds for two, four, six, eight and ten power moments and a free total, and their derivatives,
+//! Bounds for two, four, six, eight, ten and twelve power moments and a free total, and their derivatives,
 //! as maps over rows of moments: `moment_bound_n2` is for N = 2, moments `m0` to `m4`.
 //!
 //! Compensated derivatives are kernels for up to six moments: there their error is what rounding the row's
@@ -284,4 +284,16 @@ order! {
     /// Bound on the amount below a query point, from ten power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
     moment_bound_compensated_n5
+}
+
+order! {
+    6; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6, m7 d_m7 7, m8 d_m8 8, m9 d_m9 9, m10 d_m10 10, m11 d_m11 11, m12 d_m12 12;
+    Row6, AdjointRow6, Derivative6; rows_6, adjoint_rows_6;
+    /// Bound on the amount below a query point, from twelve power moments and their total.
+    moment_bound_n6,
+    /// Derivatives of the bound from twelve power moments and their total, times `d_bound`.
+    moment_bound_adjoint_n6,
+    /// Bound on the amount below a query point, from twelve power moments and their total, with what
+    /// is ill-conditioned in about twice the digits.
+    moment_bound_compensated_n6
 }

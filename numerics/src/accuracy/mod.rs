@@ -8,6 +8,8 @@ mod tables;
 
 pub use orthogonal::orthogonal_roots;
 
+use hankel_moments::MAX;
+
 use crate::families::Precision;
 use crate::peer::PeerError;
 use crate::stress::StressError;
@@ -16,7 +18,7 @@ use crate::stress::StressError;
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
     /// An order that there are no bounds for.
-    #[error("there is no bound of order {0}: give n from 1 to 5")]
+    #[error("there is no bound of order {0}: give n from 1 to {most}", most = MAX)]
     Order(usize),
     /// Too few rows.
     #[error("{0} rows are too few: give at least {LEAST_SAMPLES}")]

@@ -2,26 +2,27 @@
 //! a point to infinity (\[MBD\], section 4.2).
 
 use hankel_dsl::{Real, lit};
+use hankel_moments::{MAX, MAX_MOMENTS};
 
 use crate::numbers::DoubleDouble;
 
 /// Coefficients of the three-term recurrence `p_(k+1) = (x - a_k) p_k - b_k p_(k-1)`.
 struct Recurrence {
-    a: [DoubleDouble; 5],
-    b: [DoubleDouble; 5],
+    a: [DoubleDouble; MAX],
+    b: [DoubleDouble; MAX],
 }
 
 impl Recurrence {
     /// Of moments with a positive definite Hankel matrix, by elimination; `None` for others.
-    fn new(n: usize, m: &[DoubleDouble; 11]) -> Option<Self> {
+    fn new(n: usize, m: &[DoubleDouble; MAX_MOMENTS]) -> Option<Self> {
         let zero: DoubleDouble = lit!(0.0);
-        let mut h = [[zero; 6]; 6];
+        let mut h = [[zero; MAX + 1]; MAX + 1];
         for (i, row) in h.iter_mut().enumerate().take(n + 1) {
             for (j, cell) in row.iter_mut().enumerate().take(n + 1) {
                 *cell = m[i + j];
             }
         }
-        let (mut a, mut b) = ([zero; 5], [zero; 5]);
+        let (mut a, mut b) = ([zero; MAX], [zero; MAX]);
         let mut before = zero;
         let mut pivot_before = zero;
         for k in 0..n {
@@ -48,7 +49,7 @@ impl Recurrence {
     }
 
     /// P_k and its derivative.
-    fn eval<R: Real + From<f64>>(a: &[R; 5], b: &[R; 5], k: usize, x: R) -> (R, R) {
+    fn eval<R: Real + From<f64>>(a: &[R; MAX], b: &[R; MAX], k: usize, x: R) -> (R, R) {
         let (zero, one) = (R::from(0.0), R::from(1.0));
         let (mut p, mut before) = (one, zero);
         let (mut d, mut d_before) = (zero, zero);
@@ -67,7 +68,7 @@ impl Recurrence {
 /// The roots of P_n in ascending order; the rest is 0. `None` unless the Hankel matrix of order
 /// n - 1 is positive definite.
 #[must_use]
-pub fn orthogonal_roots(n: usize, m: &[DoubleDouble; 11]) -> Option<[DoubleDouble; 5]> {
+pub fn orthogonal_roots(n: usize, m: &[DoubleDouble; MAX_MOMENTS]) -> Option<[DoubleDouble; MAX]> {
     let Recurrence { a, b } = Recurrence::new(n, m)?;
     let (fa, fb) = (a.map(f64::from), b.map(f64::from));
     // All eigenvalues of the Jacobi matrix (Gershgorin).
@@ -104,7 +105,7 @@ pub fn orthogonal_roots(n: usize, m: &[DoubleDouble; 11]) -> Option<[DoubleDoubl
             })
             .collect();
     }
-    let mut precise = [lit!(0.0); 5];
+    let mut precise = [lit!(0.0); MAX];
     for (precise, root) in precise.iter_mut().zip(roots) {
         let mut x = DoubleDouble::from(root);
         for _ in 0..3 {

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use hankel_moments::MAX_MOMENTS;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,7 @@ const QUERIES: u64 = 17;
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Orders n, from 1 to 5.
+    /// Orders n, from 1 to 6.
     pub orders: Vec<usize>,
     /// Number formats.
     pub precisions: Vec<Precision>,
@@ -151,7 +152,7 @@ struct Values {
 }
 
 impl Values {
-    fn exact(n: usize, m: [DoubleDouble; 11], eta: DoubleDouble) -> Self {
+    fn exact(n: usize, m: [DoubleDouble; MAX_MOMENTS], eta: DoubleDouble) -> Self {
         Self {
             bound: f64::from(bounds_of(n, m, eta).lower),
             gradient: exact_gradient(n, m, eta),

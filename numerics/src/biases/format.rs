@@ -6,10 +6,10 @@ use hankel_dsl::lit;
 use hankel_listing::{Biases, Receiver, hamburger_listing};
 use hankel_moments::bias::{self, Basis, Bias, PUBLISHED};
 use hankel_moments::{
-    Bounds, HalfAngle, Moments4, Moments6, Quantized4, Quantized6, TrigonometricMoments, bound,
-    dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6,
-    from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, quantize_unit_6,
-    to_unorm, trigonometric_4,
+    Bounds, HalfAngle, MAX_MOMENTS, Moments4, Moments6, Quantized4, Quantized6,
+    TrigonometricMoments, bound, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4,
+    dequantize_unit_6, from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
+    quantize_unit_6, to_unorm, trigonometric_4,
 };
 use serde::{Deserialize, Serialize};
 
@@ -151,7 +151,7 @@ impl Format {
     /// the most similar number of bits.
     #[doc(hidden)]
     #[must_use]
-    pub fn target(self) -> [f64; 11] {
+    pub fn target(self) -> [f64; MAX_MOMENTS] {
         let fallback = match (self.basis, self.count, self.storage) {
             (Basis::Unit, 4, _) => bias::CLAMPED_4_16,
             (Basis::Unit, _, _) => bias::CLAMPED_6_10,
@@ -170,7 +170,7 @@ impl Format {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
     /// Power moments, the zeroth first, or cosines and sines.
-    moments: [f64; 11],
+    moments: [f64; MAX_MOMENTS],
     query: f64,
     /// Share strictly below the query.
     pub below: f64,
@@ -228,7 +228,7 @@ impl Region {
         let total: f64 = points.iter().map(|p| p.weight).sum();
         // The kernels' query is an f32, and so is the truth about it.
         let query = f64::from(query as f32);
-        let mut moments = [0.0; 11];
+        let mut moments = [0.0; MAX_MOMENTS];
         let (mut below, mut up_to) = (0.0, 0.0);
         for p in points {
             let w = p.weight / total;
@@ -293,7 +293,7 @@ fn signed(storage: Storage, x: f32) -> f32 {
 
 impl Format {
     /// Moments as a shader reads them.
-    fn read_back(self, exact: &[f64; 11]) -> [f32; 11] {
+    fn read_back(self, exact: &[f64; MAX_MOMENTS]) -> [f32; MAX_MOMENTS] {
         let mut m = exact.map(|x| x as f32);
         let storage = self.storage;
         if storage == Storage::Float {
@@ -374,7 +374,7 @@ impl Format {
         self,
         region: &Region,
         criterion: Criterion,
-        target: &[f64; 11],
+        target: &[f64; MAX_MOMENTS],
         strength: f64,
     ) -> bool {
         let mut m = self.read_back(&region.moments);
@@ -422,7 +422,7 @@ impl Format {
 
 /// Both bounds by the published code, which has the lower one: the upper one is that of the mirrored
 /// depths, turned over.
-fn listed(m: &[f32; 11], query: f32) -> Bounds<f32> {
+fn listed(m: &[f32; MAX_MOMENTS], query: f32) -> Bounds<f32> {
     // Its own bias is that for [0, 1]; here one is mixed in already.
     let biases = Biases {
         moment_bias: 0.0,
@@ -445,7 +445,7 @@ fn listed(m: &[f32; 11], query: f32) -> Bounds<f32> {
 }
 
 /// Whether the Hankel matrix is positive definite: in `f64` where that is sure.
-fn is_hankel_definite(n: usize, m: &[f32; 11]) -> bool {
+fn is_hankel_definite(n: usize, m: &[f32; MAX_MOMENTS]) -> bool {
     let row = Row {
         m: m.map(f64::from),
         eta: 0.0,
@@ -462,7 +462,7 @@ fn is_hankel_definite(n: usize, m: &[f32; 11]) -> bool {
 }
 
 /// Whether the Toeplitz matrix of 1, c1 + i s1 and c2 + i s2 is positive definite.
-fn is_toeplitz_definite(m: &[f32; 11]) -> bool {
+fn is_toeplitz_definite(m: &[f32; MAX_MOMENTS]) -> bool {
     let [c1, s1, c2, s2] = [m[1], m[2], m[3], m[4]].map(DoubleDouble::from);
     let one: DoubleDouble = lit!(1.0);
     let first = c1 * c1 + s1 * s1;

@@ -25,6 +25,7 @@ pub use format::{FORMATS, Format, Storage};
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use hankel_moments::MAX_MOMENTS;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -207,7 +208,7 @@ pub fn formats_named(names: &[String]) -> Result<Vec<Format>, BiasError> {
 
 struct Search {
     format: Format,
-    target: [f64; 11],
+    target: [f64; MAX_MOMENTS],
     samples: u64,
     seed: u64,
 }

@@ -2,23 +2,23 @@
 
 use hankel_moments::bias::{Bias, CLAMPED_4_16, CLAMPED_6_10, SYMMETRIC_4_16, SYMMETRIC_6_16};
 use hankel_moments::{
-    Moments4, Moments6, bias_target, dequantize_symmetric_4, dequantize_symmetric_6,
-    dequantize_unit_4, dequantize_unit_6, from_unorm, quantize_symmetric_4, quantize_symmetric_6,
-    quantize_unit_4, quantize_unit_6, to_unorm,
+    MAX, MAX_MOMENTS, Moments4, Moments6, bias_target, dequantize_symmetric_4,
+    dequantize_symmetric_6, dequantize_unit_4, dequantize_unit_6, from_unorm, quantize_symmetric_4,
+    quantize_symmetric_6, quantize_unit_4, quantize_unit_6, to_unorm,
 };
 
 use super::draw::{Point, Source};
 use super::{Depths, Format, Kind, Precision, Row};
 use crate::numbers::DoubleDouble;
 
-/// Strengths for moments stored as 32-bit floats, n = 1 to 5: those of the 2025 paper's package,
+/// Strengths for moments stored as 32-bit floats, n = 1 to 6: those of the 2025 paper's package,
 /// twice what is published with moment-based transparency.
-const FLOAT_STRENGTHS: [f64; 5] = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+const FLOAT_STRENGTHS: [f64; MAX] = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
 
 /// How much of which moments is mixed in.
 struct Mixture {
     strength: f64,
-    target: [f64; 11],
+    target: [f64; MAX_MOMENTS],
 }
 
 /// A row of order `n`.
@@ -127,7 +127,8 @@ fn float_bias(biased: bool, n: usize) -> Option<Mixture> {
         2 => bias_target::<f64, 2>(),
         3 => bias_target::<f64, 3>(),
         4 => bias_target::<f64, 4>(),
-        _ => bias_target::<f64, 5>(),
+        5 => bias_target::<f64, 5>(),
+        _ => bias_target::<f64, 6>(),
     };
     biased.then(|| Mixture {
         strength: FLOAT_STRENGTHS[n - 1],
@@ -168,7 +169,7 @@ fn rounded<T: Format>(
     row
 }
 
-fn exact_moments(n: usize, points: &[Point], mass: &Mass) -> [DoubleDouble; 11] {
+fn exact_moments(n: usize, points: &[Point], mass: &Mass) -> [DoubleDouble; MAX_MOMENTS] {
     let zero = DoubleDouble::from(0.0);
     let mut total = zero;
     for p in points {
@@ -178,7 +179,7 @@ fn exact_moments(n: usize, points: &[Point], mass: &Mass) -> [DoubleDouble; 11] 
         Mass::Free => DoubleDouble::from(1.0),
         Mass::Is(mass) => DoubleDouble::from(*mass) / total,
     };
-    let mut m = [zero; 11];
+    let mut m = [zero; MAX_MOMENTS];
     for p in points {
         let depth = DoubleDouble::from(p.depth);
         let mut power = DoubleDouble::from(p.weight) * scale;
@@ -254,7 +255,7 @@ fn channel<T: Format, const BITS: usize>(x: f64) -> T {
 }
 
 /// Four moments through the optimised basis and back.
-fn four<T: Format, const BITS: usize>(depths: Depths, exact: &[f64; 11]) -> [T; 6] {
+fn four<T: Format, const BITS: usize>(depths: Depths, exact: &[f64; MAX_MOMENTS]) -> [T; 6] {
     let m = Moments4 {
         b1: exact[1],
         b2: exact[2],
@@ -279,7 +280,7 @@ fn four<T: Format, const BITS: usize>(depths: Depths, exact: &[f64; 11]) -> [T; 
 }
 
 /// Six moments through the optimised basis and back.
-fn six<T: Format, const BITS: usize>(depths: Depths, exact: &[f64; 11]) -> [T; 6] {
+fn six<T: Format, const BITS: usize>(depths: Depths, exact: &[f64; MAX_MOMENTS]) -> [T; 6] {
     let m = Moments6 {
         b1: exact[1],
         b2: exact[2],
@@ -330,7 +331,7 @@ fn recommended(depths: Depths, bits: u32, n: usize) -> Mixture {
 /// Moments of no distribution.
 fn impossible<T: Format>(n: usize, s: &mut Source) -> Row<T> {
     let count = 2 * n + 1;
-    let mut m = [0.0; 11];
+    let mut m = [0.0; MAX_MOMENTS];
     let kind = s.count(0, 5);
     match kind {
         // Noise.

@@ -23,16 +23,18 @@ pub use validity::{Validity, pivots, scaled, validity};
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use hankel_moments::{MAX, MAX_MOMENTS};
+
 use draw::Source;
 
 /// Numbers of moments beyond the zeroth, halved, that there are bounds for.
-pub const ORDERS: RangeInclusive<usize> = 1..=5;
+pub const ORDERS: RangeInclusive<usize> = 1..=MAX;
 
 /// Moments and a query point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Row<T> {
     /// The moments m_0 to m_2n; what follows is 0.
-    pub m: [T; 11],
+    pub m: [T; MAX_MOMENTS],
     /// Where the bound is asked for.
     pub eta: T,
 }

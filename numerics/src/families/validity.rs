@@ -1,6 +1,7 @@
 //! Whether a row's moments are those of a distribution that is not degenerate.
 
 use hankel_dsl::Real;
+use hankel_moments::{MAX, MAX_MOMENTS};
 
 use super::Row;
 use crate::numbers::{DoubleDouble, Wide};
@@ -28,17 +29,17 @@ impl Validity {
 /// Pivots of the Hankel matrix without exchange of rows (m_0 first), and its diagonal. From the
 /// first pivot on that is not positive, pivots mean nothing.
 #[must_use]
-pub fn pivots<R: Real>(n: usize, m: &[R; 11]) -> ([R; 6], [R; 6]) {
+pub fn pivots<R: Real>(n: usize, m: &[R; MAX_MOMENTS]) -> ([R; MAX + 1], [R; MAX + 1]) {
     let zero: R = hankel_dsl::lit!(0.0);
     let size = n + 1;
-    let mut a = [[zero; 6]; 6];
+    let mut a = [[zero; MAX + 1]; MAX + 1];
     for (i, row) in a.iter_mut().enumerate().take(size) {
         for (j, cell) in row.iter_mut().enumerate().take(size) {
             *cell = m[i + j];
         }
     }
-    let mut diagonal = [zero; 6];
-    let mut pivots = [zero; 6];
+    let mut diagonal = [zero; MAX + 1];
+    let mut pivots = [zero; MAX + 1];
     for k in 0..size {
         diagonal[k] = m[2 * k];
     }
@@ -79,7 +80,7 @@ pub fn scaled(row: &Row<f64>) -> Option<(Row<f64>, i32)> {
 
 /// A sign that is sure if the pivot's share of its diagonal element, times what earlier pivots
 /// left, is well above rounding errors.
-fn decide(n: usize, shares: [f64; 6], epsilon: f64) -> Validity {
+fn decide(n: usize, shares: [f64; MAX + 1], epsilon: f64) -> Validity {
     let mut left = 1.0;
     for share in shares.into_iter().take(n + 1) {
         let sure = 64.0 * epsilon / left;
@@ -102,7 +103,7 @@ pub fn validity(n: usize, row: &Row<f64>) -> Validity {
         return Validity::Not;
     }
     let (pivots_dd, diagonal) = pivots(n, &row.m.map(DoubleDouble::from));
-    let mut shares = [0.0; 6];
+    let mut shares = [0.0; MAX + 1];
     for k in 0..=n {
         shares[k] = f64::from(pivots_dd[k]) / f64::from(diagonal[k]);
     }
@@ -123,7 +124,7 @@ pub fn validity(n: usize, row: &Row<f64>) -> Validity {
 
 /// Whether a leading minor is so small that it must be 0: all moments are whole multiples of one
 /// power of two, so that a minor is one of that power's.
-fn is_singular(n: usize, row: &Row<f64>, pivots: &[Wide; 6]) -> bool {
+fn is_singular(n: usize, row: &Row<f64>, pivots: &[Wide; MAX + 1]) -> bool {
     let nonzero = row.m[..=2 * n].iter().filter(|m| **m != 0.0);
     let Some(unit) = nonzero.map(|m| last_place(*m)).reduce(f64::min) else {
         return true;

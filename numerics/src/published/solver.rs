@@ -8,7 +8,7 @@ use super::{Float, cholesky_solve};
 /// Points of a canonical representation at most.
 const POINTS: usize = MAX_MOMENTS / 2 + 1;
 
-/// Algorithm 1 for both ends of its overestimation weight, for n from 1 to 5. No bias: see [`mixed`].
+/// Algorithm 1 for both ends of its overestimation weight, for n from 1 to 6. No bias: see [`mixed`].
 #[must_use]
 pub fn moment_bound<T: Float>(n: usize, m: [T; MAX_MOMENTS], eta: T) -> Bounds<T> {
     let zero = T::default();

@@ -24,6 +24,7 @@ use std::time::Instant;
 
 use hankel_dsl::native::lanes::{SCALAR, level_name, levels};
 use hankel_dsl::native::{CallError, Mode};
+use hankel_moments::MAX;
 use hankel_system::temporary::Folder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -41,7 +42,7 @@ pub const SPEED_FAMILY: &str = "paper";
 #[derive(Debug, thiserror::Error)]
 pub enum SpeedError {
     /// An order that there are no bounds for.
-    #[error("there is no bound of order {0}: give n from 1 to 5")]
+    #[error("there is no bound of order {0}: give n from 1 to {most}", most = MAX)]
     Order(usize),
     /// Nothing to measure with.
     #[error("{0} rows are too few: give at least {LEAST_ROWS}")]
@@ -77,7 +78,7 @@ pub const LEAST_ROWS: usize = 16;
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Orders n, from 1 to 5.
+    /// Orders n, from 1 to 6.
     pub orders: Vec<usize>,
     /// Rows of a call.
     pub rows: usize,

@@ -5,6 +5,7 @@ use std::time::Instant;
 use bytemuck::{bytes_of, cast_slice, cast_slice_mut, pod_read_unaligned};
 use hankel_dsl::native::describe::{self, Layout, Output, Role, Scalar, Type};
 use hankel_dsl::native::{Arg, Call, Entry, Mode};
+use hankel_moments::MAX_MOMENTS;
 
 use super::SpeedError;
 use crate::families::{Format, Precision, Row};
@@ -266,7 +267,7 @@ impl Source {
                 .strip_prefix('m')?
                 .parse()
                 .ok()
-                .filter(|k| *k < 11)
+                .filter(|k| *k < MAX_MOMENTS)
                 .map(Self::Moment),
         }
     }

@@ -3,6 +3,7 @@
 
 use std::ops::RangeInclusive;
 
+use hankel_moments::MAX_MOMENTS;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -114,7 +115,7 @@ fn of_bound(
     rounding: &Rounding,
 ) -> (Vec<Wide>, Vec<f64>) {
     let (m, eta) = (row.m.map(Wide::from), Wide::from(row.eta));
-    let at = |m: [Wide; 11], eta: Wide| {
+    let at = |m: [Wide; MAX_MOMENTS], eta: Wide| {
         let gradient = gradient_of(n, m, eta, Wide::from(overestimation));
         let mut all = gradient.m[..=2 * n].to_vec();
         all.push(gradient.eta);

@@ -23,6 +23,7 @@ pub use reference::{
 use std::path::PathBuf;
 
 use hankel_dsl::native::lanes::level_name;
+use hankel_moments::MAX;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +42,7 @@ pub enum StressError {
         given: String,
     },
     /// An order that there are no bounds for.
-    #[error("there is no bound of order {0}: give n from 1 to 5")]
+    #[error("there is no bound of order {0}: give n from 1 to {most}", most = MAX)]
     Order(usize),
     /// Too few rows.
     #[error("{0} rows are too few: give at least {LEAST_SAMPLES}")]
@@ -82,7 +83,7 @@ pub const LEAST_SAMPLES: u64 = 16;
 pub struct Options {
     /// Families, in the order of the report.
     pub families: Vec<&'static Family>,
-    /// Orders n, from 1 to 5.
+    /// Orders n, from 1 to 6.
     pub orders: Vec<usize>,
     /// Number formats.
     pub precisions: Vec<Precision>,

@@ -1,7 +1,7 @@
 //! What the bounds should be.
 
 use hankel_dsl::Real;
-use hankel_moments::{Bounds, Canonical, Gradient, bound, bound_adjoint, canonical};
+use hankel_moments::{Bounds, Canonical, Gradient, MAX_MOMENTS, bound, bound_adjoint, canonical};
 use serde::{Deserialize, Serialize};
 
 use crate::families::{Format, Row, Validity, scaled, validity};
@@ -25,26 +25,32 @@ macro_rules! by_order {
             2 => $function::<$R, 2>($($argument),*),
             3 => $function::<$R, 3>($($argument),*),
             4 => $function::<$R, 4>($($argument),*),
-            _ => $function::<$R, 5>($($argument),*),
+            5 => $function::<$R, 5>($($argument),*),
+            _ => $function::<$R, 6>($($argument),*),
         }
     };
 }
 
 /// [`bound`] of an order.
 #[inline(never)]
-pub fn bounds_of<R: Real>(n: usize, m: [R; 11], eta: R) -> Bounds<R> {
+pub fn bounds_of<R: Real>(n: usize, m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> {
     by_order!(n, bound::<R>(m, eta))
 }
 
 /// [`canonical`] of an order.
 #[inline(never)]
-pub fn canonical_of<R: Real>(n: usize, m: [R; 11], eta: R) -> Canonical<R> {
+pub fn canonical_of<R: Real>(n: usize, m: [R; MAX_MOMENTS], eta: R) -> Canonical<R> {
     by_order!(n, canonical::<R>(m, eta))
 }
 
 /// [`bound_adjoint`] of an order.
 #[inline(never)]
-pub fn gradient_of<R: Real>(n: usize, m: [R; 11], eta: R, overestimation: R) -> Gradient<R> {
+pub fn gradient_of<R: Real>(
+    n: usize,
+    m: [R; MAX_MOMENTS],
+    eta: R,
+    overestimation: R,
+) -> Gradient<R> {
     let one = R::literal::<{ 1.0_f64.to_bits() }>();
     by_order!(n, bound_adjoint::<R>(m, eta, overestimation, one))
 }
@@ -58,10 +64,10 @@ const STEP: f64 = 1.0 / (1_u128 << 80) as f64 / (1_u128 << 80) as f64;
 /// order, then the query point.
 pub(super) fn difference<F>(
     n: usize,
-    m: [Wide; 11],
+    m: [Wide; MAX_MOMENTS],
     eta: Wide,
     direction: usize,
-    function: impl Fn([Wide; 11], Wide) -> F,
+    function: impl Fn([Wide; MAX_MOMENTS], Wide) -> F,
 ) -> (F, F, Wide) {
     let step = Wide::from(STEP);
     let at = |step: Wide| {
@@ -80,7 +86,7 @@ pub(super) fn difference<F>(
 #[must_use]
 pub fn gradient_by_differences(
     n: usize,
-    m: [DoubleDouble; 11],
+    m: [DoubleDouble; MAX_MOMENTS],
     eta: DoubleDouble,
 ) -> Gradient<f64> {
     let (m, eta) = (m.map(Wide::from), Wide::from(eta));
@@ -90,8 +96,8 @@ pub fn gradient_by_differences(
         f64::from((there - back) / twice)
     };
     let mut gradient = Gradient {
-        m: [0.0; 11],
-        eta: directional(11),
+        m: [0.0; MAX_MOMENTS],
+        eta: directional(MAX_MOMENTS),
     };
     for k in 0..=2 * n {
         gradient.m[k] = directional(k);

@@ -15,7 +15,7 @@ use hankel_dsl::{Real, lit, unroll};
 
 use super::kernel::Kernel;
 use super::recurrence::{Recurrence, finite};
-use super::roots::{least_of_cubic, least_of_quadratic, least_two, whole};
+use super::roots::{least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, Plain, Twofold};
 use super::{MAX, MAX_MOMENTS};
 
@@ -50,7 +50,7 @@ pub fn bound_adjoint<R: Real, const N: usize>(
 /// For N up to 3, no derivative has an error of more than four times what rounding each argument and the result
 /// once does to it. That is measured, not proved, in `f32` and `f64`, for rows of the families that
 /// [`bound_compensated`](super::bound_compensated) is measured on; a derivative that is less than the number
-/// type's epsilon times the greatest of its row counts as that. For N = 4 and 5 it is not promised.
+/// type's epsilon times the greatest of its row counts as that. For N from 4 on it is not promised.
 #[inline(always)]
 pub fn bound_adjoint_compensated<R: Real, const N: usize>(
     m: [R; MAX_MOMENTS],
@@ -72,7 +72,7 @@ pub fn mix_bias_adjoint<R: Real, const N: usize>(
 ) -> [R; MAX_MOMENTS] {
     let strength = strength.saturate();
     let one: R = lit!(1.0);
-    unroll!(k in 1..(2 * N + 1), max 11, {
+    unroll!(k in 1..(2 * N + 1), max 13, {
         d[0] += strength * (target[k] * d[k]);
         d[k] = (one - strength) * d[k];
     });
@@ -95,7 +95,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
         kernel.fine::<N>()
     } else {
         let mut e = [A::of(one); MAX + 1];
-        unroll!(i in 1..(N + 1), max 6, {
+        unroll!(i in 1..(N + 1), max 7, {
             e[i] = A::of(kernel.e[i]);
         });
         (e, A::of(kernel.own))
@@ -109,7 +109,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     let minor_share = R::select(kernel.turned, -one, one);
     let minor_share = R::select(kernel.few.gt(zero), minor_share, zero);
     let mut q = [A::of(zero); MAX_MOMENTS];
-    unroll!(i in 0..(2 * N + 1), max 11, {
+    unroll!(i in 0..(2 * N + 1), max 13, {
         q[i] = own[i].times_plain(own_share).plus(minor[i].times_plain(minor_share));
     });
     q[0] = A::select(kernel.turned, A::of(one).plus(q[0]), q[0]);
@@ -119,7 +119,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     let sign = R::select(kernel.turned, -one, one);
     let per_length = A::of(sign * (kernel.reach / recurrence.unit));
     let mut power = per_length;
-    unroll!(i in 1..(2 * N + 1), max 11, {
+    unroll!(i in 1..(2 * N + 1), max 13, {
         q[i] = q[i].times_within(power, limit);
         power = power.times_within(per_length, limit);
     });
@@ -132,8 +132,8 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
 
     // In powers of x: Horner's scheme, repeated.
     let eta = finite(eta, lit!(1e12));
-    unroll!(j in 0..10, max 11, {
-        unroll!(i in 0..10, max 11, {
+    unroll!(j in 0..(2 * N), max 13, {
+        unroll!(i in 0..(2 * N), max 13, {
             // Each time one coefficient less: from the highest but one down to j.
             if const { i + j < 2 * N } {
                 let carried = q[2 * N - i].times_plain(eta);
@@ -145,7 +145,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
         m: [zero; MAX_MOMENTS],
         eta: d_eta,
     };
-    unroll!(i in 0..(2 * N + 1), max 11, {
+    unroll!(i in 0..(2 * N + 1), max 13, {
         gradient.m[i] = q[i].rounded() * factor;
     });
     gradient
@@ -158,8 +158,8 @@ type Fine<A> = [A; MAX + 1];
 #[inline(always)]
 fn squared<R: Real, A: Arithmetic<R>, const N: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
     let mut square = [A::of(lit!(0.0)); MAX_MOMENTS];
-    unroll!(i in 0..(N + 1), max 6, {
-        unroll!(j in 0..(N + 1), max 6, {
+    unroll!(i in 0..(N + 1), max 7, {
+        unroll!(j in 0..(N + 1), max 7, {
             square[i + j] = square[i + j].plus(p[i].times(p[j]));
         });
     });
@@ -178,14 +178,18 @@ fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
     if const { N == 1 } {
         return [A::of(zero); MAX_MOMENTS];
     }
-    let (first, second) = if const { N == 2 } {
-        (least_of_quadratic(&kernel.e), zero)
+    let (first, second, third) = if const { N == 2 } {
+        (least_of_quadratic(&kernel.e), zero, zero)
     } else if const { N == 3 } {
-        (least_of_cubic(&kernel.e), zero)
+        (least_of_cubic(&kernel.e), zero, zero)
     } else if const { N == 4 } {
-        least_two::<R, 4, 3>(&kernel.e)
+        let (first, second) = least_two::<R, 4, 3>(&kernel.e);
+        (first, second, zero)
+    } else if const { N == 5 } {
+        let (first, second) = least_two::<R, 5, 4>(&kernel.e);
+        (first, second, zero)
     } else {
-        least_two::<R, 5, 4>(&kernel.e)
+        least_three(&kernel.e)
     };
     let first = exact_root::<R, A, N>(e, first);
     let rest = deflated::<R, A, N>(e, first);
@@ -198,8 +202,18 @@ fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
     let double = double::<R, A, N>(&rest, first, second);
     let is_double = kernel.few.gt(one);
     let mut minor = single;
-    unroll!(i in 0..(2 * N + 1), max 11, {
+    unroll!(i in 0..(2 * N + 1), max 13, {
         minor[i] = A::select(is_double, double[i], single[i]);
+    });
+    if const { N < 6 } {
+        return minor;
+    }
+    let third = exact_root::<R, A, N>(e, third);
+    let rest = deflated::<R, A, N>(&rest, third);
+    let triple = triple::<R, A, N>(&rest, first, second, third);
+    let is_triple = kernel.few.gt(lit!(2.0));
+    unroll!(i in 0..(2 * N + 1), max 13, {
+        minor[i] = A::select(is_triple, triple[i], minor[i]);
     });
     minor
 }
@@ -215,11 +229,11 @@ fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A
     if const { A::TWICE } {
         let quarter: R = lit!(0.25);
         let least: R = lit!(1e-37);
-        unroll!(_step in 0..REFINEMENTS, max 6, {
+        unroll!(_step in 0..REFINEMENTS, max 7, {
             let mut p = e[0];
             let mut d = A::of(zero);
             let mut h = zero;
-            unroll!(i in 1..(N + 1), max 6, {
+            unroll!(i in 1..(N + 1), max 7, {
                 h = h * v + d.rounded();
                 d = d.times(root).plus(p);
                 p = p.times(root).plus(e[i]);
@@ -240,7 +254,7 @@ fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A
 #[inline(always)]
 fn deflated<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: A) -> Fine<A> {
     let mut rest = *e;
-    unroll!(i in 1..N, max 6, {
+    unroll!(i in 1..N, max 7, {
         rest[i] = e[i].plus(v.times(rest[i - 1]));
     });
     rest[N] = A::of(lit!(0.0));
@@ -252,7 +266,7 @@ fn deflated<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: A) -> Fin
 #[inline(always)]
 fn divided<R: Real, A: Arithmetic<R>>(e: &Fine<A>, at: A) -> Fine<A> {
     let mut quotient = *e;
-    unroll!(i in 1..6, max 6, {
+    unroll!(i in 1..(MAX + 1), max 7, {
         quotient[i] = e[i].plus(at.times(quotient[i - 1]));
     });
     quotient
@@ -274,7 +288,7 @@ fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> [A
     let slope = divided(&quotient, v)[const { less(N, 2) }];
     let per_value = value.inverse();
     let mut power = A::of(one);
-    unroll!(k in 1..N, max 6, {
+    unroll!(k in 1..N, max 7, {
         power = power.times(v);
     });
     // 1 / rest at the root: all its roots are on the other side, so it is between 0 and 1.
@@ -286,7 +300,7 @@ fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> [A
     let linear = at_root.times(v.times(tilt));
     let square = squared::<R, A, N>(rest);
     let mut q = [A::of(zero); MAX_MOMENTS];
-    unroll!(i in 1..(2 * N + 1), max 11, {
+    unroll!(i in 1..(2 * N + 1), max 13, {
         q[i] = constant.times(square[i - 1]);
         if const { i > 1 } {
             q[i] = q[i].plus(linear.times(square[i - 2]));
@@ -323,12 +337,18 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(
     let r22 = divided(&by_2, v2)[const { less(N, 3) }];
     let r112 = divided(&by_11, v2)[const { less(N, 4) }];
     let r122 = divided(&by_12, v2)[const { less(N, 4) }];
-    let r1122 = if const { N == 5 } { one } else { zero };
+    let r1122 = if const { N == 6 } {
+        divided(&divided(&by_11, v2), v2)[1]
+    } else if const { N == 5 } {
+        one
+    } else {
+        zero
+    };
     // Divided differences of v^N: complete homogeneous polynomials.
     let (mut p2, mut p12, mut p22, mut p112, mut p122, mut p1122) =
         (one, zero, zero, zero, zero, zero);
     let mut p1 = one;
-    unroll!(k in 0..N, max 6, {
+    unroll!(k in 0..N, max 7, {
         p1122 = v2.times(p1122).plus(p112);
         p122 = v2.times(p122).plus(p12);
         p112 = v1.times(p112).plus(p12);
@@ -372,10 +392,157 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(
     ];
     let square = squared::<R, A, N>(rest);
     let mut q = [zero; MAX_MOMENTS];
-    unroll!(i in 0..4, max 6, {
-        unroll!(j in 0..10, max 11, {
+    unroll!(i in 0..4, max 7, {
+        unroll!(j in 0..(2 * MAX), max 13, {
             if const { i + j < 2 * N } {
                 q[i + j + 1] = q[i + j + 1].plus(cubic[i].times(square[j]));
+            }
+        });
+    });
+    q
+}
+
+/// [`double`] for three roots of which `rest`, of degree N - 3, has none: `u rest(u)²` times the polynomial of
+/// degree 5 that makes it 1 and stationary at all three.
+///
+/// In the reciprocal it is `l² + (v - v_1)(v - v_2)(v - v_3) t`, where the parabola `l` meets `s` and the
+/// parabola `t` meets `2 l` times the third divided difference of `s`.
+#[inline(always)]
+fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
+    rest: &Fine<A>,
+    v1: A,
+    v2: A,
+    v3: A,
+) -> [A; MAX_MOMENTS] {
+    let zero = A::of(lit!(0.0));
+    let one = A::of(lit!(1.0));
+    let two: R = lit!(2.0);
+    // Divided differences of rest, named by their arguments; with four it is 1, with more 0.
+    let by_1 = divided(rest, v1);
+    let by_2 = divided(rest, v2);
+    let by_3 = divided(rest, v3);
+    let by_12 = divided(&by_1, v2);
+    let r1 = by_1[const { less(N, 3) }];
+    let r2 = by_2[const { less(N, 3) }];
+    let r3 = by_3[const { less(N, 3) }];
+    let r11 = divided(&by_1, v1)[const { less(N, 4) }];
+    let r12 = by_12[const { less(N, 4) }];
+    let r13 = divided(&by_1, v3)[const { less(N, 4) }];
+    let r23 = divided(&by_2, v3)[const { less(N, 4) }];
+    let r112 = divided(&by_12, v1)[const { less(N, 5) }];
+    let r122 = divided(&by_12, v2)[const { less(N, 5) }];
+    let r123 = divided(&by_12, v3)[const { less(N, 5) }];
+    // Divided differences of v^N: complete homogeneous polynomials.
+    let mut p3 = one;
+    let (mut p23, mut p123, mut p1123, mut p1223, mut p1233) = (zero, zero, zero, zero, zero);
+    let (mut p11223, mut p12233, mut p112233) = (zero, zero, zero);
+    unroll!(k in 0..N, max 7, {
+        p112233 = v1.times(p112233).plus(p12233);
+        p12233 = v2.times(p12233).plus(p1233);
+        p11223 = v1.times(p11223).plus(p1223);
+        p1233 = v3.times(p1233).plus(p123);
+        p1223 = v2.times(p1223).plus(p123);
+        p1123 = v1.times(p1123).plus(p123);
+        p123 = v1.times(p123).plus(p23);
+        p23 = v2.times(p23).plus(p3);
+        p3 = v3.times(p3);
+    });
+    let (per_r1, per_r2, per_r3) = (r1.inverse(), r2.inverse(), r3.inverse());
+    // And of the quotient.
+    let limit: R = lit!(1e12);
+    let quotient = |rest: A, per: A| rest.times(per).within(-limit, limit);
+    let s3 = quotient(p3, per_r3);
+    let s23 = quotient(p23.minus(r23.times(s3)), per_r2);
+    let s123 = quotient(p123.minus(r12.times(s23)).minus(r123.times(s3)), per_r1);
+    let s1123 = quotient(
+        p1123
+            .minus(r11.times(s123))
+            .minus(r112.times(s23))
+            .minus(s3),
+        per_r1,
+    );
+    let s1223 = quotient(
+        p1223
+            .minus(r12.times(s123))
+            .minus(r122.times(s23))
+            .minus(s3),
+        per_r2,
+    );
+    let s1233 = quotient(
+        p1233
+            .minus(r13.times(s123))
+            .minus(r123.times(s23))
+            .minus(s3),
+        per_r3,
+    );
+    let s11223 = quotient(
+        p11223
+            .minus(r12.times(s1223))
+            .minus(r112.times(s123))
+            .minus(s23),
+        per_r1,
+    );
+    let s12233 = quotient(
+        p12233
+            .minus(r23.times(s1233))
+            .minus(r123.times(s123))
+            .minus(s23),
+        per_r2,
+    );
+    let s112233 = quotient(
+        p112233
+            .minus(r12.times(s12233))
+            .minus(r123.times(s1233))
+            .minus(s123),
+        per_r1,
+    );
+    // l = s3 + (v - v3) (s23 + (v - v2) s123), and t as well; both by powers of v.
+    let t3 = s3.times(s1233).scaled(two);
+    let t23 = s3.times(s12233).plus(s23.times(s1223)).scaled(two);
+    let t123 = s3
+        .times(s112233)
+        .plus(s23.times(s11223))
+        .plus(s123.times(s1123))
+        .scaled(two);
+    let parabola = |at: A, slope: A, bend: A| {
+        let linear = slope.minus(bend.times(v2));
+        [
+            at.minus(v3.times(linear)),
+            linear.minus(bend.times(v3)),
+            bend,
+        ]
+    };
+    let l = parabola(s3, s23, s123);
+    let t = parabola(t3, t23, t123);
+    let e1 = v1.plus(v2).plus(v3);
+    let e2 = v1.times(v2).plus(v1.plus(v2).times(v3));
+    let e3 = v1.times(v2).times(v3);
+    // Coefficients of u^0 to u^5, of v^5 to v^0.
+    let quintic = [
+        t[2],
+        l[2].times(l[2]).plus(t[1]).minus(t[2].times(e1)),
+        l[1].times(l[2])
+            .scaled(two)
+            .plus(t[0])
+            .minus(t[1].times(e1))
+            .plus(t[2].times(e2)),
+        l[1].times(l[1])
+            .plus(l[0].times(l[2]).scaled(two))
+            .minus(t[0].times(e1))
+            .plus(t[1].times(e2))
+            .minus(t[2].times(e3)),
+        l[0].times(l[1])
+            .scaled(two)
+            .plus(t[0].times(e2))
+            .minus(t[1].times(e3)),
+        l[0].times(l[0]).minus(t[0].times(e3)),
+    ];
+    let square = squared::<R, A, N>(rest);
+    let mut q = [zero; MAX_MOMENTS];
+    unroll!(i in 0..6, max 7, {
+        unroll!(j in 0..(2 * MAX), max 13, {
+            if const { i + j < 2 * N } {
+                q[i + j + 1] = q[i + j + 1].plus(quintic[i].times(square[j]));
             }
         });
     });

@@ -25,7 +25,7 @@ pub struct Canonical<R> {
 /// The canonical representation. Takes anything that [`bound`](super::bound) takes; weights are
 /// from 0 to the total.
 ///
-/// All roots are found, while [`bound`](super::bound) needs at most two. Rounding errors of points
+/// All roots are found, while [`bound`](super::bound) needs at most three. Rounding errors of points
 /// and weights are then corrected together by what they leave of all moments, so that these are
 /// reproduced to a few units in their last place where that is possible.
 #[inline(always)]
@@ -57,14 +57,14 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
         own: kernel.own * recurrence.total,
     };
     let per_length = kernel.reach / recurrence.unit;
-    unroll!(i in 0..N, max 6, {
+    unroll!(i in 0..N, max 7, {
         let weight = small_weight_of::<R, A, N>(&kernel, roots[i]).clamp(zero, kernel.others);
         found.weights[i] = weight * recurrence.total;
         found.reciprocals[i] = roots[i] * per_length;
     });
     // A turned axis turns their order.
     let as_is = found;
-    unroll!(i in 0..N, max 6, {
+    unroll!(i in 0..N, max 7, {
         found.weights[i] = R::select(
             kernel.turned,
             as_is.weights[N - 1 - i],
@@ -76,7 +76,12 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
             as_is.reciprocals[i],
         );
     });
-    corrected::<R, N>(&m, eta, recurrence.total, found)
+    let once = corrected::<R, N>(&m, eta, recurrence.total, found);
+    if const { N < 6 } {
+        once
+    } else {
+        corrected::<R, N>(&m, eta, recurrence.total, once)
+    }
 }
 
 /// One step of Newton's method for the 2N + 1 equations that the moments are in terms of weights
@@ -84,7 +89,7 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
 ///
 /// Its matrix is a confluent Vandermonde matrix, and its inverse is made of Hermite's basis
 /// polynomials, by which each unknown has a formula of its own. What is left of the moments is as
-/// inexact as their last digits, so that one step is enough. Where it would go far, moments are
+/// inexact as their last digits, so that one step is enough; roots for twelve moments are so inexact that it takes two. Where it would go far, moments are
 /// degenerate and digits have nothing to say: there all stays as it is.
 #[inline(always)]
 fn corrected<R: Real, const N: usize>(
@@ -99,7 +104,7 @@ fn corrected<R: Real, const N: usize>(
     // The query point is the last.
     let mut u = [zero; MAX + 1];
     let mut weight = [found.own; MAX + 1];
-    unroll!(i in 0..N, max 6, {
+    unroll!(i in 0..N, max 7, {
         let v = found.reciprocals[i];
         u[i] = R::select(v.eq(zero), zero, one / R::select(v.eq(zero), one, v));
         weight[i] = found.weights[i];
@@ -108,8 +113,8 @@ fn corrected<R: Real, const N: usize>(
     let mut rest = *m;
     rest[0] = total;
     let mut terms = weight;
-    unroll!(k in 0..(2 * N + 1), max 11, {
-        unroll!(i in 0..(N + 1), max 6, {
+    unroll!(k in 0..(2 * N + 1), max 13, {
+        unroll!(i in 0..(N + 1), max 7, {
             rest[k] -= terms[i];
             terms[i] *= eta + u[if const { i < N } { i } else { MAX }];
         });
@@ -118,7 +123,7 @@ fn corrected<R: Real, const N: usize>(
     let quarter: R = lit!(0.25);
     let mut next = found;
     let mut is_near = zero.le(found.own);
-    unroll!(i in 0..(N + 1), max 6, {
+    unroll!(i in 0..(N + 1), max 7, {
         let at = u[if const { i < N } { i } else { MAX }];
         let x = eta + at;
         // 1 and stationary here, 0 and stationary at other points, 0 at the query point; but for
@@ -126,7 +131,7 @@ fn corrected<R: Real, const N: usize>(
         let mut q = [zero; MAX_MOMENTS];
         q[0] = one;
         let mut slope = zero;
-        unroll!(j in 0..(2 * N), max 11, {
+        unroll!(j in 0..(2 * N), max 13, {
             // Two factors for each other point, one for the query point in this one's place.
             if const { j / 2 != i || j % 2 != 1 } {
                 // 1 + s (t - x); at infinity s is 0.
@@ -138,10 +143,10 @@ fn corrected<R: Real, const N: usize>(
                 };
                 let constant = one - s * x;
                 slope += s;
-                unroll!(l in 0..10, max 11, {
+                unroll!(l in 0..(2 * MAX), max 13, {
                     // With each factor it has one coefficient more.
-                    if const { 10 - l <= j + 1 } {
-                        q[10 - l] = constant * q[10 - l] + s * q[9 - l];
+                    if const { 2 * MAX - l <= j + 1 } {
+                        q[2 * MAX - l] = constant * q[2 * MAX - l] + s * q[2 * MAX - 1 - l];
                     }
                 });
                 q[0] = constant * q[0];
@@ -149,7 +154,7 @@ fn corrected<R: Real, const N: usize>(
         });
         let mut value = zero;
         let mut moved = zero;
-        unroll!(k in 0..(2 * N), max 11, {
+        unroll!(k in 0..(2 * N), max 13, {
             value += q[k] * rest[k];
             moved += q[k] * rest[k + 1];
         });
@@ -169,7 +174,7 @@ fn corrected<R: Real, const N: usize>(
             is_near = is_near & (is_small | !present);
         }
     });
-    unroll!(i in 0..N, max 6, {
+    unroll!(i in 0..N, max 7, {
         next.weights[i] = R::select(is_near, next.weights[i], found.weights[i]);
         next.reciprocals[i] = R::select(is_near, next.reciprocals[i], found.reciprocals[i]);
     });

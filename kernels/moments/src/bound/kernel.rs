@@ -4,7 +4,7 @@ use hankel_dsl::{Real, lit, unroll};
 
 use super::MAX;
 use super::recurrence::Recurrence;
-use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_two, whole};
+use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, product};
 
 /// What a query point makes of a recurrence.
@@ -63,7 +63,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let fine_b = recurrence.b;
         let mut a = [zero; MAX];
         let mut b = [zero; MAX + 1];
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             a[k] = fine_a[k].rounded();
             b[k + 1] = fine_b[k + 1].rounded();
         });
@@ -72,14 +72,14 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         y[1] = -a[0];
         if const { A::TWICE } {
             fine_y[1] = fine_a[0].scaled(-one);
-            unroll!(k in 1..N, max 6, {
+            unroll!(k in 1..N, max 7, {
                 let next = fine_a[k].sum_of_products(fine_y[1], fine_b[k], fine_y[0]).scaled(-one);
                 fine_y[0] = fine_y[1];
                 fine_y[1] = next;
                 y[k + 1] = next.rounded();
             });
         } else {
-            unroll!(k in 1..N, max 6, {
+            unroll!(k in 1..N, max 7, {
                 y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
             });
         }
@@ -87,23 +87,23 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         // The roots and the query point interlace with the roots of p_N, and how many of those
         // are below the query point is the number of permanences of sign (Sturm).
         let mut below = zero;
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             let (is, was) = (y[k + 1].ge(zero), y[k].ge(zero));
             below += R::select((is & was) | !(is | was), one, zero);
         });
         let count: R = whole(N);
         let turned = below.gt(count * lit!(0.5));
         let sign = R::select(turned, -one, one);
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             a[k] *= sign;
         });
-        unroll!(k in 0..(N + 1), max 6, {
+        unroll!(k in 0..(N + 1), max 7, {
             if const { k % 2 == 1 } {
                 y[k] *= sign;
             }
         });
         if const { A::TWICE } {
-            unroll!(k in 0..N, max 6, {
+            unroll!(k in 0..N, max 7, {
                 fine_a[k] = fine_a[k].scaled(sign);
             });
             let odd = const { N % 2 };
@@ -112,11 +112,11 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let few = R::select(turned, count - below, below);
 
         let mut c = [one; MAX + 1];
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             c[N - 1 - k] = c[N - k] * b[N - k];
         });
         let mut outer = zero;
-        unroll!(k in 2..(N + 1), max 6, {
+        unroll!(k in 2..(N + 1), max 7, {
             outer += c[k] * (y[k] * y[k]);
         });
         // The first two terms are the mean square times c_1.
@@ -136,9 +136,9 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let mut kernel = [zero; MAX + 1];
         p[0] = one;
         kernel[0] = one;
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             let mut next = [zero; MAX + 2];
-            unroll!(i in 0..6, max 6, {
+            unroll!(i in 0..(MAX + 1), max 7, {
                 if const { i <= k + 1 } {
                     let mut t = zero;
                     if const { i <= k } {
@@ -155,7 +155,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
             });
             before = p;
             p = next;
-            unroll!(i in 0..6, max 6, {
+            unroll!(i in 0..(MAX + 1), max 7, {
                 if const { i <= k } {
                     kernel[i] = b[k + 1] * kernel[i] + y[k + 1] * p[i];
                 } else if const { i == k + 1 } {
@@ -193,7 +193,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let one = A::of(lit!(1.0));
         let mut y = [one; MAX + 1];
         y[1] = self.fine_a[0].scaled(lit!(-1.0));
-        unroll!(k in 1..N, max 6, {
+        unroll!(k in 1..N, max 7, {
             let next = self.fine_a[k].sum_of_products(y[k], self.fine_b[k], y[k - 1]);
             y[k + 1] = next.scaled(lit!(-1.0));
         });
@@ -204,9 +204,9 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let mut weight = one;
         p[0] = one;
         kernel[0] = one;
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             let mut next = [zero; MAX + 2];
-            unroll!(i in 0..6, max 6, {
+            unroll!(i in 0..(MAX + 1), max 7, {
                 if const { i <= k + 1 } {
                     let mut t = zero;
                     if const { i <= k } {
@@ -224,7 +224,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
             before = p;
             p = next;
             weight = weight.times(self.fine_b[k + 1]);
-            unroll!(i in 0..6, max 6, {
+            unroll!(i in 0..(MAX + 1), max 7, {
                 if const { i <= k } {
                     kernel[i] = self.fine_b[k + 1].times(kernel[i]).plus(y[k + 1].times(p[i]));
                 } else if const { i == k + 1 } {
@@ -237,7 +237,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let largest: R = lit!(32.0);
         let mut e = [one; MAX + 1];
         let mut power = per_reach;
-        unroll!(i in 1..(N + 1), max 6, {
+        unroll!(i in 1..(N + 1), max 7, {
             e[i] = kernel[i].over(square).times_within(power, largest);
             power = power.times(per_reach);
         });
@@ -247,7 +247,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
     #[inline(always)]
     fn dot<const N: usize>(&self, x: &[R; MAX + 1], y: &[R; MAX + 1]) -> R {
         let mut sum = x[N] * y[N];
-        unroll!(k in 0..N, max 6, {
+        unroll!(k in 0..N, max 7, {
             sum += self.c[k] * (x[k] * y[k]);
         });
         sum
@@ -302,11 +302,11 @@ fn vector<R: Real, A: Arithmetic<R>, const N: usize>(kernel: &Kernel<R, A>, v: R
     }
     let mut z = [one; MAX + 1];
     z[1] = s - kernel.a[0] * t;
-    unroll!(k in 1..N, max 6, {
+    unroll!(k in 1..N, max 7, {
         z[k + 1] = (s - kernel.a[k] * t) * z[k] - kernel.b[k] * (t * t) * z[k - 1];
     });
     let mut power = t;
-    unroll!(k in 0..N, max 6, {
+    unroll!(k in 0..N, max 7, {
         z[N - 1 - k] *= power;
         power *= t;
     });
@@ -340,7 +340,7 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
     let mut h = [zero; MAX + 1];
     let mut before = A::of(zero);
     let mut fine = A::of(one);
-    unroll!(k in 0..N, max 6, {
+    unroll!(k in 0..N, max 7, {
         let factor = fine_s.minus(kernel.fine_a[k].times_plain(t));
         let slope = s_moves - t_moves * kernel.a[k];
         let f = factor.rounded();
@@ -392,7 +392,7 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
 
     let mut power = one;
     let t = t + t_moves * step;
-    unroll!(k in 0..(N + 1), max 6, {
+    unroll!(k in 0..(N + 1), max 7, {
         z[N - k] = (z[N - k] + step * (d[N - k] + step * h[N - k])) * power;
         power *= t;
     });
@@ -410,7 +410,7 @@ fn freed<R: Real, A: Arithmetic<R>, const N: usize>(
     let z = vector::<R, A, N>(kernel, v);
     let shared = kernel.dot::<N>(&z, &kernel.y) / kernel.square;
     let mut x = z;
-    unroll!(k in 0..(N + 1), max 6, {
+    unroll!(k in 0..(N + 1), max 7, {
         x[k] = z[k] - shared * kernel.y[k];
     });
     let least: R = lit!(1e-37);
@@ -459,10 +459,14 @@ pub(crate) fn weight<R: Real, A: Arithmetic<R>, const N: usize>(kernel: &Kernel<
     } else if const { N == 3 } {
         weight_of::<R, A, N>(kernel, least_of_cubic(&kernel.e))
     } else {
-        let (first, second) = if const { N == 4 } {
-            least_two::<R, 4, 3>(&kernel.e)
+        let (first, second, third) = if const { N == 4 } {
+            let (first, second) = least_two::<R, 4, 3>(&kernel.e);
+            (first, second, zero)
+        } else if const { N == 5 } {
+            let (first, second) = least_two::<R, 5, 4>(&kernel.e);
+            (first, second, zero)
         } else {
-            least_two::<R, 5, 4>(&kernel.e)
+            least_three(&kernel.e)
         };
         let (x, x_square) = freed::<R, A, N>(kernel, first);
         let (z, z_square) = freed::<R, A, N>(kernel, second);
@@ -473,7 +477,23 @@ pub(crate) fn weight<R: Real, A: Arithmetic<R>, const N: usize>(kernel: &Kernel<
         let overlap = kernel.dot::<N>(&x, &z);
         let cosine = ((overlap / x_square) * (overlap / z_square)).min(lit!(0.5));
         let both = single + kernel.c[0] * z_share * (z[0] - x_share * overlap * lit!(2.0));
-        R::select(kernel.few.gt(one), both / (one - cosine), single)
+        let two = R::select(kernel.few.gt(one), both / (one - cosine), single);
+        if const { N < 6 } {
+            two
+        } else {
+            // What the third vector adds, without what it shares with that space.
+            let (w, w_square) = freed::<R, A, N>(kernel, third);
+            let by_x = kernel.dot::<N>(&w, &x);
+            let by_z = kernel.dot::<N>(&w, &z) - by_x * (overlap / x_square);
+            let z_rest = z_square * (one - cosine);
+            let z_first = (z[0] - x_share * overlap) / z_rest;
+            let first = w[0] - by_x * x_share - by_z * z_first;
+            let shared =
+                (by_x / x_square) * (by_x / w_square) + (by_z / z_rest) * (by_z / w_square);
+            let rest = w_square * (one - shared.min(lit!(0.5)));
+            let all = two + kernel.c[0] * first * (first / rest);
+            R::select(kernel.few.gt(lit!(2.0)), all, two)
+        }
     };
     R::select(kernel.few.gt(zero), weight.clamp(zero, kernel.others), zero)
 }
@@ -497,7 +517,7 @@ fn reversed<R: Real, const N: usize>(kernel: &[R; MAX + 1]) -> (Monic<R>, R) {
     let largest: R = lit!(32.0);
     let mut e = [one; MAX + 1];
     let mut power = per_reach;
-    unroll!(i in 1..(N + 1), max 6, {
+    unroll!(i in 1..(N + 1), max 7, {
         e[i] = (ratio(kernel[i]) * power).clamp(-largest, largest);
         power *= per_reach;
     });

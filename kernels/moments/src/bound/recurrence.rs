@@ -47,7 +47,9 @@ pub(crate) fn finite<R: Real>(x: R, largest: R) -> R {
 /// range.
 #[inline(always)]
 fn farthest<R: Real, A: Arithmetic<R>, const N: usize>() -> R {
-    if const { !A::TWICE } {
+    if const { N == 6 && !R::IS_WIDE } {
+        lit!(400.0)
+    } else if const { !A::TWICE } {
         let half: R = lit!(0.5);
         half / R::epsilon().sqrt()
     } else if const { R::IS_WIDE } {
@@ -198,6 +200,8 @@ fn depth_unit<R: Real, const N: usize>(mean_square: R) -> R {
         unit.clamp(lit!(two_to(-18)), lit!(two_to(18)))
     } else if const { N == 4 } {
         unit.clamp(lit!(two_to(-13)), lit!(two_to(13)))
+    } else if const { N == 6 } {
+        unit.clamp(lit!(two_to(-9)), lit!(two_to(9)))
     } else {
         unit.clamp(lit!(two_to(-10)), lit!(two_to(10)))
     }
@@ -235,7 +239,7 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
             R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)))
         };
         current[0] = A::of(scaled_total);
-        unroll!(k in 1..(2 * N + 1), max 11, {
+        unroll!(k in 1..(2 * N + 1), max 13, {
             current[k] = A::of(finite(finite(m[k], lit!(1e37)) * lift * scale, largest));
         });
         // In a length near the root of the mean square depth, even moments are 1 and more.
@@ -245,7 +249,7 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
             length = depth_unit::<R, N>(current[2].rounded() / scaled_total);
             let per_length = one / length;
             let mut power = one;
-            unroll!(k in 1..(2 * N + 1), max 11, {
+            unroll!(k in 1..(2 * N + 1), max 13, {
                 power *= per_length;
                 let scaled = current[k].rounded() * power;
                 current[k] = A::of(finite(scaled, largest));
@@ -280,9 +284,9 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
         } else {
             alpha.minus(query)
         };
-        unroll!(k in 1..(N + 1), max 6, {
+        unroll!(k in 1..(N + 1), max 7, {
             let mut next = current;
-            unroll!(l in 1..10, max 11, {
+            unroll!(l in 1..(2 * MAX), max 13, {
                 if const { A::TWICE && k == 1 && l < 2 * N } {
                     let (of_this, of_next) = (raw[l].rounded(), raw[l + 1].rounded());
                     let t = A::difference(scaled_total, of_next, raw[1].rounded(), of_this);
@@ -353,14 +357,14 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
         if const { A::TWICE } {
             let per_unit = one / unit;
             let per_square = per_unit * per_unit;
-            unroll!(k in 0..N, max 6, {
+            unroll!(k in 0..N, max 7, {
                 a[k] = a[k].scaled(per_unit);
                 b[k + 1] = b[k + 1].scaled(per_square).within(zero, most);
             });
             square *= per_square;
             unit *= length;
         } else if const { N > 2 } {
-            unroll!(k in 0..N, max 6, {
+            unroll!(k in 0..N, max 7, {
                 a[k] = A::of(a[k].rounded() / unit);
                 b[k + 1] = A::of((b[k + 1].rounded() / square).min(most));
             });

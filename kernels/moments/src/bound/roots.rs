@@ -12,7 +12,7 @@ pub(crate) type Monic<R> = [R; MAX + 1];
 
 /// The most steps of Laguerre's method towards a root. Near a root each is cubic, and three or four
 /// are enough. Of a distant group of roots each only takes off a share of the distance, for four of five
-/// roots five eighths: so many steps go down to a rounding error of the largest root.
+/// roots five eighths, for five of six three fifths: so many steps go down to a rounding error of the largest root.
 const STEPS: u32 = 18;
 const STEPS_WIDE: u32 = 40;
 
@@ -30,7 +30,9 @@ pub(crate) fn whole<R: Real>(k: usize) -> R {
         7 => lit!(7.0),
         8 => lit!(8.0),
         9 => lit!(9.0),
-        _ => lit!(10.0),
+        10 => lit!(10.0),
+        11 => lit!(11.0),
+        _ => lit!(12.0),
     }
 }
 
@@ -41,7 +43,7 @@ fn value<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R, R) {
     let mut p = e[0];
     let mut d = zero;
     let mut h = zero;
-    unroll!(i in 1..(DEGREE + 1), max 6, {
+    unroll!(i in 1..(DEGREE + 1), max 7, {
         h = h * v + d;
         d = d * v + p;
         p = p * v + e[i];
@@ -159,7 +161,7 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
     let mut derivative = *e;
-    unroll!(i in 1..(REDUCED + 1), max 6, {
+    unroll!(i in 1..(REDUCED + 1), max 7, {
         derivative[i] = e[i] * (whole::<R>(DEGREE - i) / whole::<R>(DEGREE));
     });
     let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
@@ -175,6 +177,26 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
     )
 }
 
+/// The three least roots of a polynomial of degree 6, where they are negative; else 0.
+///
+/// Its derivative's two least roots separate them. Each pair that nearly coincides is told apart from
+/// between, as [`least_two`] does it; so are stationary points of three roots that are close together.
+#[inline(always)]
+pub(crate) fn least_three<R: Real>(e: &Monic<R>) -> (R, R, R) {
+    let one: R = lit!(1.0);
+    let zero: R = lit!(0.0);
+    let mut derivative = *e;
+    unroll!(i in 1..6, max 7, {
+        derivative[i] = e[i] * (whole::<R>(6 - i) / whole::<R>(6));
+    });
+    let (first, second) = least_two::<R, 5, 4>(&derivative);
+    (
+        approach::<R, 6>(e, first, -one, -one, -one, zero),
+        approach::<R, 6>(e, first, one, -one, -one, zero),
+        approach::<R, 6>(e, second, one, one, -one, zero),
+    )
+}
+
 /// All roots in ascending order: those of each derivative bracket those of the one before
 /// (C. Yuksel, *High-Performance Polynomial Root Finding for Graphics*, 2022), here with Laguerre's
 /// steps, which need no bisection.
@@ -183,14 +205,14 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
     let mut stationary = [zero; MAX];
-    unroll!(d in 1..6, max 6, {
+    unroll!(d in 1..(MAX + 1), max 7, {
         if const { d <= DEGREE } {
             // The derivative of degree d: monic again.
             let mut derivative = *e;
-            unroll!(i in 1..6, max 6, {
+            unroll!(i in 1..(MAX + 1), max 7, {
                 if const { i <= d } {
                     let mut ratio = one;
-                    unroll!(j in 0..5, max 6, {
+                    unroll!(j in 0..MAX, max 7, {
                         if const { j < i } {
                             ratio *= whole::<R>(d - j) / whole::<R>(DEGREE - j);
                         }
@@ -199,7 +221,7 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
                 }
             });
             let mut roots = stationary;
-            unroll!(i in 0..5, max 6, {
+            unroll!(i in 0..MAX, max 7, {
                 if const { d == 1 } {
                     roots[0] = -derivative[1];
                 } else if const { i < d } {
