@@ -50,6 +50,8 @@ fn maps_over_rows_are_clean() {
             "moment_bound",
             "moment_bound_adjoint",
             "moment_bound_compensated",
+            "canonical",
+            "canonical_adjoint",
         ];
         kinds.map(|kind| format!("{kind}_n{n}"))
     });

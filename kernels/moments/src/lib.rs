@@ -50,8 +50,8 @@ pub use bias::Bias;
 pub use blockers::Blockers;
 pub use bound::{
     Bounds, Canonical, Gradient, MAX, MAX_MOMENTS, bias_target, bound, bound_adjoint,
-    bound_adjoint_compensated, bound_compensated, canonical, canonical_compensated, mix_bias,
-    mix_bias_adjoint, mix_bias_and_total,
+    bound_adjoint_compensated, bound_compensated, canonical, canonical_adjoint,
+    canonical_compensated, mix_bias, mix_bias_adjoint, mix_bias_and_total,
 };
 pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degenerate_6};
 pub use exponential::{markov_1, warped_2};

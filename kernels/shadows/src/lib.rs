@@ -36,6 +36,7 @@ mod filtered;
 
 pub mod blur;
 pub mod bounds;
+pub mod canonical;
 pub mod convolution;
 pub mod depth;
 pub mod exponential;
@@ -173,6 +174,16 @@ hankel_dsl::kernels![
     moment_bounds::moment_bound_adjoint_compensated_n1,
     moment_bounds::moment_bound_adjoint_compensated_n2,
     moment_bounds::moment_bound_adjoint_compensated_n3,
+    canonical::canonical_n1,
+    canonical::canonical_n2,
+    canonical::canonical_n3,
+    canonical::canonical_n4,
+    canonical::canonical_n5,
+    canonical::canonical_adjoint_n1,
+    canonical::canonical_adjoint_n2,
+    canonical::canonical_adjoint_n3,
+    canonical::canonical_adjoint_n4,
+    canonical::canonical_adjoint_n5,
     six::hamburger_6msm,
     six::hamburger_6msm_compensated,
     trigonometric::trigonometric_4msm,

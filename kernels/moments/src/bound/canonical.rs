@@ -22,6 +22,18 @@ pub struct Canonical<R> {
     pub own: R,
 }
 
+impl<R: Real> Canonical<R> {
+    /// No points and no weight: all numbers are 0.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Self {
+            reciprocals: [lit!(0.0); MAX],
+            weights: [lit!(0.0); MAX],
+            own: lit!(0.0),
+        }
+    }
+}
+
 /// The canonical representation. Takes anything that [`bound`](super::bound) takes; weights are
 /// from 0 to the total.
 ///

@@ -13,6 +13,7 @@
 
 mod adjoint;
 mod canonical;
+mod canonical_adjoint;
 mod kernel;
 mod recurrence;
 mod roots;
@@ -22,6 +23,7 @@ use hankel_dsl::{Real, lit};
 
 pub use adjoint::{Gradient, bound_adjoint, bound_adjoint_compensated, mix_bias_adjoint};
 pub use canonical::{Canonical, canonical, canonical_compensated};
+pub use canonical_adjoint::canonical_adjoint;
 use kernel::Kernel;
 use recurrence::Recurrence;
 use twofold::{Arithmetic, Plain, Twofold};

@@ -2,6 +2,7 @@
 //! distributions, as renderers meet them and as papers measure with, and ([`maps`]) shadow maps.
 //! Only for the host: parity runs them.
 
+pub mod canonical;
 pub mod maps;
 pub mod mips;
 pub mod scattering;
