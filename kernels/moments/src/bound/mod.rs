@@ -24,7 +24,7 @@ pub use adjoint::{Gradient, bound_adjoint, bound_adjoint_compensated, mix_bias_a
 pub use canonical::{Canonical, canonical, canonical_compensated};
 use kernel::Kernel;
 use recurrence::Recurrence;
-use twofold::{Arithmetic, Plain, Twofold};
+pub(crate) use twofold::{Arithmetic, Plain, Twofold};
 
 /// The largest N.
 pub const MAX: usize = 5;
