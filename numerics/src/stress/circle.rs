@@ -37,16 +37,15 @@ pub fn pi() -> Wide {
 
 /// Cosine and sine of πz for z from 0 to 1, by Taylor's series about 1/2 with 80 terms: what remains is below 1e-100.
 pub fn half_angle<R: Real + From<f64>>(z: R, pi: R) -> (R, R) {
-    let number = |x: f64| R::from(x);
-    let x = (z - number(0.5)) * pi;
-    let (mut cos, mut sin) = (number(0.0), number(0.0));
-    let mut term = number(1.0);
+    let x = (z - R::from(0.5)) * pi;
+    let (mut cos, mut sin) = (R::from(0.0), R::from(0.0));
+    let mut term = R::from(1.0);
     for k in 0..40 {
         let k = f64::from(2 * k);
         cos += term;
-        term = term * x / number(k + 1.0);
+        term = term * x / R::from(k + 1.0);
         sin += term;
-        term = -(term * x / number(k + 2.0));
+        term = -(term * x / R::from(k + 2.0));
     }
     (-sin, cos)
 }
@@ -127,7 +126,7 @@ impl Kernel {
         a.x * (self.xx * b.x + self.xy * b.y) + a.y * (self.xy * b.x + self.yy * b.y)
     }
 
-    fn from_mean(&self, a: Vector) -> Vector {
+    fn relative(&self, a: Vector) -> Vector {
         Vector {
             x: a.x - self.mean.x,
             y: a.y - self.mean.y,
@@ -135,12 +134,12 @@ impl Kernel {
     }
 
     fn value(&self, a: Vector, b: Vector) -> Wide {
-        wide(1.0) + self.product(self.from_mean(a), self.from_mean(b))
+        wide(1.0) + self.product(self.relative(a), self.relative(b))
     }
 
     /// Half the angle of the first direction from depth 0 on where K with `a` is 0; there it is `at_start`.
     fn zero(&self, a: Vector, at_start: Wide) -> Vector {
-        let a = self.from_mean(a);
+        let a = self.relative(a);
         let x = self.xx * a.x + self.xy * a.y;
         let y = self.xy * a.x + self.yy * a.y;
         let sign = wide(if at_start < wide(0.0) { -1.0 } else { 1.0 });
@@ -177,11 +176,8 @@ fn lower(m: [Wide; 4], query: Vector) -> Wide {
                 // 1/w and two derivatives to the angle.
                 let x = half.doubled();
                 let tangent = Vector { x: -x.y, y: x.x };
-                let (from_mean, to_s, to_q) = (
-                    kernel.from_mean(x),
-                    kernel.from_mean(s),
-                    kernel.from_mean(q),
-                );
+                let (from_mean, to_s, to_q) =
+                    (kernel.relative(x), kernel.relative(s), kernel.relative(q));
                 let (own, ks, kq) = (kernel.value(x, x), kernel.value(x, s), kernel.value(x, q));
                 let (ds, dq) = (kernel.product(tangent, to_s), kernel.product(tangent, to_q));
                 let (bs, bq) = (-kernel.product(x, to_s), -kernel.product(x, to_q));
