@@ -629,6 +629,11 @@ fn bounds_are_put_under_stress() {
         .code(0)
         .out();
     assert!(out.contains("| 1 | f64       | plain"), "{out}");
+    let out = desk
+        .hankel("stress --shadows --samples 16 --precision f32")
+        .code(0)
+        .out();
+    assert!(out.contains("trigonometric bound"), "{out}");
     let json = desk
         .hankel("stress --family one-texel --n 1 --samples 50 --format json")
         .code(0)

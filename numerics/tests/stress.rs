@@ -5,6 +5,7 @@ use hankel_moments::{Bounds, MAX_MOMENTS, Moments6, hamburger_6, hamburger_6_com
 use hankel_numerics::accuracy::{singularities, table_1};
 use hankel_numerics::families::{FAMILIES, Family, ORDERS, Precision, Row, scaled, validity};
 use hankel_numerics::numbers::DoubleDouble;
+use hankel_numerics::stress::shadows::{self, Form};
 use hankel_numerics::stress::{
     Backend, BackendError, Cell, Native, Options, Solver, Stress, StressError,
     gradient_by_differences, gradient_of, judgement, run,
@@ -219,6 +220,31 @@ fn compensated_six_moment_shadows_are_as_exact_as_their_inputs() {
         }
     }
     assert!(rows > 1000 && plain > 10.0, "{rows} {plain}");
+}
+
+/// Trigonometric moments, and the Hausdorff problem.
+#[test]
+fn compensated_shadows_of_four_numbers_are_as_exact_as_their_inputs() {
+    let options = shadows::Options {
+        samples: 200,
+        ..shadows::Options::default()
+    };
+    let found = shadows::measure(&options, &mut |_| ()).unwrap();
+    assert!(found.passed());
+    let mut valid = 0;
+    for line in &found.lines {
+        let Some(over) = line.over.filter(|_| line.form == Form::Compensated) else {
+            continue;
+        };
+        assert!(over.greatest <= 4.0, "{line:?}");
+        valid += line.valid;
+    }
+    assert!(valid > 10_000, "{valid}");
+    // Without compensation, some rows are far beyond that.
+    for bound in shadows::BOUNDS {
+        let plain = found.greatest(bound, Form::Plain);
+        assert!(plain > 100.0, "{bound:?}: {plain}");
+    }
 }
 
 #[test]

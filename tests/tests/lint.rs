@@ -60,8 +60,10 @@ fn maps_over_rows_are_clean() {
         "hamburger_6msm_compensated",
         "hamburger_4msm",
         "hausdorff_4msm",
+        "hausdorff_4msm_compensated",
         "hamburger_6msm",
         "trigonometric_4msm",
+        "trigonometric_4msm_compensated",
         "vsm",
         "quantize_4_unit",
     ];

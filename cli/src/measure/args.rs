@@ -202,6 +202,7 @@ Examples:
   hankel stress --backend vulkan --precision f32
   hankel stress --against diffmoments --python venv/bin/python --out report
   hankel stress --singularities --samples 5000
+  hankel stress --shadows
   hankel stress --biases
 
 Exit code 1: a kernel gave something that is no number or not from 0 to m_0, or lanes gave other
@@ -219,8 +220,8 @@ pub struct Stress {
     /// Only these families of rows; several with commas between, or repeated.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub family: Vec<String>,
-    /// Rows of each family, order and precision; moment vectors for --singularities; regions for
-    /// each strength for --biases [default: 10000; 400; 4000000].
+    /// Rows of each family, order and precision; moment vectors for --singularities; rows of each
+    /// family for --shadows; regions for each strength for --biases [default: 10000; 400; 1000; 4000000].
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(16..=MOST_SAMPLES))]
     pub samples: Option<u64>,
     /// Only this precision.
@@ -238,6 +239,9 @@ pub struct Stress {
     /// Only bounds and derivatives at singularities and next to them.
     #[arg(long, conflicts_with_all = ["family", "biases"])]
     pub singularities: bool,
+    /// Instead, bounds by trigonometric moments and by four power moments of depths in a range.
+    #[arg(long, conflicts_with_all = ["n", "family", "backend", "against", "singularities", "biases"])]
+    pub shadows: bool,
     /// Instead, search the least biases that keep stored moments valid (minutes).
     #[arg(long, conflicts_with_all = ["n", "family", "precision", "against"])]
     pub biases: bool,

@@ -7,7 +7,7 @@ use hankel_numerics::biases;
 use hankel_numerics::families::{ORDERS, Precision};
 use hankel_numerics::peer::default_python;
 use hankel_numerics::report::Report;
-use hankel_numerics::stress::{self, BackendError, Native};
+use hankel_numerics::stress::{self, BackendError, Native, shadows};
 use hankel_system::output;
 
 use super::args::{Rival, Stress};
@@ -28,6 +28,8 @@ pub fn run(args: &Stress, quiet: bool) -> Result<Outcome> {
     progress.begin("Measuring bounds");
     let (report, passed) = if args.biases {
         (of_biases(args, &progress)?, true)
+    } else if args.shadows {
+        of_shadows(args, &progress)?
     } else if args.singularities {
         of_singularities(args, args.samples, &progress)?
     } else {
@@ -109,6 +111,19 @@ fn of_singularities(
         options.samples = samples;
     }
     let found = singularities::measure(&options, &mut |step| progress.detail(step))?;
+    Ok((found.report(&command_line()), found.passed()))
+}
+
+fn of_shadows(args: &Stress, progress: &Progress) -> Result<(Report, bool)> {
+    let mut options = shadows::Options {
+        precisions: precisions(args),
+        seed: args.seed,
+        ..shadows::Options::default()
+    };
+    if let Some(samples) = args.samples {
+        options.samples = samples;
+    }
+    let found = shadows::measure(&options, &mut |step| progress.detail(step))?;
     Ok((found.report(&command_line()), found.passed()))
 }
 

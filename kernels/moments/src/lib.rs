@@ -57,7 +57,9 @@ pub use degenerate::{Degenerate4, Degenerate6, ThreePoints, degenerate_4, degene
 pub use exponential::{markov_1, warped_2};
 pub use fourier::{OddHarmonics, fourier_light};
 pub use hamburger::{blockers_4, hamburger_4, hamburger_4_bounds};
-pub use hausdorff::{hausdorff_4, hausdorff_4_symmetric};
+pub use hausdorff::{
+    hausdorff_4, hausdorff_4_compensated, hausdorff_4_symmetric, hausdorff_4_symmetric_compensated,
+};
 pub use leak::cut_leak;
 pub use moments::{Moments4, Moments6};
 pub use quantization::{
@@ -72,5 +74,8 @@ pub use scattering::{
 };
 pub use six::{blockers_6, hamburger_6, hamburger_6_compensated};
 pub use sparse::{TwoPoints, sparse_2};
-pub use trigonometric::{HalfAngle, TrigonometricMoments, trigonometric_4, trigonometric_4_lower};
+pub use trigonometric::{
+    HalfAngle, TrigonometricMoments, trigonometric_4, trigonometric_4_compensated,
+    trigonometric_4_lower,
+};
 pub use variance::{blockers_2, variance_2};

@@ -32,8 +32,15 @@
 //! - m on the other side: 0.
 //!
 //! The greatest share is 1 minus the least on the complement, by mirroring depths.
+//!
+//! [`trigonometric_4_compensated`] computes the same in about twice the digits. It is a source of its own: libraries of
+//! functions are written from the plain one, which they need without generic arithmetic.
+
+mod compensated;
 
 use hankel_dsl::{Element, Real, lit, unroll};
+
+pub use compensated::trigonometric_4_compensated;
 
 use crate::bound::Bounds;
 use crate::moments::within;

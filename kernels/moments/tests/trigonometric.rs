@@ -7,7 +7,9 @@ mod programme;
 use std::f64::consts::{PI, TAU};
 
 use common::{Distribution, distribution};
-use hankel_moments::{Bounds, HalfAngle, TrigonometricMoments, trigonometric_4};
+use hankel_moments::{
+    Bounds, HalfAngle, TrigonometricMoments, trigonometric_4, trigonometric_4_compensated,
+};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -63,9 +65,19 @@ proptest! {
     #[test]
     fn the_distribution_lies_between_the_bounds(d in distribution(8), z in 0.0..=1.0_f64) {
         let below = d.below(z);
-        let bounds = bounds(moments(&d), z);
-        prop_assert!(bounds.lower <= below + TOLERANCE, "{bounds:?} {below}");
-        prop_assert!(below <= bounds.upper + TOLERANCE, "{bounds:?} {below}");
+        for bounds in [bounds(moments(&d), z), trigonometric_4_compensated(moments(&d), z)] {
+            prop_assert!(bounds.lower <= below + TOLERANCE, "{bounds:?} {below}");
+            prop_assert!(below <= bounds.upper + TOLERANCE, "{bounds:?} {below}");
+        }
+    }
+
+    /// Away from singularities plain arithmetic is exact enough to compare with.
+    #[test]
+    fn both_forms_are_the_same_bounds(d in distribution(8), z in 0.0..=1.0_f64) {
+        let m = moments(&d).biased(1e-3);
+        let (a, b) = (bounds(m, z), trigonometric_4_compensated(m, z));
+        prop_assert!((a.lower - b.lower).abs() < 1e-9, "{a:?} {b:?}");
+        prop_assert!((a.upper - b.upper).abs() < 1e-9, "{a:?} {b:?}");
     }
 
     /// Both bounds of one or two surfaces are their share, and a bias moves them in proportion.
@@ -150,15 +162,24 @@ proptest! {
     ) {
         for [c1, s1, c2, s2, z, other] in [bits.map(f32::from_bits), plausible, small] {
             let m = TrigonometricMoments { c1, s1, c2, s2 };
-            for query in [HalfAngle::of_depth(z), HalfAngle::of_vector(z, other)] {
-                let bounds = trigonometric_4(m, query);
+            let by_vector = HalfAngle::of_vector(z, other);
+            for bounds in [
+                trigonometric_4(m, HalfAngle::of_depth(z)),
+                trigonometric_4(m, by_vector),
+                trigonometric_4_compensated(m, z),
+            ] {
                 prop_assert!(0.0 <= bounds.lower && bounds.lower <= bounds.upper, "{bounds:?}");
                 prop_assert!(bounds.upper <= 1.0, "{bounds:?}");
             }
         }
         let [c1, s1, c2, s2, z, other] = wide.map(f64::from_bits);
-        for query in [HalfAngle::of_depth(z), HalfAngle::of_vector(z, other)] {
-            let bounds = trigonometric_4(TrigonometricMoments { c1, s1, c2, s2 }, query);
+        let m = TrigonometricMoments { c1, s1, c2, s2 };
+        let by_vector = HalfAngle::of_vector(z, other);
+        for bounds in [
+            trigonometric_4(m, HalfAngle::of_depth(z)),
+            trigonometric_4(m, by_vector),
+            trigonometric_4_compensated(m, z),
+        ] {
             prop_assert!(0.0 <= bounds.lower && bounds.lower <= bounds.upper, "{bounds:?}");
             prop_assert!(bounds.upper <= 1.0, "{bounds:?}");
         }
@@ -181,8 +202,11 @@ proptest! {
                 c2: m.c2 + amount * noise[2],
                 s2: m.s2 + amount * noise[3],
             };
-            let bounds = trigonometric_4(m, HalfAngle::of_depth(z));
-            prop_assert!(0.0 <= bounds.lower && bounds.lower <= bounds.upper && bounds.upper <= 1.0);
+            let query = HalfAngle::of_depth(z);
+            for bounds in [trigonometric_4(m, query), trigonometric_4_compensated(m, z)] {
+                prop_assert!(0.0 <= bounds.lower && bounds.lower <= bounds.upper);
+                prop_assert!(bounds.upper <= 1.0);
+            }
         }
     }
 

@@ -2,7 +2,9 @@
 //! `hankel eval`, and for parity in both precisions.
 
 use hankel_dsl::{Element, Real, kernel};
-use hankel_moments::{Moments4, cut_leak, hamburger_4, hausdorff_4, variance_2};
+use hankel_moments::{
+    Moments4, cut_leak, hamburger_4, hausdorff_4, hausdorff_4_compensated, variance_2,
+};
 
 /// How a bound is turned into a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -104,6 +106,26 @@ pub fn hausdorff_4msm<R: Real>(
 ) -> Shadow<R> {
     let (m, z) = biased(settings, receiver);
     cut(hausdorff_4(m, z), settings)
+}
+
+/// `hausdorff_4msm` with what is ill-conditioned in about twice the digits.
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    pinned,
+    inputs = crate::inputs::unit_receivers_4,
+    parity(
+        absolute = 2e-45,
+        why = "shaders take a product's error from partial products, which may underflow: one subnormal step"
+    )
+)]
+pub fn hausdorff_4msm_compensated<R: Real>(
+    #[uniform] settings: &Settings<R>,
+    #[element] receiver: Receiver4<R>,
+) -> Shadow<R> {
+    let (m, z) = biased(settings, receiver);
+    cut(hausdorff_4_compensated(m, z), settings)
 }
 
 /// Variance shadow mapping: the least shadow that two moments allow.

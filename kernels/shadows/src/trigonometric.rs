@@ -2,7 +2,9 @@
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
-use hankel_moments::{HalfAngle, TrigonometricMoments, cut_leak, trigonometric_4};
+use hankel_moments::{
+    Bounds, HalfAngle, TrigonometricMoments, cut_leak, trigonometric_4, trigonometric_4_compensated,
+};
 
 use crate::bounds::Shadow;
 use crate::resolve::mean;
@@ -58,6 +60,19 @@ pub struct UnitDepth<R> {
     pub depth: R,
 }
 
+#[inline(always)]
+fn shadow<R: Real>(
+    settings: &TrigonometricSettings<R>,
+    receiver: TrigonometricReceiver<R>,
+    bounds: impl FnOnce(TrigonometricMoments<R>, R) -> Bounds<R>,
+) -> Shadow<R> {
+    let m = receiver.moments.biased(settings.moment_bias);
+    let bounds = bounds(m, receiver.depth - settings.depth_bias);
+    Shadow {
+        shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
+    }
+}
+
 /// Trigonometric moment shadow mapping: the shadow that two complex trigonometric moments allow,
 /// for depths in [0, 1].
 #[kernel(
@@ -70,12 +85,28 @@ pub fn trigonometric_4msm<R: Real>(
     #[uniform] settings: &TrigonometricSettings<R>,
     #[element] receiver: TrigonometricReceiver<R>,
 ) -> Shadow<R> {
-    let m = receiver.moments.biased(settings.moment_bias);
-    let query = HalfAngle::of_depth(receiver.depth - settings.depth_bias);
-    let bounds = trigonometric_4(m, query);
-    Shadow {
-        shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
-    }
+    shadow(settings, receiver, |m, z| {
+        trigonometric_4(m, HalfAngle::of_depth(z))
+    })
+}
+
+/// `trigonometric_4msm` with what is ill-conditioned in about twice the digits.
+#[kernel(
+    compute,
+    threads(64),
+    precision(f32, f64),
+    pinned,
+    inputs = crate::inputs::trigonometric_receivers,
+    parity(
+        absolute = 2e-45,
+        why = "shaders take a product's error from partial products, which may underflow: one subnormal step"
+    )
+)]
+pub fn trigonometric_4msm_compensated<R: Real>(
+    #[uniform] settings: &TrigonometricSettings<R>,
+    #[element] receiver: TrigonometricReceiver<R>,
+) -> Shadow<R> {
+    shadow(settings, receiver, trigonometric_4_compensated)
 }
 
 /// The trigonometric moments of one depth: what a map for them stores.

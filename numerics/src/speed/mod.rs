@@ -11,7 +11,7 @@
 pub mod count;
 mod errors;
 mod machine;
-mod native;
+pub(crate) mod native;
 mod tables;
 mod worker;
 

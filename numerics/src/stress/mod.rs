@@ -9,8 +9,10 @@
 //! is not enough; samples of it are compared with 300 bits and with the linear programme.
 
 mod backend;
+mod circle;
 mod derivatives;
 mod reference;
+pub mod shadows;
 mod tables;
 
 pub use backend::{Backend, BackendError, LANES, Map, Native};

@@ -58,7 +58,7 @@ pub fn gradient_of<R: Real>(
 /// The step of differences in 300 bits, for moments with a total near 1. What it leaves out is less than 1e-30 of a
 /// derivative, unless pivots of the Hankel matrix are below 1e-33; what rounding does to a difference is 1e-42 of the
 /// total.
-const STEP: f64 = 1.0 / (1_u128 << 80) as f64 / (1_u128 << 80) as f64;
+pub(super) const STEP: f64 = 1.0 / (1_u128 << 80) as f64 / (1_u128 << 80) as f64;
 
 /// A function of a row a step further in one direction, a step back, and twice the step: moments in their
 /// order, then the query point.

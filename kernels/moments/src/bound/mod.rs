@@ -26,7 +26,7 @@ pub use canonical::{Canonical, canonical, canonical_compensated};
 pub use canonical_adjoint::canonical_adjoint;
 use kernel::Kernel;
 use recurrence::Recurrence;
-use twofold::{Arithmetic, Plain, Twofold};
+pub(crate) use twofold::{Arithmetic, Plain, Twofold};
 
 /// The largest N.
 pub const MAX: usize = 6;
