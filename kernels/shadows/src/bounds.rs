@@ -98,6 +98,7 @@ pub fn hamburger_4msm<R: Real>(
     compute,
     threads(64),
     precision(f32, f64),
+    compensated = hausdorff_4msm_compensated,
     inputs = crate::inputs::unit_receivers_4
 )]
 pub fn hausdorff_4msm<R: Real>(

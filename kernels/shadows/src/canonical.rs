@@ -28,7 +28,7 @@ macro_rules! order {
         $(#[$doc:meta])* $canonical:ident,
         $(#[$adjoint_doc:meta])* $adjoint:ident
     ) => {
-        /// Points and weights, the query point among them, or what each of these numbers is worth.
+        /// Points and weights, the query point among them, or the upstream gradient to each of these numbers.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
         #[repr(C)]
         pub struct $Canonical<R> {

@@ -79,6 +79,7 @@ fn shadow<R: Real>(
     compute,
     threads(64),
     precision(f32, f64),
+    compensated = trigonometric_4msm_compensated,
     inputs = crate::inputs::trigonometric_receivers
 )]
 pub fn trigonometric_4msm<R: Real>(

@@ -101,8 +101,9 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
 ///
 /// Its matrix is a confluent Vandermonde matrix, and its inverse is made of Hermite's basis
 /// polynomials, by which each unknown has a formula of its own. What is left of the moments is as
-/// inexact as their last digits, so that one step is enough; roots for twelve moments are so inexact that it takes two. Where it would go far, moments are
-/// degenerate and digits have nothing to say: there all stays as it is.
+/// inexact as their last digits, so that one step is enough; roots for twelve moments are so inexact that it
+/// takes two. Where a step would go far, moments are degenerate and their digits say nothing: there all stays
+/// as it is.
 #[inline(always)]
 fn corrected<R: Real, const N: usize>(
     m: &[R; MAX_MOMENTS],

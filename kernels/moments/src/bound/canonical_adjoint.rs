@@ -33,7 +33,7 @@ use super::{MAX, MAX_MOMENTS};
 /// The largest magnitude of a factor.
 const LIMIT: f64 = 1e25;
 
-/// A point other than the query point, and what it is worth.
+/// A point other than the query point, with its upstream gradients.
 #[derive(Clone, Copy)]
 struct Node<R> {
     /// The reciprocal of its distance, as the kernel has it: divided by the reach.
@@ -53,8 +53,8 @@ struct Place<R> {
     size: R,
 }
 
-/// What [`canonical`](super::canonical) gives as seen from behind: from the gradient to reciprocals,
-/// weights and own weight, `d`, that to moments and query point. What `d` has beyond N is not used.
+/// The adjoint of [`canonical`](super::canonical): from the upstream gradient `d` to reciprocals, weights and own
+/// weight, the gradient to moments and query point. What `d` has beyond N is not used.
 ///
 /// Takes anything that [`canonical`](super::canonical) takes. Of a point at infinity the weight has the derivative
 /// 0. Points that coincide, and weights of 0, are those of degenerate moments, which have no derivatives: there
@@ -91,7 +91,7 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
         reciprocal: zero,
     }; MAX];
     let mut of_distances = zero;
-    unroll!(i in 0..N, max 6, {
+    unroll!(i in 0..N, max 7, {
         // A turned axis turns their order.
         let back = N - 1 - i;
         let weight = R::select(kernel.turned, d.weights[back], d.weights[i]);
@@ -121,7 +121,7 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
         size: one,
     }; MAX];
     let mut slopes = [zero; MAX];
-    unroll!(i in 0..N, max 6, {
+    unroll!(i in 0..N, max 7, {
         let v = nodes[i].v * per_middle;
         let size = v.abs().max(one);
         let place = Place {
@@ -139,7 +139,7 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
     // In powers of x - eta.
     let turned_length = sign * per_length;
     let mut power = turned_length;
-    unroll!(i in 1..(2 * N + 1), max 11, {
+    unroll!(i in 1..(2 * N + 1), max 13, {
         q[i] = (q[i].clamp(-limit, limit) * power).clamp(-limit, limit);
         power = (power * turned_length).clamp(-limit, limit);
     });
@@ -153,8 +153,8 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
     // In powers of x: Horner's scheme, repeated.
     q[0] = d_own;
     let eta = finite(eta, lit!(1e12));
-    unroll!(j in 0..10, max 11, {
-        unroll!(i in 0..10, max 11, {
+    unroll!(j in 0..(2 * MAX), max 13, {
+        unroll!(i in 0..(2 * MAX), max 13, {
             // Each time one coefficient less: from the highest but one down to j.
             if const { i + j < 2 * N } {
                 let carried = q[2 * N - i] * eta;
@@ -167,7 +167,7 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
         m: [zero; MAX_MOMENTS],
         eta: d_eta,
     };
-    unroll!(i in 0..(2 * N + 1), max 11, {
+    unroll!(i in 0..(2 * N + 1), max 13, {
         gradient.m[i] = q[i] * per_small.min(most / q[i].abs().max(one));
     });
     gradient
@@ -177,8 +177,8 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
 /// neighbours, unless one at the same distance on the other side gets between.
 #[inline(always)]
 fn from_afar<R: Real, const N: usize>(mut nodes: [Node<R>; MAX]) -> [Node<R>; MAX] {
-    unroll!(pass in 0..N, max 6, {
-        unroll!(i in 0..4, max 6, {
+    unroll!(pass in 0..N, max 7, {
+        unroll!(i in 0..(MAX - 1), max 7, {
             if const { i + 1 < N && (i + pass).is_multiple_of(2) } {
                 let (a, b) = (nodes[i], nodes[i + 1]);
                 let swap = b.v.abs().lt(a.v.abs());
@@ -207,13 +207,13 @@ fn per_weight<R: Real, const N: usize>(kernel: &Kernel<R, Plain<R>>, s: R, t: R)
     let least: R = lit!(1e-37);
     let mut z = [one; MAX + 1];
     z[1] = s - kernel.a[0] * t;
-    unroll!(k in 1..N, max 6, {
+    unroll!(k in 1..N, max 7, {
         let next = (s - kernel.a[k] * t) * z[k] - kernel.b[k] * (t * t) * z[k - 1];
         z[k + 1] = next.clamp(-limit, limit);
     });
     let mut square = kernel.c[N] * (z[N] * z[N]);
     let mut power = t;
-    unroll!(k in 0..N, max 6, {
+    unroll!(k in 0..N, max 7, {
         let z = z[N - 1 - k] * power;
         square += kernel.c[N - 1 - k] * (z * z);
         power *= t;
@@ -242,10 +242,10 @@ fn interpolated<R: Real, const N: usize>(
     let mut c = [zero; 2 * MAX];
     let mut size = one;
     h[0] = one;
-    unroll!(j in 0..(2 * N), max 11, {
+    unroll!(j in 0..(2 * N), max 13, {
         let place = places[const { j / 2 }];
         let v = place.t * place.size;
-        unroll!(degree in 1..11, max 11, {
+        unroll!(degree in 1..(2 * MAX + 1), max 13, {
             if const { degree + j <= 2 * N } {
                 h[degree] = bounded(h[degree] + v * h[degree - 1]);
             }
@@ -257,8 +257,8 @@ fn interpolated<R: Real, const N: usize>(
 
     // Reciprocals of differences; what is closer counts as an epsilon apart.
     let mut per_difference = [[zero; MAX]; MAX];
-    unroll!(i in 0..N, max 6, {
-        unroll!(j in 1..N, max 6, {
+    unroll!(i in 0..N, max 7, {
+        unroll!(j in 1..N, max 7, {
             if const { i < j } {
                 let difference = places[i].tau * places[j].t - places[j].tau * places[i].t;
                 let per_size = one / difference.abs().max(R::epsilon());
@@ -271,8 +271,8 @@ fn interpolated<R: Real, const N: usize>(
     // ones, which are 0 at infinity with the weight.
     let mut of_values = [zero; 2 * MAX];
     let mut of_slopes = [zero; 2 * MAX];
-    unroll!(order in 1..(2 * N), max 11, {
-        unroll!(first in 0..9, max 11, {
+    unroll!(order in 1..(2 * N), max 13, {
+        unroll!(first in 0..(2 * MAX - 1), max 13, {
             if const { first + order < 2 * N } {
                 let i = const { first / 2 };
                 let k = const { (first + order) / 2 };
@@ -303,10 +303,10 @@ fn interpolated<R: Real, const N: usize>(
     });
 
     let mut q = [zero; MAX_MOMENTS];
-    unroll!(i in 0..(2 * N), max 11, {
+    unroll!(i in 0..(2 * N), max 13, {
         // Multiplied by the factor of this node, and so of a degree more.
         let place = places[(2 * N - 1 - i) / 2];
-        unroll!(j in 0..10, max 11, {
+        unroll!(j in 0..(2 * MAX), max 13, {
             if const { j <= i } {
                 q[i + 1 - j] = bounded(place.tau * q[i + 1 - j] - place.t * q[i - j]);
             }
