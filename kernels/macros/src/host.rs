@@ -569,7 +569,7 @@ impl Kernel {
                 Role::Uniform(_) | Role::Element(_) | Role::Constant { .. }
             )
         });
-        if !spreads {
+        if !spreads || self.scalar {
             return quote!(exec::map1(mode, output, |__i| #call));
         }
         let fields = self.params.iter().map(|p| {

@@ -38,6 +38,8 @@ pub struct Kernel {
     pub inputs: Option<TokenStream>,
     /// The kernel that computes the same in about twice the digits.
     pub compensated: Option<Ident>,
+    /// Natively it runs without SIMD lanes.
+    pub scalar: bool,
     /// Cooperative functions that it calls.
     pub helpers: Vec<Ident>,
     /// Its result depends on the size of subgroups.
@@ -454,6 +456,7 @@ impl Kernel {
         let variants = args.variants(&name, real.as_ref())?;
         let output_formats = args.output_formats(&outputs)?;
         let compensated = args.compensated.clone();
+        let scalar = args.scalar;
         let rounding = args.rounding.unwrap_or(Rounding::Free);
         let inputs = args.inputs.as_ref().map(from_inside);
         let helpers = args.cooperative.clone();
@@ -483,6 +486,7 @@ impl Kernel {
             rounding,
             inputs,
             compensated,
+            scalar,
             helpers,
             sized_by_subgroups: depends.is_some(),
         };
@@ -1038,6 +1042,7 @@ struct Args {
     rounding: Option<Rounding>,
     inputs: Option<syn::Path>,
     compensated: Option<Ident>,
+    scalar: bool,
 }
 
 impl Parse for Args {
@@ -1121,6 +1126,7 @@ impl Parse for Args {
                     input.parse::<Token![=]>()?;
                     args.inputs = Some(input.parse()?);
                 }
+                "scalar" => args.scalar = true,
                 "compensated" => {
                     input.parse::<Token![=]>()?;
                     args.compensated = Some(input.parse()?);
@@ -1129,7 +1135,7 @@ impl Parse for Args {
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, compensated, inputs or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, scalar, compensated, inputs or parity",
                     ));
                 }
             }

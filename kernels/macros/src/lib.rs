@@ -32,6 +32,7 @@ use syn::parse_macro_input;
 /// | `inputs = path::to::function` | makes inputs for parity, see below |
 /// | `exact` | the result is right only if sums and products are computed as they are written: the error of a rounding, for example. Languages that cannot forbid contraction and reordering do not get the kernel; the manifest says which |
 /// | `pinned` | SPIR-V asks for arithmetic as it is written, so that the bits are the same everywhere even where the result is ill-conditioned; languages that cannot ask for it get the kernel all the same |
+/// | `scalar` | natively it runs without SIMD lanes, and is compiled once, not once more for each instruction set: for kernels that take long to compile and are not run on many rows |
 /// | `compensated = name` | the kernel of that name has the same parameters and computes the same in about twice the digits, wherever digits are lost: `hankel eval` runs it unless `--fast` is given |
 /// | `parity(ulp = N, absolute = X, why = "…")` | how far backends may differ; without it, not at all. `exact(FORMAT, …)` names formats that it does not concern; `non_finite` says that finite inputs may give infinities and NaN, which fails parity otherwise |
 ///

@@ -284,7 +284,11 @@ impl Footprint {
         let reach = 0.5 * (self.length + 1.0);
         // How many places there are on each side.
         let whole = to_i32(reach);
-        let count = (if (whole as f32) < reach { whole } else { whole - 1 }) as u32;
+        let count = (if (whole as f32) < reach {
+            whole
+        } else {
+            whole - 1
+        }) as u32;
         let mut sum = sample(uv);
         let mut i = 0;
         while i < count {

@@ -390,7 +390,7 @@ pub(crate) fn weighted(
 
 /// [`weighted`] of the samples of a depth map that are nearer than `z`.
 #[inline(always)]
-pub(crate) fn weighted_depths(
+pub(crate) fn weighted_nearer(
     depth: Texture2dMultisampled<'_>,
     weights: Buffer<'_, f32>,
     samples: u32,
@@ -461,7 +461,7 @@ pub fn shade_pcf_gaussian(
     samples: u32,
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
-        weighted_depths(depth, weights, samples, uv, z)
+        weighted_nearer(depth, weights, samples, uv, z)
     })
 }
 

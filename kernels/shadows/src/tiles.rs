@@ -17,7 +17,9 @@ use hankel_moments::hamburger_4;
 use crate::blur::{Direction, filtered};
 use crate::grid::within;
 use crate::resolve::mean_symmetric;
-use crate::shade::{Light, biased, encoding, in_range, look_up, shade_by, shade_with, weighted};
+use crate::shade::{
+    Light, biased, encoding, in_range, look_up, shade_by, shade_with, weighted_nearer,
+};
 
 /// Texels of a tile along each axis.
 pub const EDGE: u32 = 8;
@@ -379,7 +381,7 @@ pub fn shade_pcf_gaussian_tiles(
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
         unless_settled(depth.size(), between, 0.0, uv, z, || {
-            weighted_depths(depth, weights, samples, uv, z)
+            weighted_nearer(depth, weights, samples, uv, z)
         })
     })
 }

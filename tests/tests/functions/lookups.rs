@@ -107,7 +107,10 @@ pub fn natives() -> Vec<Function> {
             run: |words, out| {
                 let (uv, across) = (read_pair(words, 0), read_pair(words, 2));
                 let (down, size) = (read_pair(words, 4), Vec2::new(64.0, 32.0));
-                write_four(mean_of_footprint(uv, across, down, size, 8.0, level_of), out);
+                write_four(
+                    mean_of_footprint(uv, across, down, size, 8.0, level_of),
+                    out,
+                );
             },
         },
     ]
