@@ -51,6 +51,7 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
+            scalar,
             inputs = crate::inputs::canonical::$rows
         )]
         pub fn $canonical<R: Real>(
@@ -74,6 +75,7 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
+            scalar,
             inputs = crate::inputs::canonical::$adjoint_rows
         )]
         pub fn $adjoint<R: Real>(
