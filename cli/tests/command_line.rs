@@ -481,7 +481,7 @@ fn eval_computes_in_twice_the_digits_unless_it_is_to_be_fast() {
     // Two thin surfaces: plain elimination loses most of the digits.
     let header = "m0,m1,m2,m3,m4,m5,m6,eta";
     let row = "1,0.5500125,0.32506253,0.20256564,0.13189186,0.08925484,0.06247703,0.4";
-    desk.write("rows.csv", &format!("{header}\n{row}\n"));
+    desk.write("rows.csv", format!("{header}\n{row}\n"));
     let result = |kernel: &str| {
         let line = format!("eval {kernel} --input rows.csv --output out.csv");
         let said = desk.hankel(&line).code(0).out();

@@ -97,6 +97,7 @@ pub fn trigonometric_4msm<R: Real>(
     threads(64),
     precision(f32, f64),
     pinned,
+    scalar,
     inputs = crate::inputs::trigonometric_receivers,
     parity(
         absolute = 2e-45,

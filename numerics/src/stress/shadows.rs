@@ -8,7 +8,7 @@ use hankel_dsl::Real;
 use hankel_dsl::native::Mode;
 use hankel_moments::bias::{Basis, MEASURED};
 use hankel_moments::{
-    HalfAngle, Moments4, TrigonometricMoments, hausdorff_4, hausdorff_4_compensated,
+    HalfAngle, MAX_MOMENTS, Moments4, TrigonometricMoments, hausdorff_4, hausdorff_4_compensated,
     hausdorff_4_symmetric, hausdorff_4_symmetric_compensated, trigonometric_4,
     trigonometric_4_compensated,
 };
@@ -369,7 +369,7 @@ impl Distributions {
     }
 }
 
-fn mix(exact: [DoubleDouble; 4], target: [f64; 11], strength: f64) -> [DoubleDouble; 4] {
+fn mix(exact: [DoubleDouble; 4], target: [f64; MAX_MOMENTS], strength: f64) -> [DoubleDouble; 4] {
     let mut mixed = exact;
     for (m, target) in mixed.iter_mut().zip(&target[1..]) {
         *m += DoubleDouble::from(strength) * (DoubleDouble::from(*target) - *m);
@@ -500,9 +500,7 @@ pub struct Cost {
     pub kernel: String,
     /// The number format.
     pub precision: Precision,
-    /// Whether it runs on SIMD lanes, or one row at a time.
-    pub lanes: bool,
-    /// Nanoseconds of processor time for a row, plain and compensated: medians of rounds.
+    /// Nanoseconds of processor time for a row, plain and compensated, one row at a time: medians of rounds.
     pub nanoseconds: [f64; 2],
 }
 
@@ -524,8 +522,8 @@ pub fn measure(options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Shad
         progress(&format!("run time, {precision}"));
         for bound in BOUNDS {
             found.costs.extend(match precision {
-                Precision::F32 => costs::<f32>(bound, options)?,
-                Precision::F64 => costs::<f64>(bound, options)?,
+                Precision::F32 => cost::<f32>(bound, options)?,
+                Precision::F64 => cost::<f64>(bound, options)?,
             });
         }
     }
@@ -582,9 +580,9 @@ fn of_family<T: Format>(bound: Bound, family: &Distributions, options: &Options)
 const TIMED_ROWS: u64 = 4096;
 const ROUNDS: usize = 9;
 
-fn costs<T: Format>(bound: Bound, options: &Options) -> Result<Vec<Cost>, StressError> {
+fn cost<T: Format>(bound: Bound, options: &Options) -> Result<Option<Cost>, StressError> {
     let Some(kernel) = bound.kernel() else {
-        return Ok(Vec::new());
+        return Ok(None);
     };
     let rows: Vec<T> = (0..TIMED_ROWS)
         .flat_map(|index| DISTRIBUTIONS[0].row::<T>(bound, options.seed, index))
@@ -600,30 +598,21 @@ fn costs<T: Format>(bound: Bound, options: &Options) -> Result<Vec<Cost>, Stress
         let native = native::Native::from_bytes(name, T::PRECISION, rows.0, rows.1);
         kernels.push(native.map_err(|e| fail(name, &e))?);
     }
-    let mut costs = Vec::new();
-    for lanes in [false, true] {
-        let mode = Mode {
-            lanes,
-            ..Mode::REFERENCE
-        };
-        let mut seconds = [Vec::new(), Vec::new()];
-        for _ in 0..ROUNDS {
-            for ((kernel, name), seconds) in kernels.iter_mut().zip(&names).zip(&mut seconds) {
-                seconds.push(kernel.time(mode).map_err(|e| fail(name, &e))?);
-            }
+    let mut seconds = [Vec::new(), Vec::new()];
+    for _ in 0..ROUNDS {
+        for ((kernel, name), seconds) in kernels.iter_mut().zip(&names).zip(&mut seconds) {
+            seconds.push(kernel.time(Mode::REFERENCE).map_err(|e| fail(name, &e))?);
         }
-        let median = |mut seconds: Vec<f64>| {
-            seconds.sort_by(f64::total_cmp);
-            seconds[ROUNDS / 2] * 1e9 / TIMED_ROWS as f64
-        };
-        costs.push(Cost {
-            kernel: kernel.into(),
-            precision: T::PRECISION,
-            lanes,
-            nanoseconds: seconds.map(median),
-        });
     }
-    Ok(costs)
+    let median = |mut seconds: Vec<f64>| {
+        seconds.sort_by(f64::total_cmp);
+        seconds[ROUNDS / 2] * 1e9 / TIMED_ROWS as f64
+    };
+    Ok(Some(Cost {
+        kernel: kernel.into(),
+        precision: T::PRECISION,
+        nanoseconds: seconds.map(median),
+    }))
 }
 
 fn is_in_range<T: Format>([lower, upper]: [T; 2]) -> bool {
@@ -663,11 +652,10 @@ impl Shadows {
     fn cost(&self) -> Table {
         let mut table = Table::new(
             "shadow-costs",
-            "Run time of the native kernels on one thread, on the generic family",
+            "Run time of the native kernels on one thread, row by row, on the generic family",
             [
                 Column::text("kernel"),
                 Column::text("precision"),
-                Column::text("rows"),
                 Column::fixed("plain", 0).of("ns"),
                 Column::fixed("compensated", 0).of("ns"),
                 Column::fixed("times", 2),
@@ -675,15 +663,9 @@ impl Shadows {
         );
         for cost in &self.costs {
             let [plain, compensated] = cost.nanoseconds;
-            let rows = if cost.lanes {
-                "on lanes"
-            } else {
-                "one at a time"
-            };
             table.push([
                 cost.kernel.as_str().into(),
                 cost.precision.to_string().into(),
-                rows.into(),
                 plain.into(),
                 compensated.into(),
                 (compensated / plain).into(),

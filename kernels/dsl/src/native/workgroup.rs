@@ -159,9 +159,9 @@ pub fn for_each_group(
                 one(number as usize);
             }
         } else if mode.parallel {
-            (0..all).into_par_iter().for_each(&one);
+            (0..all).into_par_iter().for_each(one);
         } else {
-            (0..all).for_each(&one);
+            (0..all).for_each(one);
         }
     })
 }

@@ -165,6 +165,14 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
         derivative[i] = e[i] * (whole::<R>(DEGREE - i) / whole::<R>(DEGREE));
     });
     let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
+    around::<R, DEGREE>(e, between)
+}
+
+/// The two least roots, where they are negative, from a point between them; else 0.
+#[inline(always)]
+fn around<R: Real, const DEGREE: usize>(e: &Monic<R>, between: R) -> (R, R) {
+    let one: R = lit!(1.0);
+    let zero: R = lit!(0.0);
     // Between both, the polynomial has the sign that it does not have on the left.
     let sign = if const { DEGREE.is_multiple_of(2) } {
         -one
@@ -185,11 +193,14 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
 pub(crate) fn least_three<R: Real>(e: &Monic<R>) -> (R, R, R) {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
-    let mut derivative = *e;
+    // Each from one product: of two constants in a row, compilers may make one that rounds otherwise.
+    let (mut derivative, mut second) = (*e, *e);
     unroll!(i in 1..6, max 7, {
         derivative[i] = e[i] * (whole::<R>(6 - i) / whole::<R>(6));
+        second[i] = e[i] * (whole::<R>(6 - i) * whole::<R>(5 - i) / lit!(30.0));
     });
-    let (first, second) = least_two::<R, 5, 4>(&derivative);
+    let between = from_outside::<R, 4>(&second).clamp(-one, zero);
+    let (first, second) = around::<R, 5>(&derivative, between);
     (
         approach::<R, 6>(e, first, -one, -one, -one, zero),
         approach::<R, 6>(e, first, one, -one, -one, zero),
