@@ -270,7 +270,7 @@ fn native_code_follows_a_source_with_an_old_date() {
     let edited = text
         .replace("lit!(3.0)", "lit!(3.5)")
         .replace("The smooth step", "A step");
-    for (text, result, summary) in [(text, "1", "The smooth step"), (edited, "1.5", "A step")] {
+    for (text, result, summary) in [(text, "1.0", "The smooth step"), (edited, "1.5", "A step")] {
         desk.write_with_an_old_date("my-kernels/src/lib.rs", &text);
         let out = desk.hankel(list).code(0).out();
         assert!(out.contains(summary), "{out}");

@@ -184,7 +184,7 @@ fn options_that_make_no_sense() {
         change(&mut options);
         measure(&options, &mut |_| {}).unwrap_err()
     };
-    assert!(matches!(fail(|o| o.orders = vec![6]), SpeedError::Order(6)));
+    assert!(matches!(fail(|o| o.orders = vec![7]), SpeedError::Order(7)));
     assert!(matches!(fail(|o| o.rows = 3), SpeedError::Rows(3)));
     assert!(matches!(fail(|o| o.rounds = 0), SpeedError::Rounds));
     let error = fail(|o| o.python = Some("/nonexistent/python".into()));
