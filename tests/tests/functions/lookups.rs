@@ -2,12 +2,11 @@
 //! its macro, in MSL by a functor, in C by a function with a context, in Rust by a closure. WGSL has no such
 //! functions; what three.js makes of a lookup is in `tsl.rs`.
 
-use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
+use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec4};
 use hankel_dsl::native::describe::{Scalar, Type};
 use hankel_dsl::native::function::Function;
 use hankel_shadows::library::lookups::{
-    mean_of_footprint, mean_of_table_four, percentage_closer, percentage_closer_weighted,
-    resolve_four, resolve_quantized_four,
+    mean_of_table_four, percentage_closer, resolve_four, resolve_quantized_four,
 };
 
 /// The sample of a texel with these depths.
@@ -24,16 +23,6 @@ fn sum(columns: u32, rows: u32) -> UVec4 {
 /// Whether a texel of a map is nearer than the receiver: every other one on a slant.
 fn compare(at: UVec2) -> f32 {
     ((at.x * 3 + at.y) & 1) as f32
-}
-
-/// A filter's weights.
-fn weight(i: u32) -> f32 {
-    0.25 - 0.0625 * i as f32
-}
-
-/// A map with levels.
-fn level_of(at: Vec3) -> Vec4 {
-    Vec4::new(at.x * 0.5, at.y * 0.25, at.z, 0.125)
 }
 
 /// Texels of the host's map.
@@ -86,33 +75,6 @@ pub fn natives() -> Vec<Function> {
                 out.push(percentage_closer(MAP, words[2] & 3, uv, compare).to_bits());
             },
         },
-        Function {
-            name: "host_percentage_closer_weighted",
-            params: vec![("uv", vector(2)), ("count", scalar(Scalar::U32))],
-            result: scalar(Scalar::F32),
-            run: |words, out| {
-                let (uv, count) = (read_pair(words, 0), words[2] & 3);
-                let given = percentage_closer_weighted(MAP, count, uv, weight, compare);
-                out.push(given.to_bits());
-            },
-        },
-        Function {
-            name: "host_mean_of_footprint",
-            params: vec![
-                ("uv", vector(2)),
-                ("place_across", vector(2)),
-                ("place_down", vector(2)),
-            ],
-            result: vector(4),
-            run: |words, out| {
-                let (uv, across) = (read_pair(words, 0), read_pair(words, 2));
-                let (down, size) = (read_pair(words, 4), Vec2::new(64.0, 32.0));
-                write_four(
-                    mean_of_footprint(uv, across, down, size, 8.0, level_of),
-                    out,
-                );
-            },
-        },
     ]
 }
 
@@ -141,17 +103,7 @@ float host_compare(uint2 at)
 {
     return float((at.x * 3u + at.y) & 1u);
 }
-float host_weight(uint i)
-{
-    return 0.25f - 0.0625f * float(i);
-}
-float4 host_level(float3 at)
-{
-    return float4(at.x * 0.5f, at.y * 0.25f, at.z, 0.125f);
-}
 #define HANKEL_COMPARE(at) host_compare(at)
-#define HANKEL_WEIGHT(i) host_weight(i)
-#define HANKEL_SAMPLE_VALUE(at) host_level(at)
 #define HANKEL_SAMPLE_DEPTH(i) host_depths[(i) & 3u]
 #define HANKEL_SUM_BEFORE(columns, rows) host_sum(columns, rows)
 ";
@@ -176,14 +128,6 @@ float hankel_host_percentage_closer(float2 uv, uint radius)
 {
     return hankel_percentage_closer(uint2(5u, 4u), radius & 3u, uv);
 }
-float hankel_host_percentage_closer_weighted(float2 uv, uint count)
-{
-    return hankel_percentage_closer_weighted(uint2(5u, 4u), count & 3u, uv);
-}
-float4 hankel_host_mean_of_footprint(float2 uv, float2 across, float2 down)
-{
-    return hankel_mean_of_footprint(uv, across, down, float2(64.0f, 32.0f), 8.0f);
-}
 ";
 
 /// HLSL's words in GLSL.
@@ -193,7 +137,6 @@ pub fn as_glsl(hlsl: &str) -> String {
         ("uint4", "uvec4"),
         ("uint2", "uvec2"),
         ("float4", "vec4"),
-        ("float3", "vec3"),
         ("float2", "vec2"),
     ];
     let mut text = hlsl.to_owned();
@@ -201,7 +144,7 @@ pub fn as_glsl(hlsl: &str) -> String {
         text = text.replace(from, to);
     }
     // What has no precision of its own would have the host's.
-    for ty in ["float", "vec2", "vec3", "vec4", "uint", "uvec2", "uvec4"] {
+    for ty in ["float", "vec2", "vec4", "uint", "uvec2", "uvec4"] {
         for before in ["(", ", ", "\n", "    "] {
             let (from, to) = (format!("{before}{ty} "), format!("{before}highp {ty} "));
             text = text.replace(&from, &to);
@@ -228,15 +171,6 @@ struct HostSum {
 struct HostCompare {
     float operator()(metal::uint2 at) const { return float((at.x * 3u + at.y) & 1u); }
 };
-struct HostWeight {
-    float operator()(uint i) const { return 0.25f - 0.0625f * float(i); }
-};
-struct HostLevel {
-    metal::float4 operator()(metal::float3 at) const
-    {
-        return metal::float4(at.x * 0.5f, at.y * 0.25f, at.z, 0.125f);
-    }
-};
 inline metal::float4 host_resolve_four(metal::float4 depths, uint count)
 {
     return resolve_four(1u + (count & 3u), HostDepths{depths});
@@ -252,14 +186,6 @@ inline metal::float4 host_mean_of_table_four(metal::float2 place, metal::float2 
 inline float host_percentage_closer(metal::float2 uv, uint radius)
 {
     return percentage_closer(metal::uint2(5u, 4u), radius & 3u, uv, HostCompare());
-}
-inline float host_percentage_closer_weighted(metal::float2 uv, uint count)
-{
-    return percentage_closer_weighted(metal::uint2(5u, 4u), count & 3u, uv, HostWeight(), HostCompare());
-}
-inline metal::float4 host_mean_of_footprint(metal::float2 uv, metal::float2 across, metal::float2 down)
-{
-    return mean_of_footprint(uv, across, down, metal::float2(64.0f, 32.0f), 8.0f, HostLevel());
 }
 }
 }
@@ -284,16 +210,6 @@ static float host_compare(void *context, hankel_uint2 at)
     (void)context;
     return (float)((at.x * 3u + at.y) & 1u);
 }
-static float host_weight(void *context, uint32_t i)
-{
-    (void)context;
-    return 0.25f - 0.0625f * (float)i;
-}
-static hankel_float4 host_level(void *context, hankel_float3 at)
-{
-    (void)context;
-    return hankel_make_float4(at.x * 0.5f, at.y * 0.25f, at.z, 0.125f);
-}
 static hankel_float4 hankel_host_resolve_four(hankel_float4 depths, uint32_t count)
 {
     return hankel_resolve_four(1u + (count & 3u), host_depth, &depths);
@@ -309,15 +225,6 @@ static hankel_float4 hankel_host_mean_of_table_four(hankel_float2 place, hankel_
 static float hankel_host_percentage_closer(hankel_float2 uv, uint32_t radius)
 {
     return hankel_percentage_closer(hankel_make_uint2(5u, 4u), radius & 3u, uv, host_compare, 0);
-}
-static float hankel_host_percentage_closer_weighted(hankel_float2 uv, uint32_t count)
-{
-    return hankel_percentage_closer_weighted(hankel_make_uint2(5u, 4u), count & 3u, uv,
-        host_weight, 0, host_compare, 0);
-}
-static hankel_float4 hankel_host_mean_of_footprint(hankel_float2 uv, hankel_float2 across, hankel_float2 down)
-{
-    return hankel_mean_of_footprint(uv, across, down, hankel_make_float2(64.0f, 32.0f), 8.0f, host_level, 0);
 }
 ";
 
@@ -338,13 +245,7 @@ pub fn host_mean_of_table_four(place: [f32; 2], reach: [f32; 2]) -> [f32; 4] {
 pub fn host_percentage_closer(uv: [f32; 2], radius: u32) -> f32 {
     percentage_closer([5, 4], radius & 3, uv, &compare)
 }
-pub fn host_percentage_closer_weighted(uv: [f32; 2], count: u32) -> f32 {
-    percentage_closer_weighted([5, 4], count & 3, uv, &|i| 0.25 - 0.0625 * i as f32, &compare)
-}
 fn compare(at: [u32; 2]) -> f32 {
     ((at[0] * 3 + at[1]) & 1) as f32
-}
-pub fn host_mean_of_footprint(uv: [f32; 2], across: [f32; 2], down: [f32; 2]) -> [f32; 4] {
-    mean_of_footprint(uv, across, down, [64.0, 32.0], 8.0, &|at| [at[0] * 0.5, at[1] * 0.25, at[2], 0.125])
 }
 ";

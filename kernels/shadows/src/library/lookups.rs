@@ -1,14 +1,13 @@
 //! What looks a map up more than once. The engine's own lookup is a parameter: samples, texels and entries come
 //! from wherever the engine keeps them.
 
-use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
+use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec4};
 use hankel_dsl::{Real, function};
 use hankel_moments::{FixedPoint, Moments4, quantize_symmetric_4};
 
 use super::store::{channels, fixed, moments_of_depth, quantize_symmetric_four, symmetric_depth};
-use crate::mips::Footprint;
 use crate::resolve::mean_of;
-use crate::shade::{percentage, weighted};
+use crate::shade::percentage;
 use crate::soft::{Area, region};
 
 /// A texel of a map of moments (\[BHS\], lecture, "Generate a moment shadow map"): the mean of the first four
@@ -84,39 +83,4 @@ pub fn percentage_closer(
     compare: impl Fn(UVec2) -> f32,
 ) -> f32 {
     percentage(size, radius, uv, compare)
-}
-
-/// Percentage-closer filtering with the weights that a filtered shadow map has: those of a separable filter, such as
-/// a Gaussian, and of the bilinear lookup. `weight` gives the filter's weight of a texel that is 0 to
-/// `count - 1` texels away along an axis; `compare` is that of `percentage_closer`, or the share of a texel's samples
-/// that are nearer. It is called for `2 count` by `2 count` texels.
-#[function]
-#[inline(always)]
-pub fn percentage_closer_weighted(
-    size: UVec2,
-    count: u32,
-    uv: Vec2,
-    weight: impl Fn(u32) -> f32,
-    compare: impl Fn(UVec2) -> f32,
-) -> f32 {
-    weighted(size, count, uv, weight, compare)
-}
-
-/// Anisotropic lookup of a map with mip levels: the mean over a pixel's footprint of what `sample` gives for
-/// coordinates (x, y) and a width of z texels, 1 or more, which is level log2(z). `across` and `down` are how far the
-/// map's place moves from the pixel to its neighbours along x and along y, in texels of a map of `size` texels. A
-/// footprint is taken for at most `anisotropy` times as long as wide, 1 (trilinear) to 16; `sample` is called up to
-/// that often, and once more.
-#[function]
-#[inline(always)]
-pub fn mean_of_footprint(
-    uv: Vec2,
-    across: Vec2,
-    down: Vec2,
-    size: Vec2,
-    anisotropy: f32,
-    sample: impl Fn(Vec3) -> Vec4,
-) -> Vec4 {
-    let footprint = Footprint::of_steps([across, down], size, anisotropy);
-    footprint.mean(uv, |at| sample(Vec3::new(at.x, at.y, footprint.width)))
 }
