@@ -1,5 +1,6 @@
 //! What must hold of every bound, whatever computes it.
 
+#[allow(dead_code, reason = "each test needs some of it")]
 mod common;
 
 use common::{Distribution, distribution};

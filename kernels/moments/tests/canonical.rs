@@ -3,7 +3,7 @@
 #[allow(dead_code, reason = "other tests use the rest of it")]
 mod common;
 
-use common::Distribution;
+use common::{Distribution, awkward};
 use hankel_dsl::Real;
 use hankel_moments::{
     Canonical, Gradient, MAX, MAX_MOMENTS, bound_adjoint, canonical, canonical_adjoint,
@@ -219,29 +219,6 @@ where
     g.m.iter()
         .chain([&g.eta])
         .all(|&g| f64::from(g).abs() <= 2e37)
-}
-
-fn awkward() -> impl Strategy<Value = f64> {
-    prop_oneof![
-        -2.0..2.0_f64,
-        prop::sample::select(vec![
-            0.0,
-            -0.0,
-            1.0,
-            -1.0,
-            0.5,
-            1e-30,
-            1e30,
-            1e-42,
-            1e37,
-            3e38,
-            -3e38,
-            1e-7,
-            f64::NAN,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-        ]),
-    ]
 }
 
 proptest! {

@@ -65,3 +65,27 @@ pub fn distribution(most: usize) -> impl Strategy<Value = Distribution> {
         Distribution(points.into_iter().map(|(z, w)| (z, w / total)).collect())
     })
 }
+
+/// Numbers that are out of range, at its ends, or no numbers at all, among ordinary ones.
+pub fn awkward() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        -2.0..2.0_f64,
+        prop::sample::select(vec![
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            0.5,
+            1e-30,
+            1e30,
+            1e-42,
+            1e37,
+            3e38,
+            -3e38,
+            1e-7,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+        ]),
+    ]
+}
