@@ -204,19 +204,13 @@ pub fn compile(
     let target_dir = std::path::absolute(target_dir)
         .during("resolve", target_dir)?
         .join(TARGET_SUBFOLDER);
-    // One compilation at a time: another one would write over what this one is about to read.
-    std::fs::create_dir_all(&target_dir).during("create", &target_dir)?;
-    let lock = target_dir.join("hankel.lock");
-    let lock = std::fs::File::create(&lock).during("create", &lock)?;
-    // File systems without locks are used without.
-    let _ = lock.lock();
+    let flags = wanted.flags();
+    let build = std::iter::once(manifest.as_os_str()).chain(flags.iter().map(OsStr::new));
+    let last = LastBuild::of(&target_dir, build)?;
+    last.forget_if_overlooked()?;
     let version = compiler.version()?;
     let sysroot = compiler.ask("rustc", &["--print", "sysroot"])?;
     let own = [target_dir.clone(), sysroot.into(), compiler.backend.clone()];
-    let flags = wanted.flags();
-    let build = std::iter::once(manifest.as_os_str()).chain(flags.iter().map(OsStr::new));
-    let last = LastBuild::of(&target_dir, build);
-    last.forget_if_overlooked()?;
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;

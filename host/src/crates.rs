@@ -468,7 +468,7 @@ impl Package {
         let build = std::iter::once(self.manifest.as_os_str())
             .chain(native.profile().iter().map(OsStr::new))
             .chain(flags.iter().map(OsString::as_os_str));
-        let last = LastBuild::of(&target_dir, build);
+        let last = LastBuild::of(&target_dir, build)?;
         last.forget_if_overlooked()?;
         let began = SystemTime::now();
         let mut command = cargo();

@@ -31,11 +31,13 @@ pub struct RecordError {
     pub source: io::Error,
 }
 
-/// What a build in a target folder read, and when it began. The record is kept in that folder.
+/// What a build in a target folder read, and when it began. The record is kept in that folder. While this exists,
+/// other builds of Hankel's in the folder wait: they would write over what this one is about to read.
 #[derive(Debug)]
 pub struct LastBuild {
     target_dir: PathBuf,
     file: PathBuf,
+    _lock: File,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -48,13 +50,23 @@ struct Made {
 impl LastBuild {
     /// That of the build in cargo's `target_dir` which `build` tells from the other ones there: its manifest and
     /// flags.
-    pub fn of<'a>(target_dir: &Path, build: impl IntoIterator<Item = &'a OsStr>) -> Self {
-        let mut hasher = DefaultHasher::new();
-        build.into_iter().for_each(|it| it.hash(&mut hasher));
-        Self {
-            file: target_dir.join(format!("hankel-inputs-{:016x}.json", hasher.finish())),
+    ///
+    /// # Errors
+    /// The folder or its lock cannot be made.
+    pub fn of<'a>(
+        target_dir: &Path,
+        build: impl IntoIterator<Item = &'a OsStr>,
+    ) -> Result<Self, RecordError> {
+        fs::create_dir_all(target_dir).map_err(fail("create", target_dir))?;
+        let path = target_dir.join("hankel.lock");
+        let lock = File::create(&path).map_err(fail("create", &path))?;
+        // File systems without locks are used without.
+        let _ = lock.lock();
+        Ok(Self {
+            file: target_dir.join(record_of(build)),
             target_dir: target_dir.to_owned(),
-        }
+            _lock: lock,
+        })
     }
 
     /// Has cargo compile everything again if it would overlook a change.
@@ -91,29 +103,16 @@ impl LastBuild {
             contents: contents.collect(),
         };
         let write = || -> io::Result<()> {
-            fs::create_dir_all(&self.target_dir)?;
             let mut file = tempfile::NamedTempFile::new_in(&self.target_dir)?;
             file.write_all(&serde_json::to_vec(&made)?)?;
             file.persist(&self.file)?;
             Ok(())
         };
-        write().map_err(|source| RecordError {
-            action: "write",
-            path: self.file.clone(),
-            source,
-        })
+        write().map_err(fail("write", &self.file))
     }
 
     /// Removes cargo's fingerprints: those of all profiles, for this machine and for other targets.
     fn forget(&self) -> Result<(), RecordError> {
-        let fail = |action, path: &Path| {
-            let path = path.to_owned();
-            move |source| RecordError {
-                action,
-                path,
-                source,
-            }
-        };
         let within = |folder: &Path| -> Result<Vec<PathBuf>, RecordError> {
             match fs::read_dir(folder) {
                 Ok(found) => Ok(found.filter_map(|it| Some(it.ok()?.path())).collect()),
@@ -135,6 +134,22 @@ impl LastBuild {
             }
         }
         Ok(())
+    }
+}
+
+/// The record's name.
+fn record_of<'a>(build: impl IntoIterator<Item = &'a OsStr>) -> String {
+    let mut hasher = DefaultHasher::new();
+    build.into_iter().for_each(|it| it.hash(&mut hasher));
+    format!("hankel-inputs-{:016x}.json", hasher.finish())
+}
+
+fn fail(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RecordError {
+    let path = path.to_owned();
+    move |source| RecordError {
+        action,
+        path,
+        source,
     }
 }
 
@@ -238,7 +253,7 @@ mod tests {
         let target = path("target");
         let fingerprints =
             ["release", "describe", "spirv/release"].map(|it| target.join(it).join(".fingerprint"));
-        let last = LastBuild::of(&target, [OsStr::new("Cargo.toml")]);
+        let last = LastBuild::of(&target, [OsStr::new("Cargo.toml")]).unwrap();
         let forgets = |name: &str, text: &str, date: SystemTime| {
             for it in &fingerprints {
                 fs::create_dir_all(it).unwrap();
@@ -267,7 +282,7 @@ mod tests {
 
     #[test]
     fn builds_have_records_of_their_own() {
-        let of = |build: [&str; 2]| LastBuild::of(Path::new("target"), build.map(OsStr::new)).file;
+        let of = |build: [&str; 2]| record_of(build.map(OsStr::new));
         assert_ne!(of(["a", "b"]), of(["ab", ""]));
         assert_eq!(of(["a", "b"]), of(["a", "b"]));
     }
