@@ -252,12 +252,7 @@ fn mixed(x: u32) -> u32 {
 /// Layers of a map's depth whose surfaces have thresholds of their own.
 const LAYERS: f32 = 1024.0;
 
-/// Four depths of a translucent fragment, for blending that keeps the least: each is the fragment's depth `z` with
-/// the probability `opacity`, and else 1 (stochastic transparency: Enderton, Sintorn, Shirley, Luebke, 2010).
-///
-/// The four thresholds lie in the four quarters of [0, 1), in one of four orders, so that of an opacity of 0.5
-/// two of four remain. What is random is a hash of the texel and of the depth in 1024 layers (hashed
-/// alpha: Wyman, McGuire, 2017): always the same for the same surface, and another for one behind it.
+/// What [`stochastic_depths`] writes for a fragment at `texel` with depth `z`.
 #[inline(always)]
 pub(crate) fn kept_depths(texel: UVec2, z: f32, opacity: f32) -> Vec4 {
     let layer = to_i32(z * LAYERS) as u32;
@@ -271,7 +266,12 @@ pub(crate) fn kept_depths(texel: UVec2, z: f32, opacity: f32) -> Vec4 {
     Vec4::new(kept(0), kept(1), kept(2), kept(3))
 }
 
-/// [`kept_depths`] of a fragment, whose place in the map is given in clip space.
+/// Four depths of a translucent fragment, for blending that keeps the least: each is the fragment's depth with
+/// the probability `opacity`, and else 1 (stochastic transparency: Enderton, Sintorn, Shirley, Luebke, 2010).
+///
+/// The four thresholds lie in the four quarters of [0, 1), in one of four orders, so that of an opacity of 0.5
+/// two of four remain. What is random is a hash of the texel and of the depth in 1024 layers (hashed
+/// alpha: Wyman, McGuire, 2017): always the same for the same surface, and another for one behind it.
 #[kernel(fragment, inputs = crate::inputs::translucent::fragments)]
 pub fn stochastic_depths(
     #[varying]

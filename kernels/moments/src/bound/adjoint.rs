@@ -390,12 +390,21 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(
             .plus(t1.times(product)),
         l0.times(l0).plus(t0.times(product)),
     ];
+    times_square::<R, A, N, 4>(cubic, rest)
+}
+
+/// `u rest(u)²` times a polynomial of `TERMS` coefficients, that of `u^0` first.
+#[inline(always)]
+fn times_square<R: Real, A: Arithmetic<R>, const N: usize, const TERMS: usize>(
+    factors: [A; TERMS],
+    rest: &Fine<A>,
+) -> [A; MAX_MOMENTS] {
     let square = squared::<R, A, N>(rest);
-    let mut q = [zero; MAX_MOMENTS];
-    unroll!(i in 0..4, max 7, {
+    let mut q = [A::of(lit!(0.0)); MAX_MOMENTS];
+    unroll!(i in 0..TERMS, max 7, {
         unroll!(j in 0..(2 * MAX), max 13, {
             if const { i + j < 2 * N } {
-                q[i + j + 1] = q[i + j + 1].plus(cubic[i].times(square[j]));
+                q[i + j + 1] = q[i + j + 1].plus(factors[i].times(square[j]));
             }
         });
     });
@@ -537,14 +546,5 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
             .minus(t[1].times(e3)),
         l[0].times(l[0]).minus(t[0].times(e3)),
     ];
-    let square = squared::<R, A, N>(rest);
-    let mut q = [zero; MAX_MOMENTS];
-    unroll!(i in 0..6, max 7, {
-        unroll!(j in 0..(2 * MAX), max 13, {
-            if const { i + j < 2 * N } {
-                q[i + j + 1] = q[i + j + 1].plus(quintic[i].times(square[j]));
-            }
-        });
-    });
-    q
+    times_square::<R, A, N, 6>(quintic, rest)
 }
