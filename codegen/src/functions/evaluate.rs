@@ -1647,15 +1647,19 @@ impl<'a> Evaluator<'a> {
                 }
                 let id = self.new_local(name, x.ty.clone(), Rank::Part);
                 self.changing.insert(id);
-                let nothing = match x.ty {
-                    Type::Scalar(Scalar::F32) => float(0.0),
-                    Type::Scalar(Scalar::U32) => literal(Literal::U32(0)),
-                    Type::Scalar(Scalar::I32) => literal(Literal::I32(0)),
-                    _ => literal(Literal::Bool(false)),
-                };
-                self.emit(Stmt::Var(id, nothing));
                 then_block.push(Stmt::Assign(id, x.clone()));
-                other_block.push(Stmt::Assign(id, y.clone()));
+                let first = if matches!(y.kind, Kind::Literal(_)) {
+                    y.clone()
+                } else {
+                    other_block.push(Stmt::Assign(id, y.clone()));
+                    match x.ty {
+                        Type::Scalar(Scalar::F32) => float(0.0),
+                        Type::Scalar(Scalar::U32) => literal(Literal::U32(0)),
+                        Type::Scalar(Scalar::I32) => literal(Literal::I32(0)),
+                        _ => literal(Literal::Bool(false)),
+                    }
+                };
+                self.emit(Stmt::Var(id, first));
                 chosen.push(local(id, x.ty.clone()));
             }
             self.emit(Stmt::If(condition, then_block, other_block));

@@ -54,7 +54,8 @@ pub fn write(library: &Library, naming: &Naming, sha256: &str) -> String {
     for f in &library.functions {
         text.push('\n');
         text.push_str(&documented(&f.docs, "///"));
-        text.push_str("#[must_use]\n#[allow(unused_variables, clippy::all, clippy::pedantic)]\n");
+        text.push_str("#[must_use]\n#[allow(unused_variables, unused_assignments)]\n");
+        text.push_str("#[allow(clippy::all, clippy::pedantic)]\n");
         text.push_str(&function(&d, f));
     }
     text

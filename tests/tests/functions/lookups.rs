@@ -6,7 +6,8 @@ use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec4};
 use hankel_dsl::native::describe::{Scalar, Type};
 use hankel_dsl::native::function::Function;
 use hankel_shadows::library::lookups::{
-    mean_of_table_four, percentage_closer, resolve_four, resolve_quantized_four,
+    mean_of_footprint, mean_of_table_four, percentage_closer, percentage_closer_weighted,
+    resolve_four, resolve_quantized_four,
 };
 
 /// The sample of a texel with these depths.
@@ -23,6 +24,21 @@ fn sum(columns: u32, rows: u32) -> UVec4 {
 /// Whether a texel of a map is nearer than the receiver: every other one on a slant.
 fn compare(at: UVec2) -> f32 {
     ((at.x * 3 + at.y) & 1) as f32
+}
+
+/// A filter's weight of a texel so far away.
+fn weight(i: u32) -> f32 {
+    if i == 0 { 0.5 } else { 0.25 }
+}
+
+/// A number from 0 to 1, 0 for NaN.
+fn within(t: f32) -> f32 {
+    if t > 0.0 { t.min(1.0) } else { 0.0 }
+}
+
+/// A map that holds its coordinates, and the width it is looked up with.
+fn sample_of_width(uv: Vec2, width: f32) -> Vec4 {
+    Vec4::new(within(uv.x), within(uv.y), width, 1.0)
 }
 
 /// Texels of the host's map.
@@ -75,6 +91,27 @@ pub fn natives() -> Vec<Function> {
                 out.push(percentage_closer(MAP, words[2] & 3, uv, compare).to_bits());
             },
         },
+        Function {
+            name: "host_percentage_closer_weighted",
+            params: vec![("uv", vector(2)), ("count", scalar(Scalar::U32))],
+            result: scalar(Scalar::F32),
+            run: |words, out| {
+                let (uv, count) = (read_pair(words, 0), 1 + (words[2] & 1));
+                out.push(percentage_closer_weighted(MAP, count, uv, weight, compare).to_bits());
+            },
+        },
+        Function {
+            name: "host_mean_of_footprint",
+            params: vec![("uv", vector(2)), ("dx", vector(2)), ("dy", vector(2))],
+            result: vector(4),
+            run: |words, out| {
+                let [uv, dx, dy] = [0, 2, 4].map(|at| read_pair(words, at));
+                write_four(
+                    mean_of_footprint(uv, dx, dy, MAP, 4.0, sample_of_width),
+                    out,
+                );
+            },
+        },
     ]
 }
 
@@ -103,7 +140,21 @@ float host_compare(uint2 at)
 {
     return float((at.x * 3u + at.y) & 1u);
 }
+float host_weight(uint i)
+{
+    return i == 0u ? 0.5 : 0.25;
+}
+float host_within(float t)
+{
+    return t > 0.0 ? (t < 1.0 ? t : 1.0) : 0.0;
+}
+float4 host_sample_of_width(float2 uv, float width)
+{
+    return float4(host_within(uv.x), host_within(uv.y), width, 1.0);
+}
 #define HANKEL_COMPARE(at) host_compare(at)
+#define HANKEL_WEIGHT(i) host_weight(i)
+#define HANKEL_SAMPLE_OF_WIDTH(uv, width) host_sample_of_width(uv, width)
 #define HANKEL_SAMPLE_DEPTH(i) host_depths[(i) & 3u]
 #define HANKEL_SUM_BEFORE(columns, rows) host_sum(columns, rows)
 ";
@@ -127,6 +178,14 @@ float4 hankel_host_mean_of_table_four(float2 place, float2 reach)
 float hankel_host_percentage_closer(float2 uv, uint radius)
 {
     return hankel_percentage_closer(uint2(5u, 4u), radius & 3u, uv);
+}
+float hankel_host_percentage_closer_weighted(float2 uv, uint count)
+{
+    return hankel_percentage_closer_weighted(uint2(5u, 4u), 1u + (count & 1u), uv);
+}
+float4 hankel_host_mean_of_footprint(float2 uv, float2 dx, float2 dy)
+{
+    return hankel_mean_of_footprint(uv, dx, dy, uint2(5u, 4u), 4.0);
 }
 ";
 
@@ -171,6 +230,16 @@ struct HostSum {
 struct HostCompare {
     float operator()(metal::uint2 at) const { return float((at.x * 3u + at.y) & 1u); }
 };
+struct HostWeight {
+    float operator()(uint i) const { return i == 0u ? 0.5f : 0.25f; }
+};
+struct HostSampleOfWidth {
+    static float within(float t) { return t > 0.0f ? (t < 1.0f ? t : 1.0f) : 0.0f; }
+    metal::float4 operator()(metal::float2 uv, float width) const
+    {
+        return metal::float4(within(uv.x), within(uv.y), width, 1.0f);
+    }
+};
 inline metal::float4 host_resolve_four(metal::float4 depths, uint count)
 {
     return resolve_four(1u + (count & 3u), HostDepths{depths});
@@ -186,6 +255,14 @@ inline metal::float4 host_mean_of_table_four(metal::float2 place, metal::float2 
 inline float host_percentage_closer(metal::float2 uv, uint radius)
 {
     return percentage_closer(metal::uint2(5u, 4u), radius & 3u, uv, HostCompare());
+}
+inline float host_percentage_closer_weighted(metal::float2 uv, uint count)
+{
+    return percentage_closer_weighted(metal::uint2(5u, 4u), 1u + (count & 1u), uv, HostWeight(), HostCompare());
+}
+inline metal::float4 host_mean_of_footprint(metal::float2 uv, metal::float2 dx, metal::float2 dy)
+{
+    return mean_of_footprint(uv, dx, dy, metal::uint2(5u, 4u), 4.0f, HostSampleOfWidth());
 }
 }
 }
@@ -210,6 +287,20 @@ static float host_compare(void *context, hankel_uint2 at)
     (void)context;
     return (float)((at.x * 3u + at.y) & 1u);
 }
+static float host_weight(void *context, uint32_t i)
+{
+    (void)context;
+    return i == 0u ? 0.5f : 0.25f;
+}
+static float host_within(float t)
+{
+    return t > 0.0f ? (t < 1.0f ? t : 1.0f) : 0.0f;
+}
+static hankel_float4 host_sample_of_width(void *context, hankel_float2 uv, float width)
+{
+    (void)context;
+    return hankel_make_float4(host_within(uv.x), host_within(uv.y), width, 1.0f);
+}
 static hankel_float4 hankel_host_resolve_four(hankel_float4 depths, uint32_t count)
 {
     return hankel_resolve_four(1u + (count & 3u), host_depth, &depths);
@@ -225,6 +316,15 @@ static hankel_float4 hankel_host_mean_of_table_four(hankel_float2 place, hankel_
 static float hankel_host_percentage_closer(hankel_float2 uv, uint32_t radius)
 {
     return hankel_percentage_closer(hankel_make_uint2(5u, 4u), radius & 3u, uv, host_compare, 0);
+}
+static float hankel_host_percentage_closer_weighted(hankel_float2 uv, uint32_t count)
+{
+    const hankel_uint2 size = hankel_make_uint2(5u, 4u);
+    return hankel_percentage_closer_weighted(size, 1u + (count & 1u), uv, host_weight, 0, host_compare, 0);
+}
+static hankel_float4 hankel_host_mean_of_footprint(hankel_float2 uv, hankel_float2 dx, hankel_float2 dy)
+{
+    return hankel_mean_of_footprint(uv, dx, dy, hankel_make_uint2(5u, 4u), 4.0f, host_sample_of_width, 0);
 }
 ";
 
@@ -244,6 +344,16 @@ pub fn host_mean_of_table_four(place: [f32; 2], reach: [f32; 2]) -> [f32; 4] {
 }
 pub fn host_percentage_closer(uv: [f32; 2], radius: u32) -> f32 {
     percentage_closer([5, 4], radius & 3, uv, &compare)
+}
+pub fn host_percentage_closer_weighted(uv: [f32; 2], count: u32) -> f32 {
+    let weight = |i| if i == 0 { 0.5 } else { 0.25 };
+    percentage_closer_weighted([5, 4], 1 + (count & 1), uv, &weight, &compare)
+}
+pub fn host_mean_of_footprint(uv: [f32; 2], dx: [f32; 2], dy: [f32; 2]) -> [f32; 4] {
+    let within = |t: f32| if t > 0.0 { if t < 1.0 { t } else { 1.0 } } else { 0.0 };
+    mean_of_footprint(uv, dx, dy, [5, 4], 4.0, &|uv, width| {
+        [within(uv[0]), within(uv[1]), width, 1.0]
+    })
 }
 fn compare(at: [u32; 2]) -> f32 {
     ((at[0] * 3 + at[1]) & 1) as f32

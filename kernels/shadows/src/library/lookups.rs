@@ -6,8 +6,9 @@ use hankel_dsl::{Real, function};
 use hankel_moments::{FixedPoint, Moments4, quantize_symmetric_4};
 
 use super::store::{channels, fixed, moments_of_depth, quantize_symmetric_four, symmetric_depth};
+use crate::mips::Footprint;
 use crate::resolve::mean_of;
-use crate::shade::percentage;
+use crate::shade::{percentage, weighted};
 use crate::soft::{Area, region};
 
 /// A texel of a map of moments (\[BHS\], lecture, "Generate a moment shadow map"): the mean of the first four
@@ -83,4 +84,47 @@ pub fn percentage_closer(
     compare: impl Fn(UVec2) -> f32,
 ) -> f32 {
     percentage(size, radius, uv, compare)
+}
+
+/// Percentage-closer filtering with the weights of a separable filter and of bilinear lookup: what a filtered
+/// shadow map approximates. `weight` gives the filter's weight of a texel that is so many texels away along one
+/// axis, from 0 to `count - 1`; all weights of an axis have the sum 1, both sides counted. A map has `size`
+/// texels; beyond its edge the last texel counts once more. `compare` gives the share of a texel's samples that
+/// are nearer than the receiver, from 0 to 1. It is called `4 count count` times.
+#[function]
+#[inline(always)]
+pub fn percentage_closer_weighted(
+    size: UVec2,
+    count: u32,
+    uv: Vec2,
+    weight: impl Fn(u32) -> f32,
+    compare: impl Fn(UVec2) -> f32,
+) -> f32 {
+    weighted(size, count, uv, weight, compare)
+}
+
+/// Anisotropic lookup (P. Heckbert, *Fundamentals of Texture Mapping and Image Warping*, 1989): the mean of a
+/// filtered map over what a pixel sees of it. `dx` and `dy` are how much `uv` changes to the next pixel along x and
+/// along y; a map has `size` texels. The longer axis of a footprint counts for up to `anisotropy` times the shorter
+/// one, from 1 (trilinear lookup) to 16.
+///
+/// `sample_of_width` looks the map up at a place, with a linear filter, between mip levels too, where texels are
+/// `width` texels of the whole map wide: the level is the logarithm of that to base 2. It is called at most
+/// `anisotropy + 2` times. The bias and the bound come after.
+#[function]
+#[inline(always)]
+pub fn mean_of_footprint(
+    uv: Vec2,
+    dx: Vec2,
+    dy: Vec2,
+    size: UVec2,
+    anisotropy: f32,
+    sample_of_width: impl Fn(Vec2, f32) -> Vec4,
+) -> Vec4 {
+    let texels = Vec2::new(size.x as f32, size.y as f32);
+    // No footprint is wider than that in the map, and squares of steps stay finite.
+    let near = |t: f32| Real::clamp(t, -16.0, 16.0);
+    let step = |d: Vec2| Vec2::new(near(d.x) * texels.x, near(d.y) * texels.y);
+    let footprint = Footprint::of_steps([step(dx), step(dy)], texels, anisotropy);
+    footprint.mean(uv, |uv| sample_of_width(uv, footprint.width))
 }

@@ -5,7 +5,7 @@
 //! | --- | --- |
 //! | the least shadow that moments allow | [`bounds`] |
 //! | what is nearer than a receiver, for soft shadows | [`blockers`] |
-//! | bounds from two to ten moments with a free total | [`totals`] |
+//! | bounds from two to twelve moments with a free total | [`totals`] |
 //! | exponential and convolution shadow maps | [`exponential`], [`convolution`] |
 //! | translucent casters, single scattering | [`translucent`], [`scattering`] |
 //! | resolves and filters that look a map up more than once | [`lookups`] |
@@ -68,6 +68,7 @@ hankel_dsl::library! {
             totals::bounds_of_six,
             totals::bounds_of_eight,
             totals::bounds_of_ten,
+            totals::bounds_of_twelve,
             totals::bounds_of_four_compensated,
             totals::bounds_of_six_compensated,
             store::symmetric_depth,
@@ -91,6 +92,8 @@ hankel_dsl::library! {
             lookups::resolve_quantized_four,
             lookups::mean_of_table_four,
             lookups::percentage_closer,
+            lookups::percentage_closer_weighted,
+            lookups::mean_of_footprint,
             depths::two_depths,
             depths::three_depths,
             depths::three_shares,

@@ -1,4 +1,4 @@
-//! Bounds from two to ten power moments with a free total.
+//! Bounds from two to twelve power moments with a free total.
 
 use hankel_dsl::function;
 use hankel_dsl::glam::{Vec2, Vec3, Vec4};
@@ -93,4 +93,17 @@ pub fn bounds_of_ten(total: f32, low: Vec4, middle: Vec4, high: Vec2, depth: f32
     m[9] = high.x;
     m[10] = high.y;
     pair(bound::<f32, 5>(m, depth))
+}
+
+/// The least (x) and the greatest (y) amount below `depth`, from twelve power moments (1 to 4 in `low`,
+/// 5 to 8 in `middle`, 9 to 12 in `high`) and their total; both from 0 to `total`. Depths may be
+/// anywhere.
+#[function]
+pub fn bounds_of_twelve(total: f32, low: Vec4, middle: Vec4, high: Vec4, depth: f32) -> Vec2 {
+    let mut m = eight(total, low, middle);
+    m[9] = high.x;
+    m[10] = high.y;
+    m[11] = high.z;
+    m[12] = high.w;
+    pair(bound::<f32, 6>(m, depth))
 }
