@@ -1648,6 +1648,7 @@ impl<'a> Evaluator<'a> {
                 let id = self.new_local(name, x.ty.clone(), Rank::Part);
                 self.changing.insert(id);
                 then_block.push(Stmt::Assign(id, x.clone()));
+                // A literal is the initial value, and the other side has nothing to assign.
                 let first = if matches!(y.kind, Kind::Literal(_)) {
                     y.clone()
                 } else {

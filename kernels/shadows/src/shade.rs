@@ -2,16 +2,14 @@
 //! same light. Here are those of four power moments and of the depths themselves, and what all share.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{
-    Buffer, Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel, to_i32,
-};
+use hankel_dsl::{Buffer, Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{
     Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
     hausdorff_4, hausdorff_4_symmetric, variance_2,
 };
 
 use crate::depth::{Transform, row_times_point};
-use crate::grid::within;
+use crate::library::lookups::{percentage_closer, percentage_closer_weighted};
 
 /// How the map holds moments: values of the specialisation constant `encoding`.
 pub mod encoding {
@@ -314,81 +312,7 @@ shading! {
     )
 }
 
-/// The mean of what `compare` gives for the texels of a square around a place in a map.
-#[inline(always)]
-pub(crate) fn percentage(
-    size: UVec2,
-    radius: u32,
-    uv: Vec2,
-    compare: impl Fn(UVec2) -> f32,
-) -> f32 {
-    let nearest = |t: f32, size: u32| {
-        let last = (size - 1) as f32;
-        // Not negative, so that cutting the fraction off is rounding down.
-        to_i32(Real::clamp(t * size as f32, 0.0, last))
-    };
-    let (left, top) = (
-        nearest(uv.x, size.x) - radius as i32,
-        nearest(uv.y, size.y) - radius as i32,
-    );
-    let width = 2 * radius + 1;
-    let mut shadowed = 0.0;
-    let mut row = 0;
-    while row < width {
-        let y = within(top + row as i32, size.y);
-        let mut column = 0;
-        while column < width {
-            shadowed += compare(UVec2::new(within(left + column as i32, size.x), y));
-            column += 1;
-        }
-        row += 1;
-    }
-    let width = width as f32;
-    shadowed / (width * width)
-}
-
-/// The mean of what `compare` gives for the texels around a place in a map of `size` texels, by a separable filter
-/// and bilinear lookup: `weight` gives the filter's weight of a texel from 0 to `count - 1` texels away.
-#[inline(always)]
-pub(crate) fn weighted(
-    size: UVec2,
-    count: u32,
-    uv: Vec2,
-    weight: impl Fn(u32) -> f32,
-    compare: impl Fn(UVec2) -> f32,
-) -> f32 {
-    // In texels from the first one's centre; beyond the edge as at it.
-    let place = |t: f32, size: u32| Real::clamp(t * size as f32 - 0.5, 0.0, (size - 1) as f32);
-    let (x, y) = (place(uv.x, size.x), place(uv.y, size.y));
-    let (left, top) = (to_i32(x), to_i32(y));
-    let (right_share, low_share) = (x - left as f32, y - top as f32);
-    let count = count as i32;
-    let weight_at = |d: i32| {
-        let d = if d < 0 { -d } else { d };
-        if d < count { weight(d as u32) } else { 0.0 }
-    };
-    let width = 2 * count as u32;
-    let mut shadowed = 0.0;
-    let mut row = 0;
-    while row < width {
-        let dy = row as i32 + 1 - count;
-        let mut of_row = 0.0;
-        let mut column = 0;
-        while column < width {
-            let dx = column as i32 + 1 - count;
-            let at = UVec2::new(within(left + dx, size.x), within(top + dy, size.y));
-            let share = weight_at(dx) * (1.0 - right_share) + weight_at(dx - 1) * right_share;
-            of_row += share * compare(at);
-            column += 1;
-        }
-        let share = weight_at(dy) * (1.0 - low_share) + weight_at(dy - 1) * low_share;
-        shadowed += share * of_row;
-        row += 1;
-    }
-    Real::saturate(shadowed)
-}
-
-/// [`weighted`] of the samples of a depth map that are nearer than `z`.
+/// [`percentage_closer_weighted`] of the samples of a depth map that are nearer than `z`.
 #[inline(always)]
 pub(crate) fn weighted_nearer(
     depth: Texture2dMultisampled<'_>,
@@ -398,7 +322,7 @@ pub(crate) fn weighted_nearer(
     z: f32,
 ) -> f32 {
     let weight = |i: u32| weights.get(i);
-    weighted(depth.size(), weights.len(), uv, weight, |at| {
+    percentage_closer_weighted(depth.size(), weights.len(), uv, weight, |at| {
         let mut nearer = 0.0;
         let mut i = 0;
         while i < samples {
@@ -424,7 +348,7 @@ pub fn shade_pcf(
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
-        percentage(depth.size(), light.filter_radius, uv, |at| {
+        percentage_closer(depth.size(), light.filter_radius, uv, |at| {
             if depth.load(at, 0).x < z { 1.0 } else { 0.0 }
         })
     })

@@ -15,8 +15,9 @@ use hankel_dsl::{Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
 use hankel_moments::{Moments4, Quantized4, quantize_symmetric_4, quantize_unit_4};
 
 use crate::depth::Transform;
+use crate::library::lookups::percentage_closer;
 use crate::resolve::mean_of;
-use crate::shade::{Light, encoding, percentage, shade_by};
+use crate::shade::{Light, encoding, shade_by};
 use crate::six::halves;
 
 /// A vertex of a translucent surface: position; colour with opacity; position in clip space once more.
@@ -305,7 +306,7 @@ pub fn shade_stochastic(
     #[texture] kept: Texture2dMultisampled<'_>,
 ) -> Vec4 {
     shade_by(light, world, normal, colour, |uv, z| {
-        percentage(depth.size(), light.filter_radius, uv, |at| {
+        percentage_closer(depth.size(), light.filter_radius, uv, |at| {
             let sample = |i: u32, kept: f32| {
                 let nearest = Real::min(depth.load(at, i).x, kept);
                 if nearest < z { 0.25 } else { 0.0 }

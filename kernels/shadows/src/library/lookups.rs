@@ -2,13 +2,13 @@
 //! from wherever the engine keeps them.
 
 use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec4};
-use hankel_dsl::{Real, function};
+use hankel_dsl::{Real, function, to_i32};
 use hankel_moments::{FixedPoint, Moments4, quantize_symmetric_4};
 
 use super::store::{channels, fixed, moments_of_depth, quantize_symmetric_four, symmetric_depth};
+use crate::grid::within;
 use crate::mips::Footprint;
 use crate::resolve::mean_of;
-use crate::shade::{percentage, weighted};
 use crate::soft::{Area, region};
 
 /// A texel of a map of moments (\[BHS\], lecture, "Generate a moment shadow map"): the mean of the first four
@@ -83,14 +83,36 @@ pub fn percentage_closer(
     uv: Vec2,
     compare: impl Fn(UVec2) -> f32,
 ) -> f32 {
-    percentage(size, radius, uv, compare)
+    let nearest = |t: f32, size: u32| {
+        let last = (size - 1) as f32;
+        // Not negative, so that cutting the fraction off is rounding down.
+        to_i32(Real::clamp(t * size as f32, 0.0, last))
+    };
+    let (left, top) = (
+        nearest(uv.x, size.x) - radius as i32,
+        nearest(uv.y, size.y) - radius as i32,
+    );
+    let width = 2 * radius + 1;
+    let mut shadowed = 0.0;
+    let mut row = 0;
+    while row < width {
+        let y = within(top + row as i32, size.y);
+        let mut column = 0;
+        while column < width {
+            shadowed += compare(UVec2::new(within(left + column as i32, size.x), y));
+            column += 1;
+        }
+        row += 1;
+    }
+    let width = width as f32;
+    shadowed / (width * width)
 }
 
 /// Percentage-closer filtering with the weights of a separable filter and of bilinear lookup: what a filtered
 /// shadow map approximates. `weight` gives the filter's weight of a texel that is so many texels away along one
 /// axis, from 0 to `count - 1`; all weights of an axis have the sum 1, both sides counted. A map has `size`
 /// texels; beyond its edge the last texel counts once more. `compare` gives the share of a texel's samples that
-/// are nearer than the receiver, from 0 to 1. It is called `4 count count` times.
+/// are nearer than the receiver, from 0 to 1; it is called `4 * count * count` times.
 #[function]
 #[inline(always)]
 pub fn percentage_closer_weighted(
@@ -100,13 +122,41 @@ pub fn percentage_closer_weighted(
     weight: impl Fn(u32) -> f32,
     compare: impl Fn(UVec2) -> f32,
 ) -> f32 {
-    weighted(size, count, uv, weight, compare)
+    // In texels from the first one's centre; beyond the edge as at it.
+    let place = |t: f32, size: u32| Real::clamp(t * size as f32 - 0.5, 0.0, (size - 1) as f32);
+    let (x, y) = (place(uv.x, size.x), place(uv.y, size.y));
+    let (left, top) = (to_i32(x), to_i32(y));
+    let (right_share, low_share) = (x - left as f32, y - top as f32);
+    let count = count as i32;
+    let weight_at = |d: i32| {
+        let d = if d < 0 { -d } else { d };
+        if d < count { weight(d as u32) } else { 0.0 }
+    };
+    let width = 2 * count as u32;
+    let mut shadowed = 0.0;
+    let mut row = 0;
+    while row < width {
+        let dy = row as i32 + 1 - count;
+        let mut of_row = 0.0;
+        let mut column = 0;
+        while column < width {
+            let dx = column as i32 + 1 - count;
+            let at = UVec2::new(within(left + dx, size.x), within(top + dy, size.y));
+            let share = weight_at(dx) * (1.0 - right_share) + weight_at(dx - 1) * right_share;
+            of_row += share * compare(at);
+            column += 1;
+        }
+        let share = weight_at(dy) * (1.0 - low_share) + weight_at(dy - 1) * low_share;
+        shadowed += share * of_row;
+        row += 1;
+    }
+    Real::saturate(shadowed)
 }
 
 /// Anisotropic lookup (P. Heckbert, *Fundamentals of Texture Mapping and Image Warping*, 1989): the mean of a
 /// filtered map over what a pixel sees of it. `dx` and `dy` are how much `uv` changes to the next pixel along x and
-/// along y; a map has `size` texels. The longer axis of a footprint counts for up to `anisotropy` times the shorter
-/// one, from 1 (trilinear lookup) to 16.
+/// along y; a map has `size` texels. `anisotropy`, from 1 (trilinear lookup) to 16, is how many times as long as wide a
+/// footprint is at most. Longer ones are taken for wider ones.
 ///
 /// `sample_of_width` looks the map up at a place, with a linear filter, between mip levels too, where texels are
 /// `width` texels of the whole map wide: the level is the logarithm of that to base 2. It is called at most
