@@ -1,4 +1,4 @@
-//! From a kernel crate to raw SPIR-V, one module for each entry point.
+//! From a kernel crate to raw SPIR-V: one module of all entry points, divided into one for each.
 //!
 //! This runs cargo as `spirv-builder` does, with the same flags, and takes rust-gpu's types for
 //! the target's description and for the result from the crate that spirv-builder takes them from.
@@ -23,7 +23,7 @@ use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
-use crate::spirv::trim;
+use crate::spirv::{self, divide, trim};
 
 /// What the modules are compiled for.
 const TARGET: &str = "spirv-unknown-vulkan1.2";
@@ -362,8 +362,7 @@ fn cargo(
         // Its optimiser makes one constant of two in a row, which rounds otherwise than the source
         // (tests/upstream/rust-gpu-merged-constants).
         // `finish` runs it, with arithmetic held.
-        "-Cllvm-args=--module-output=multiple --spirv-metadata=name-variables --no-spirv-opt"
-            .into(),
+        "-Cllvm-args=--module-output=single --spirv-metadata=name-variables --no-spirv-opt".into(),
         format!("-Ctarget-feature={}", capabilities.join(",")),
     ];
     cargo
@@ -507,6 +506,7 @@ fn last_artefact(messages: &str) -> Option<Artefact> {
         .rfind(|artefact| artefact.file.to_string_lossy().ends_with(".spv.json"))
 }
 
+/// The raw modules of a crate's entry points.
 fn read_modules(
     manifest: &Path,
     artefact: &Path,
@@ -517,26 +517,27 @@ fn read_modules(
         path: artefact.to_owned(),
         problem: format!("rust-gpu wrote no list of modules: {error}"),
     })?;
-    let ModuleResult::MultiModule(files) = result.module else {
+    let ModuleResult::SingleModule(file) = result.module else {
         return Err(Error::Bundle {
             path: artefact.to_owned(),
-            problem: "rust-gpu wrote one module for all entry points".into(),
+            problem: "rust-gpu wrote a module for each entry point".into(),
         });
     };
-    if let Some(missing) = kernels.iter().find(|name| !files.contains_key(**name)) {
+    let bytes = std::fs::read(&file).during("read", &file)?;
+    let crate_name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let module = spirv::load(&spirv::words(&bytes, &crate_name)?, &crate_name)?;
+    let modules = divide::entry_points(&module);
+    if let Some(missing) = kernels.iter().find(|name| !modules.contains_key(**name)) {
         return Err(Error::NoEntryPoint {
             manifest: manifest.to_owned(),
             kernel: (*missing).into(),
-            found: files.keys().cloned().collect(),
+            found: modules.into_keys().collect(),
         });
     }
-    files
+    Ok(modules
         .into_iter()
-        .map(|(name, file)| {
-            let bytes = std::fs::read(&file).during("read", &file)?;
-            Ok((name, bytes))
-        })
-        .collect()
+        .map(|(name, module)| (name, spirv::bytes(&spirv::store(&module))))
+        .collect())
 }
 
 #[cfg(test)]

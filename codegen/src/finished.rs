@@ -16,6 +16,7 @@ use crate::error::{Failure, Result};
 use crate::files::{self, sha256, write_whole};
 use crate::finish::{self, PIPELINE};
 use crate::folder::MOST_BYTES;
+use crate::spirv::{self, canonical, trim};
 
 /// Length of the hash that stands before a kept module.
 const HASH: usize = 64;
@@ -77,15 +78,33 @@ fn finish_one(
 }
 
 fn file_name(module: &[u8], kernel: &Kernel) -> String {
+    // Errors name the line, and what is kept has none.
+    let description = Kernel {
+        line: 0,
+        ..kernel.clone()
+    };
     // Nothing in a description can fail to become JSON.
-    let description = serde_json::to_string(kernel).unwrap_or_default();
+    let description = serde_json::to_string(&description).unwrap_or_default();
     let parts = [
-        sha256(module),
+        sha256(&without_lines(module, &kernel.name)),
         description,
         PIPELINE.into(),
         env!("HANKEL_SPIRV_TOOLS_VERSION").into(),
     ];
     format!("{}.spv", sha256(parts.join("\n").as_bytes()))
+}
+
+/// A raw module without the lines of its source, in the order of [`canonical`]: an edit above a function, or of
+/// another entry point, changes neither.
+fn without_lines(module: &[u8], name: &str) -> Vec<u8> {
+    let read = spirv::words(module, name).and_then(|words| spirv::load(&words, name));
+    let Ok(mut read) = read else {
+        // `finish` says what is wrong with it.
+        return module.to_vec();
+    };
+    trim::lines(&mut read);
+    canonical::order(&mut read);
+    spirv::bytes(&spirv::store(&read))
 }
 
 /// A kept module, if it is the one that was written.

@@ -2,6 +2,7 @@
 
 pub mod bounds;
 pub(crate) mod canonical;
+pub(crate) mod divide;
 pub(crate) mod edit;
 pub mod exact;
 pub mod libm;

@@ -330,9 +330,14 @@ fn uses_otherwise(module: &Module, variable: Word, access: Op) -> bool {
 
 /// Drops source lines and names; the names are written anew from the kernel's description.
 pub fn debug(module: &mut Module) {
+    module.debug_names.clear();
+    lines(module);
+}
+
+/// Drops source lines.
+pub fn lines(module: &mut Module) {
     module.debug_string_source.clear();
     module.debug_module_processed.clear();
-    module.debug_names.clear();
     for function in &mut module.functions {
         for block in &mut function.blocks {
             block
