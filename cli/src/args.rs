@@ -189,6 +189,7 @@ Examples:
   hankel build --out shaders --hlsl-space 2 --wgsl-group 1 --msl-slot-base 8 --bindings places.toml
   hankel build --out shaders --manifest-path my-kernels/Cargo.toml
   hankel build --form functions --out libraries
+  hankel build --form functions --function 'hamburger_*' --function mix_bias --out libraries
   hankel build --scene scenes/fence.toml --out frame
   hankel build --scene scenes/fence.toml --technique auto --error 0.1 --target wgsl --out frame
 
@@ -220,6 +221,9 @@ pub struct Build {
     /// What the names of a library begin with.
     #[arg(long, value_name = "NAME", default_value = "hankel")]
     pub prefix: String,
+    /// Libraries: only this function, and what it calls; `*` stands for any letters; may be repeated.
+    #[arg(long = "function", value_name = "NAME")]
+    pub functions: Vec<String>,
     /// Folder for what is generated.
     #[arg(long, value_name = "FOLDER", default_value = "shaders")]
     pub out: PathBuf,

@@ -112,3 +112,50 @@ fn what_libraries_follow_from_is_known_to_build_tools() {
         assert!(rule.contains(file), "no {file} in {rule}");
     }
 }
+
+#[test]
+fn a_choice_of_functions_is_what_an_engine_takes() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let run = |line: &str| {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        let output = hankel(&arguments, elsewhere.path());
+        let words = [output.stdout, output.stderr].concat();
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&words).into_owned(),
+        )
+    };
+    let size = || {
+        let path = elsewhere.path().join("lib/wgsl/hankel_shadows.wgsl");
+        std::fs::read_to_string(path).expect("a library")
+    };
+    assert_eq!(run("build --form functions --out lib").0, Some(0));
+    let whole = size();
+    let (code, words) =
+        run("build --form functions --out lib --function hamburger_bound --function mix_*");
+    // That fewer are chosen is no change of a signature.
+    assert_eq!(code, Some(0), "{words}");
+    let few = size();
+    assert!(
+        few.len() * 4 < whole.len(),
+        "{} of {}",
+        few.len(),
+        whole.len()
+    );
+    assert!(few.contains("fn hankel_hamburger_bound(") && few.contains("fn hankel_mix_bias("));
+    assert!(few.contains("HANKEL_SHADOWS_SYMMETRIC_FOUR_SIXTEEN_BITS_TARGET"));
+    assert!(!few.contains("fn hankel_hausdorff_bound("));
+    // The folder remembers the choice.
+    assert_eq!(run("check lib").0, Some(0));
+
+    let (code, words) = run("build --form functions --out lib --function hamburger_bonud");
+    assert_eq!(code, Some(2), "{words}");
+    assert!(
+        words.contains("no function is named `hamburger_bonud`")
+            && words.contains("hamburger_bound"),
+        "{words}"
+    );
+    let (code, words) = run("build --out shaders --function mix_*");
+    assert_eq!(code, Some(2), "{words}");
+    assert!(words.contains("--form functions"), "{words}");
+}

@@ -255,6 +255,7 @@ pub fn of_libraries(old: &api::Record, new: &api::Record) -> Diff {
         build: [
             changes("hankel", &old.hankel, &new.hankel, |_| false),
             changes("prefix", &old.prefix, &new.prefix, |_| true),
+            changes("functions", &old.functions, &new.functions, |_| false),
         ]
         .concat(),
         ..Diff::default()
@@ -466,6 +467,7 @@ mod tests {
         Record {
             hankel: "1".into(),
             prefix: "hankel".into(),
+            functions: Vec::new(),
             libraries: [("shadows".into(), library)].into(),
             files: BTreeMap::new(),
         }

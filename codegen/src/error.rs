@@ -185,6 +185,14 @@ pub enum Error {
         /// What there is.
         known: Vec<String>,
     },
+    /// No function of a library matches.
+    #[error("no function is named `{name}`; there are: {}", list(known))]
+    UnknownFunction {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
     /// No such language.
     #[error("no target is named `{name}`; there are: {}", list(known))]
     UnknownTarget {
@@ -360,6 +368,7 @@ impl Error {
             Self::UnknownKernel { .. } => {
                 "Name one of these, or part of a name with `*`; `hankel list` shows them.".into()
             }
+            Self::UnknownFunction { .. } => "Name one of these, or part of a name with `*`.".into(),
             Self::InTheWay {
                 kind: None | Some("a FIFO" | "a socket" | "a device"),
                 ..

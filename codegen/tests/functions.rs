@@ -519,7 +519,7 @@ fn folder_of(body: &str, api: u32) -> Folder {
     let text = format!(
         "#[function]\n{body}\nhankel_dsl::library!(sample {{ api: {api}, functions: [f] }});"
     );
-    Folder::new(&libraries(&text).unwrap(), "hankel", "0").unwrap()
+    Folder::new(&libraries(&text).unwrap(), "hankel", &[], "0").unwrap()
 }
 
 #[test]
@@ -580,7 +580,10 @@ fn what_hankel_did_not_write_stays() {
 fn a_prefix_is_a_name() {
     let libraries = one("#[function]\npub fn f(x: f32) -> f32 { x }").unwrap();
     for prefix in ["", "Hankel", "9x", "a__b", "a_", "float", "my-engine"] {
-        assert!(Folder::new(&libraries, prefix, "0").is_err(), "{prefix}");
+        assert!(
+            Folder::new(&libraries, prefix, &[], "0").is_err(),
+            "{prefix}"
+        );
     }
     let naming = Naming {
         prefix: "my_engine".into(),

@@ -24,6 +24,12 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     {
         drop(Output::create(file, &[])?);
     }
+    if args.form == Form::Kernels && !args.functions.is_empty() {
+        return Err(Failure::input(
+            "--function: it is for libraries, and shaders have kernels",
+            "Add --form functions, or choose kernels with --kernel.",
+        ));
+    }
     #[cfg(feature = "frames")]
     match &args.frame.scene {
         Some(scene) => return super::frame::build(args, scene, quiet),
@@ -40,7 +46,7 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     {
         return Err(Failure::input(
             format!("{option}: it is for shaders, and --form functions writes libraries"),
-            "Leave it out: a library has all of its functions in every form.",
+            "Leave it out: a library is written in every form, and --function chooses from it.",
         ));
     }
     if args.watch {

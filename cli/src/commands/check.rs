@@ -26,7 +26,7 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
     }
     if let Some(record) = hankel_codegen::functions::folder::read(&args.folder) {
         let manifest = args.generate.source.manifest_path.as_deref();
-        return functions::check(manifest, &record.prefix, &args.folder, args.format, quiet);
+        return functions::check(manifest, &record, &args.folder, args.format, quiet);
     }
     let budget = match &args.budget {
         Some(file) => Config::read(file)?.budget,

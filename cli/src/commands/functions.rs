@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use hankel_codegen::Error;
+use hankel_codegen::functions::api::Record;
 use hankel_codegen::functions::crates::Sources;
 use hankel_codegen::functions::folder::Folder;
 use hankel_codegen::functions::source::CrateText;
-use hankel_codegen::functions::{crates, read};
+use hankel_codegen::functions::{crates, read_chosen};
 
 use crate::args::{Build, Format};
 use crate::failure::{Failure, Outcome, Result};
@@ -15,7 +16,11 @@ use crate::session::built_in_manifest;
 
 /// Translates the libraries of the crate at `manifest`, or of the built-in one, and names the files
 /// and folders that they follow from. No kernel is compiled for it.
-fn folder(manifest: Option<&Path>, prefix: &str) -> Result<(Folder, Vec<PathBuf>)> {
+fn folder(
+    manifest: Option<&Path>,
+    prefix: &str,
+    functions: &[String],
+) -> Result<(Folder, Vec<PathBuf>)> {
     let manifest = match manifest {
         Some(path) if path.is_dir() => Some(path.join("Cargo.toml")),
         Some(path) => Some(path.to_owned()),
@@ -29,12 +34,12 @@ fn folder(manifest: Option<&Path>, prefix: &str) -> Result<(Folder, Vec<PathBuf>
         },
     };
     let sha256 = crates::hash(&texts);
-    let libraries = read(&texts).map_err(Error::from)?;
+    let libraries = read_chosen(&texts, functions)?;
     if libraries.is_empty() {
         let name = texts.first().map(|t| t.name.clone()).unwrap_or_default();
         return Err(Error::NoLibrary { name }.into());
     }
-    Ok((Folder::new(&libraries, prefix, &sha256)?, paths))
+    Ok((Folder::new(&libraries, prefix, functions, &sha256)?, paths))
 }
 
 fn from_disk(manifest: &Path) -> Result<Sources> {
@@ -66,7 +71,8 @@ fn embedded() -> Vec<CrateText> {
 
 /// Writes the libraries. Gives the files and folders that they follow from.
 pub fn build(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
-    let (folder, paths) = folder(args.generate.source.manifest_path.as_deref(), &args.prefix)?;
+    let manifest = args.generate.source.manifest_path.as_deref();
+    let (folder, paths) = folder(manifest, &args.prefix, &args.functions)?;
     let report = folder.write(&args.out, args.force)?;
     if args.format == Format::Json {
         print::json(&report);
@@ -83,15 +89,17 @@ pub fn build(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Compares a committed folder of libraries with its sources.
+/// Compares a committed folder of libraries, of which `record` says how it was built, with its sources.
 pub fn check(
     manifest: Option<&Path>,
-    prefix: &str,
+    record: &Record,
     committed: &Path,
     format: Format,
     quiet: bool,
 ) -> Result<Outcome> {
-    let differences = folder(manifest, prefix)?.0.check(committed)?;
+    let differences = folder(manifest, &record.prefix, &record.functions)?
+        .0
+        .check(committed)?;
     if format == Format::Json {
         print::json(&differences);
     } else if !quiet || !differences.is_fine() {

@@ -17,6 +17,9 @@ pub struct Record {
     pub hankel: String,
     /// What names begin with.
     pub prefix: String,
+    /// The functions that it was built with, by name or pattern; none: all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub functions: Vec<String>,
     /// The libraries, by name.
     pub libraries: BTreeMap<String, LibraryRecord>,
     /// SHA-256 of each file, by path.

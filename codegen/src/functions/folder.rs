@@ -66,11 +66,17 @@ impl fmt::Display for Differences {
 }
 
 impl Folder {
-    /// The libraries with names that begin with `prefix`, from sources with a hash.
+    /// The libraries with names that begin with `prefix`, from sources with a hash. `functions` is what of them was
+    /// [chosen](super::read_chosen).
     ///
     /// # Errors
     /// A prefix that is no name.
-    pub fn new(libraries: &[Library], prefix: &str, sources: &str) -> Result<Self> {
+    pub fn new(
+        libraries: &[Library],
+        prefix: &str,
+        functions: &[String],
+        sources: &str,
+    ) -> Result<Self> {
         let is_name = prefix.starts_with(|c: char| c.is_ascii_lowercase())
             && !prefix.ends_with('_')
             && !prefix.contains("__")
@@ -93,6 +99,7 @@ impl Folder {
         let record = Record {
             hankel: crate::VERSION.into(),
             prefix: prefix.into(),
+            functions: functions.to_vec(),
             libraries: libraries
                 .iter()
                 .map(|l| (l.name.clone(), LibraryRecord::of(l)))
@@ -176,7 +183,13 @@ impl Folder {
             let Some(new) = self.record.libraries.get(name) else {
                 continue;
             };
-            let changes = new.breaks(old);
+            let mut old = old.clone();
+            if before.functions != self.record.functions {
+                // What is not chosen any more is no change of the library.
+                old.signatures
+                    .retain(|name, _| new.signatures.contains_key(name));
+            }
+            let changes = new.breaks(&old);
             if !changes.is_empty() && new.api <= old.api {
                 return Err(Error::Api {
                     library: name.clone(),

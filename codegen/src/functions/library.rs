@@ -13,6 +13,8 @@ use super::ir::{Function, Library};
 use super::refusal::Refusal;
 use super::source::{CrateText, Item, ModuleId, Tree, segments};
 use super::tidy::tidy;
+use crate::build::matches;
+use crate::error::Error;
 
 /// `name { api: 1, functions: […], constants: […] }`
 struct List {
@@ -72,6 +74,35 @@ impl Parse for List {
 /// # Errors
 /// What has no form, with file and line.
 pub fn read(crates: &[CrateText]) -> Result<Vec<Library>, Refusal> {
+    Ok(read_where(crates, &mut |_| true)?)
+}
+
+/// As [`read`], with those functions alone that fit one of the patterns (`*` stands for any letters; none: all),
+/// and what they call. Constants are all there; a library without a fitting function is left out.
+///
+/// # Errors
+/// What has no form, with file and line; a pattern that no function fits.
+pub fn read_chosen(crates: &[CrateText], patterns: &[String]) -> Result<Vec<Library>, Error> {
+    let mut known = Vec::new();
+    let libraries = read_where(crates, &mut |name| {
+        known.push(name.to_owned());
+        patterns.is_empty() || patterns.iter().any(|pattern| matches(pattern, name))
+    })?;
+    let fits = |pattern: &String| known.iter().any(|name| matches(pattern, name));
+    match patterns.iter().find(|pattern| !fits(pattern)) {
+        Some(pattern) => Err(Error::UnknownFunction {
+            name: pattern.clone(),
+            known,
+        }),
+        None => Ok(libraries),
+    }
+}
+
+/// The libraries with those of their functions that are wanted, by their names.
+fn read_where(
+    crates: &[CrateText],
+    wanted: &mut dyn FnMut(&str) -> bool,
+) -> Result<Vec<Library>, Refusal> {
     let prelude = CrateText {
         name: PRELUDE.into(),
         files: [(
@@ -94,8 +125,16 @@ pub fn read(crates: &[CrateText]) -> Result<Vec<Library>, Refusal> {
             continue;
         }
         let file = &tree.modules[invocation.module].file;
-        let list: List = syn::parse2(invocation.tokens.clone())
+        let mut list: List = syn::parse2(invocation.tokens.clone())
             .map_err(|e| Refusal::at(file, e.span(), format!("`library!`: {e}")))?;
+        let had_functions = !list.functions.is_empty();
+        list.functions.retain(|path| {
+            let name = segments(path).pop().unwrap_or_default();
+            wanted(&name)
+        });
+        if had_functions && list.functions.is_empty() {
+            continue;
+        }
         libraries.push(translated(&tree, first, invocation.module, list)?);
     }
     Ok(libraries)

@@ -48,7 +48,7 @@ pub mod wgsl;
 
 use std::collections::BTreeMap;
 
-pub use library::read;
+pub use library::{read, read_chosen};
 pub use refusal::Refusal;
 
 use ir::Library;

@@ -6,10 +6,10 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use rspirv::dr::{Function, Instruction, Module, Operand};
-use rspirv::spirv::{Op, Word};
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::Word;
 
-use super::{id, op};
+use super::id;
 
 /// The module of each entry point, by its name: what the entry point reaches, in the order in which it was.
 /// Capabilities and extensions are the whole module's.

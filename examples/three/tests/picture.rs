@@ -39,7 +39,7 @@ fn three_js_draws_what_wgpu_draws_and_rays_say() {
         .expect("the sources")
         .texts;
     let all = functions::read(&texts).unwrap_or_else(|e| panic!("{e}"));
-    let folder = Folder::new(&all, "hankel", &crates::hash(&texts)).expect("libraries");
+    let folder = Folder::new(&all, "hankel", &[], &crates::hash(&texts)).expect("libraries");
     folder.write(libraries.path(), false).expect("libraries");
 
     let native = hankel_example_wgpu::draw().expect("a Vulkan device");

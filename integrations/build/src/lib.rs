@@ -172,6 +172,13 @@ impl Build {
         self.argument("--prefix").argument(prefix)
     }
 
+    /// Libraries: only functions of this name, where `*` stands for any letters, and what they call. May be called
+    /// again.
+    #[must_use]
+    pub fn function(self, pattern: &str) -> Self {
+        self.argument("--function").argument(pattern)
+    }
+
     /// Only kernels of this name, where `*` stands for any letters. May be called again.
     #[must_use]
     pub fn kernel(self, pattern: &str) -> Self {
@@ -567,7 +574,10 @@ mod tests {
         std::fs::write(&program, script).expect("a script");
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
             .expect("it runs");
-        let build = Build::built_in_functions().prefix("own").program(&program);
+        let build = Build::built_in_functions()
+            .prefix("own")
+            .function("mix_*")
+            .program(&program);
         let (functions, lines) = build
             .make(folder.path(), folder.path())
             .unwrap_or_else(|e| panic!("{e}"));
@@ -575,7 +585,7 @@ mod tests {
         assert!(lines.contains(&"rerun-if-changed=/b.rs".to_owned()));
         let said = std::fs::read_to_string(folder.path().join("said")).expect("it ran");
         assert!(said.contains("build --form functions --out"), "{said}");
-        assert!(said.contains("--prefix own"), "{said}");
+        assert!(said.contains("--prefix own --function mix_*"), "{said}");
     }
 
     #[test]
