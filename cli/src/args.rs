@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 #[cfg(feature = "frames")]
+use hankel_frames::graph::ImagePasses;
+#[cfg(feature = "frames")]
 use hankel_frames::scene::Scene;
 
 /// Shaders for every language from kernels written once in Rust.
@@ -577,6 +579,10 @@ pub struct Render {
     pub error: Option<f64>,
     #[command(flatten)]
     pub maps: Maps,
+    /// How passes run that give a texel for each index: as compute passes, or as draws into render targets, as
+    /// far as their kernels can: compute, fragment.
+    #[arg(long, value_name = "FORM", default_value_t)]
+    pub image_passes: ImagePasses,
     /// How much the difference picture is amplified.
     #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION)]
     pub amplify: u32,
@@ -609,6 +615,10 @@ pub struct OfScene {
     pub backend: Option<Backend>,
     #[command(flatten)]
     pub maps: Maps,
+    /// With --scene: how passes run that give a texel for each index: as compute passes, or as draws into render
+    /// targets, as far as their kernels can: compute, fragment [default: compute].
+    #[arg(long, value_name = "FORM", requires = "scene")]
+    pub image_passes: Option<ImagePasses>,
 }
 
 /// Ways to make shadows.

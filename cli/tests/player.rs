@@ -141,6 +141,57 @@ fn mip_levels_are_played() {
     }
 }
 
+/// Image passes are drawn: nothing is computed, no texture is stored to, and the picture is the same.
+#[test]
+fn image_passes_are_played_as_draws() {
+    let desk = Desk::new();
+    for (technique, format) in [
+        ("hamburger", "rgba16unorm"),
+        ("hamburger-6", "rg32uint"),
+        ("hamburger-6", "r32uint"),
+        ("evsm4", "rgba16float"),
+        ("convolution", "rgba8unorm"),
+        ("esm", "r32float"),
+    ] {
+        let shadow = format!("[shadow]\ntechnique = \"{technique}\"\nformat = \"{format}\"");
+        desk.write("scene.toml", SCENE.replace("[shadow]", &shadow));
+        let build = "build --scene scene.toml --target wgsl --out";
+        desk.hankel(&format!("{build} computed")).code(0);
+        desk.hankel(&format!("{build} drawn --image-passes fragment"))
+            .code(0);
+        let (share, largest) = compare(&played(&desk, "drawn"), &played(&desk, "computed"));
+        assert!(
+            share == 0.0,
+            "{technique} {format}: {share} of the pixels, the most by {largest}"
+        );
+        let drawn = rendered(&desk, "scene.toml", "--image-passes fragment");
+        let (share, largest) = compare(&played(&desk, "drawn"), &drawn);
+        assert!(
+            share <= ROUNDED,
+            "{technique} {format}: {share} of the pixels, the most by {largest}"
+        );
+        let frame = json(&desk, "drawn/frame.json");
+        assert_eq!(frame["image_passes"], "fragment");
+        let kinds: Vec<&str> = frame["passes"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|pass| pass["kind"].as_str().expect("a word"))
+            .collect();
+        assert_eq!(
+            kinds,
+            ["draw", "full-screen", "full-screen", "full-screen", "draw"]
+        );
+        let text = desk.read("drawn/frame.json");
+        assert!(!text.contains("storage-binding"), "{technique} {format}");
+        assert!(desk.read("computed/frame.json").contains("storage-binding"));
+        // The folder says itself which form it has.
+        desk.hankel("check drawn --scene scene.toml").code(0);
+    }
+    desk.hankel("build --scene scene.toml --out d --image-passes vertex")
+        .code(2);
+}
+
 /// What is blended, kept sample by sample, or scattered on the way to the camera, is played too.
 #[test]
 fn glass_and_a_medium_are_played() {

@@ -53,6 +53,10 @@ pub struct Frame {
     /// How the light of the scene's medium is made, if it has one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub scattering: Option<Scattering>,
+    /// How passes run that give a texel for each index: as `compute` passes, or drawn by `fragment` shaders as far as
+    /// those can.
+    #[serde(skip_serializing_if = "is_compute", default = "compute")]
+    pub image_passes: String,
     /// The texture that holds the picture after the last pass: linear light, rows from the top.
     pub picture: String,
     /// Buffers, by name.
@@ -68,6 +72,14 @@ pub struct Frame {
     pub shaders: BTreeMap<String, Shader>,
     /// Passes, in the order in which they run.
     pub passes: Vec<Pass>,
+}
+
+fn compute() -> String {
+    "compute".into()
+}
+
+fn is_compute(form: &str) -> bool {
+    form == "compute"
 }
 
 /// How shadows are made, as scene files say it.
@@ -327,6 +339,18 @@ pub enum Pass {
         #[serde(skip_serializing_if = "Option::is_none", default)]
         said_in: Option<SaidIn>,
     },
+    /// Draws a triangle that covers all pixels of its targets: three vertices without attributes and indices, one
+    /// sample of a pixel, no depth, no blending, nothing culled.
+    FullScreen {
+        /// Its name.
+        label: String,
+        /// The vertex shader.
+        vertex: Call,
+        /// The fragment shader with its arguments.
+        fragment: Call,
+        /// Textures that the fragment shader's outputs go to, in order; what they held before is not wanted.
+        targets: Vec<String>,
+    },
     /// Draws triangles.
     Draw(Box<Draw>),
 }
@@ -499,7 +523,10 @@ impl Frame {
     fn draws(&self) -> impl Iterator<Item = &Draw> {
         self.passes.iter().filter_map(|pass| match pass {
             Pass::Draw(draw) => Some(&**draw),
-            Pass::Clear { .. } | Pass::Levels { .. } | Pass::Compute { .. } => None,
+            Pass::Clear { .. }
+            | Pass::Levels { .. }
+            | Pass::Compute { .. }
+            | Pass::FullScreen { .. } => None,
         })
     }
 }

@@ -209,6 +209,14 @@ pub struct KernelEntry {
     /// Compute: how many invocations run where the outputs do not say it.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub range: Option<RangeEntry>,
+    /// Compute: the kernel that draws the same texels into render targets, from the same function and with the same
+    /// parameters, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub fragment_form: Option<String>,
+    /// Fragment: it is the fragment form of compute kernels. Draw a triangle that covers all of its targets, without
+    /// depth and blending; what those kernels take for an index is the pixel, with row 0 where texels have it.
+    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
+    pub full_screen: bool,
     /// Floating-point type of a function that has several: `f32` or `f64`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub precision: Option<String>,
@@ -589,6 +597,8 @@ pub(crate) fn entry(
         dimensions: compute.as_ref().map(|it| it.1),
         workgroup_bytes: compute.as_ref().map(|it| it.2),
         range: compute.and_then(|it| it.3),
+        fragment_form: kernel.fragment_form().map(str::to_owned),
+        full_screen: kernel.is_fragment_form(),
         precision: kernel.precision.map(|precision| {
             match precision {
                 describe::Precision::F32 => "f32",

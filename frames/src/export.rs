@@ -63,6 +63,7 @@ pub fn export(scene: &Scene, file: &str, mesh: &Mesh) -> Result<Draft> {
                 technique: medium.technique.name.into(),
                 steps: medium.steps,
             }),
+            image_passes: scene.image_passes.name().into(),
             picture,
             buffers: export.buffers,
             textures: export.textures,
@@ -433,6 +434,19 @@ impl<'g> Export<'g> {
                     invocations,
                     workgroups: [0, 1, 2].map(groups),
                     said_in,
+                }
+            }
+            Work::FullScreen { vertex, fragment } => {
+                let targets = writes.iter().map(|handle| {
+                    let name = self.name(*handle);
+                    self.attachment(name)
+                });
+                let targets = targets.collect();
+                FramePass::FullScreen {
+                    label: label.into(),
+                    vertex: self.call(label, vertex)?.0,
+                    fragment: self.call(label, fragment)?.0,
+                    targets,
                 }
             }
             Work::Draw {

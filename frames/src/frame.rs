@@ -207,6 +207,7 @@ fn with_lights(
             graph.omit("mips", "the technique interpolates no map");
         }
     }
+    graph.set_image_passes(scene.image_passes)?;
     graph.keep(picture);
     Ok((graph, all, picture))
 }

@@ -7,7 +7,7 @@ use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::Blend;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
-use hankel_shadows::blur::Direction;
+use hankel_shadows::blur::Taps;
 use hankel_shadows::mips::Raster;
 use hankel_shadows::shade::encoding;
 use hankel_shadows::soft::Lines;
@@ -371,6 +371,16 @@ pub fn gaussian(taps: u32) -> Vec<f32> {
     raw.iter().map(|w| (w / sum) as f32).collect()
 }
 
+/// The pass along `step` of a Gaussian with `taps` taps.
+pub fn taps_along(graph: &mut Graph, taps: u32, step: IVec2) -> Handle {
+    let pass = graph.constant("taps", &Taps::new(step, &gaussian(taps)));
+    graph.describe(
+        pass,
+        "A pass of the filter: its direction in texels, and its weights from the centre on.",
+    );
+    pass
+}
+
 /// The Gaussian that the scene asks for, along rows and along columns; the map itself where that
 /// is one texel wide.
 ///
@@ -386,14 +396,12 @@ pub fn blur(graph: &mut Graph, given: &Given, map: Handle) -> Result<Handle> {
         return Ok(map);
     }
     let kernel = format!("blur_{}", shape.format.name());
-    let weights = graph.constants("weights", &gaussian(taps));
     let mut map = map;
     for (label, step) in [("blur rows", IVec2::X), ("blur columns", IVec2::Y)] {
-        let direction = graph.constant("direction", &Direction { step });
+        let pass = taps_along(graph, taps, step);
         map = graph
             .compute(label, kernel.clone())
-            .arg("direction", direction)
-            .arg("weights", weights)
+            .arg("taps", pass)
             .arg("source", map)
             .note(format!("{taps} taps"))
             .image([shape.size[0], shape.size[1]])?;

@@ -9,7 +9,7 @@ use hankel_dsl::native::describe::TexelFormat;
 use hankel_frames::graph::{Graph, GraphError, Handle, Surfaces};
 use hankel_frames::passes::BILINEAR;
 use hankel_host::device::TextureShape;
-use hankel_shadows::blur::Direction;
+use hankel_shadows::blur::Taps;
 use hankel_shadows::depth::Transform;
 use hankel_shadows::shade::Light;
 
@@ -67,6 +67,28 @@ fn kernels_are_found_by_their_names() {
     refused(
         g.compute("resolve", "surface").image([8, 8]),
         &["it is a vertex kernel", "a compute kernel here"],
+    );
+    refused(
+        g.compute("filter", "blur_fragment").image([8, 8]),
+        &["it is a fragment kernel", "a compute kernel here"],
+    );
+    let positions = g.buffer("positions", &[Vec3::ZERO; 3]);
+    let indices = g.buffer("indices", &[0_u32, 1, 2]);
+    let surfaces = Surfaces {
+        positions,
+        indices,
+        clip_from_world: g.parameter("view", &TRANSFORM),
+    };
+    let drawn = g.draw("filter", surfaces, "full_screen");
+    refused(
+        drawn
+            .fragment("blur_fragment")
+            .colour([8, 8], TexelFormat::Rgba16Float, [0.0; 4]),
+        &[
+            "kernel `blur_fragment`",
+            "the fragment form of an image pass",
+            "`set_image_passes`",
+        ],
     );
     assert!(g.passes().is_empty());
 }
@@ -154,23 +176,20 @@ fn types_are_compared_and_not_only_sizes() {
             .elements(10),
         &["`map`: `vectors` holds f32x2[2], but the kernel takes Affine"],
     );
-    let short = g.constant("direction", &IVec2::X);
+    let short = g.constant("step", &IVec2::X);
     let map = g.cleared("map", TextureShape::d2(64, 64, TexelFormat::Rgba16Unorm));
-    let weights = g.constants("weights", &[1.0_f32]);
     refused(
         g.compute("blur", "blur_rgba16unorm")
-            .arg("direction", short)
-            .arg("weights", weights)
+            .arg("taps", short)
             .arg("source", map)
             .image([64, 64]),
-        &["`direction`: `direction` holds i32x2, but the kernel takes Direction"],
+        &["`taps`: `step` holds i32x2, but the kernel takes Taps"],
     );
-    let direction = g.constant("direction", &Direction { step: IVec2::X });
+    let taps = g.constant("taps", &Taps::new(IVec2::X, &[1.0]));
     refused(
         g.compute("blur", "blur_rgba16unorm")
-            .arg("direction", direction)
-            .arg("weights", weights)
-            .arg("source", weights)
+            .arg("taps", taps)
+            .arg("source", taps)
             .image([64, 64]),
         &["`source`: it must be a texture"],
     );

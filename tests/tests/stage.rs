@@ -61,6 +61,54 @@ fn what_a_language_cannot_ask_for_is_refused() {
     assert!(gathered.languages.contains_key(&Essl310));
 }
 
+/// An image pass whose format a language cannot store is drawn in it.
+#[test]
+fn image_passes_are_drawn_where_they_cannot_be_stored() {
+    let generated = Crate::conformance().generate();
+    let kernels = &generated.manifest.kernels;
+    let form = Some("two_forms_fragment");
+    for compute in [
+        "two_forms_rgba16unorm",
+        "two_forms_rgba32float",
+        "two_forms_rgba8unorm",
+    ] {
+        assert_eq!(kernels[compute].fragment_form.as_deref(), form);
+        assert!(!kernels[compute].full_screen);
+    }
+    let stored = &kernels["two_forms_rgba16unorm"].unsupported;
+    assert!(stored[&Essl310].contains("storage textures"), "{stored:?}");
+    assert!(stored[&Essl300].contains("no compute"), "{stored:?}");
+    let fragment = &kernels["two_forms_fragment"];
+    assert!(fragment.full_screen && fragment.unsupported.is_empty());
+    assert_eq!(fragment.bindings.len(), 2);
+    let several = &kernels["several_forms_fragment"];
+    let types: Vec<&str> = several.outputs.iter().map(|it| it.ty.as_str()).collect();
+    assert_eq!(types, ["u32", "vec2<u32>", "vec4<i32>", "f32"]);
+    assert!(several.unsupported.is_empty());
+    let essl = text(&generated, "essl300/two_forms_fragment", ".frag");
+    assert!(essl.contains("gl_FragCoord"), "{essl}");
+}
+
+/// Which passes of a shadow map WebGL 2 can run, and what keeps it from the others.
+#[test]
+fn filters_run_in_webgl_2() {
+    let generated = Crate::shadows().generate();
+    let kernels = &generated.manifest.kernels;
+    let fragments = kernels.iter().filter(|(_, kernel)| kernel.full_screen);
+    for (name, kernel) in fragments {
+        assert!(!kernel.unsupported.contains_key(&Essl310), "{name}");
+        let reads_samples = kernel.bindings.iter().any(|it| it.is_multisampled());
+        match kernel.unsupported.get(&Essl300) {
+            None => assert!(!reads_samples, "{name}"),
+            Some(why) => assert!(why.contains("no multisampled textures"), "{name}: {why}"),
+        }
+    }
+    for name in ["blur_fragment", "halve_fragment", "blur_packed_10_fragment"] {
+        assert!(kernels[name].languages.contains_key(&Essl300), "{name}");
+    }
+    assert!(kernels["full_screen"].languages.contains_key(&Essl300));
+}
+
 #[test]
 fn what_textures_are_sampled_with_is_in_the_texts() {
     let generated = Crate::conformance().generate();

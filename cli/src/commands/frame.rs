@@ -40,6 +40,7 @@ pub fn build(args: &Build, file: &Path, quiet: bool) -> Result<Outcome> {
         error: of_scene.error,
         maps: &of_scene.maps,
         backend: of_scene.backend.unwrap_or_default(),
+        image_passes: of_scene.image_passes.unwrap_or_default(),
     };
     let scene = asked.read(file)?;
     let quiet = quiet || args.format == Format::Json;
@@ -105,6 +106,10 @@ pub fn expected(args: &Check, file: &Path, quiet: bool) -> Result<Generated> {
             }
         }
         Some(name) => scene.shadow = with_technique(scene.shadow, name)?,
+    }
+    // Of a file that cannot be read, the comparison tells.
+    if let Ok(record) = read(&args.folder) {
+        scene.image_passes = record.image_passes.parse().unwrap_or_default();
     }
     let session = Session::linked(quiet);
     let request = session.request_again(&args.generate, &args.folder)?;

@@ -86,6 +86,9 @@ fn bindings(kernel: &Kernel) {
         }
         Rounding::Exact => say!("    exact: no contraction or reordering in any language"),
     }
+    if let Some(name) = kernel.fragment_form() {
+        say!("    fragment form: {name}, which draws the same into render targets");
+    }
     if let Some(name) = &kernel.compensated {
         say!("    compensated: {name}, which `hankel eval` runs without --fast");
     }
@@ -168,6 +171,7 @@ fn bindings(kernel: &Kernel) {
             Role::Constant { id, default } => format!("constant {id}, default {default}"),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
             Role::Varying { location, ty, flat } => varying(*location, ty, *flat),
+            Role::Index if kernel.is_fragment_form() => "the pixel".into(),
             Role::Index => "the invocation's index".into(),
             Role::BuiltIn { built_in } => match built_in {
                 BuiltIn::LocalId => "the invocation's place in its workgroup",

@@ -39,6 +39,7 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         error: args.error,
         maps: &args.maps,
         backend: args.backend,
+        image_passes: args.image_passes,
     };
     let scene = asked.read(&args.scene)?;
     let is_linear = is_exr(&args.out);

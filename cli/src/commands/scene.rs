@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hankel_frames::Picture;
+use hankel_frames::graph::ImagePasses;
 use hankel_frames::plan::Wanted;
 use hankel_frames::scene::{Geometry, Scene, Shadow};
 use hankel_system::output::Output;
@@ -25,12 +26,17 @@ pub struct Asked<'a> {
     pub maps: &'a Maps,
     /// Where the frame will run.
     pub backend: Backend,
+    /// How its image passes run.
+    pub image_passes: ImagePasses,
 }
 
 impl Asked<'_> {
     /// Reads a scene, with the technique that was asked for by name.
     pub fn read(&self, file: &Path) -> Result<Scene> {
-        let mut scene = Scene::read(file)?;
+        let mut scene = Scene {
+            image_passes: self.image_passes,
+            ..Scene::read(file)?
+        };
         let is_planned = self.technique == Some(AUTO);
         if let Some(name) = self.technique.filter(|_| !is_planned) {
             scene.shadow = with_technique(scene.shadow, name)?;

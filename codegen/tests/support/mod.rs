@@ -68,6 +68,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         rounding: Rounding::Free,
         subgroups: Subgroups::Unused,
         compensated: None,
+        image_pass: None,
     }
 }
 

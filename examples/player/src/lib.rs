@@ -115,7 +115,8 @@ enum Pass {
         pipeline: wgpu::RenderPipeline,
         groups: Vec<(u32, wgpu::BindGroup)>,
         attributes: Vec<String>,
-        indices: String,
+        /// Without them, the vertices in their order.
+        indices: Option<String>,
         count: u32,
         colours: Vec<Colour>,
         depth: Option<Depth>,
@@ -406,9 +407,13 @@ impl Player {
                     for (slot, name) in (0..).zip(attributes) {
                         pass.set_vertex_buffer(slot, find(&self.buffers, name)?.slice(..));
                     }
-                    let indices = find(&self.buffers, indices)?.slice(..);
-                    pass.set_index_buffer(indices, wgpu::IndexFormat::Uint32);
-                    pass.draw_indexed(0..*count, 0, 0..1);
+                    if let Some(indices) = indices {
+                        let indices = find(&self.buffers, indices)?.slice(..);
+                        pass.set_index_buffer(indices, wgpu::IndexFormat::Uint32);
+                        pass.draw_indexed(0..*count, 0, 0..1);
+                    } else {
+                        pass.draw(0..*count, 0..1);
+                    }
                 }
             }
             self.queue.submit([encoder.finish()]);
@@ -640,6 +645,7 @@ impl Make<'_> {
                     workgroups: three(pass, "workgroups")?,
                 })
             }
+            "full-screen" => self.full_screen(pass),
             "draw" => self.draw(pass),
             other => Err(format!("frame.json: no pass is of the kind `{other}`")),
         }
@@ -744,10 +750,62 @@ impl Make<'_> {
             groups,
             pipeline,
             attributes,
-            indices: text(indices, "buffer")?.to_owned(),
+            indices: Some(text(indices, "buffer")?.to_owned()),
             count: number(indices, "count")?,
             colours,
             depth,
+        })
+    }
+
+    /// A triangle over all pixels of its targets: an image pass in its fragment form.
+    fn full_screen(&self, pass: &Value) -> Result<Pass> {
+        let (vertex, fragment) = (at(pass, "vertex")?, at(pass, "fragment")?);
+        let (mut targets, mut colours) = (Vec::new(), Vec::new());
+        for name in list(pass, "targets")? {
+            let drawn = find(self.textures, name.as_str().unwrap_or_default())?;
+            targets.push(Some(drawn.texel.format.into()));
+            colours.push(Colour {
+                view: drawn.view(),
+                resolve: None,
+                clear: wgpu::Color::TRANSPARENT,
+            });
+        }
+        let (module, entry_point) = find(self.modules, text(vertex, "shader")?)?;
+        let (second, second_entry_point) = find(self.modules, text(fragment, "shader")?)?;
+        let pipeline = self
+            .device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(text(pass, "label")?),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: Default::default(),
+                depth_stencil: None,
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: second,
+                    entry_point: Some(second_entry_point),
+                    compilation_options: Default::default(),
+                    targets: &targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            });
+        let groups = self.groups([vertex, fragment], |group| {
+            pipeline.get_bind_group_layout(group)
+        })?;
+        Ok(Pass::Draw {
+            groups,
+            pipeline,
+            attributes: Vec::new(),
+            indices: None,
+            count: 3,
+            colours,
+            depth: None,
         })
     }
 

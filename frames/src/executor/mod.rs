@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{FrameError, Result, during};
 use crate::graph::{Argument, Call, Graph, Handle, Origin, Pass, Shape, Target, Work};
-use crate::visibility::{Draw, Onto, Source, Stage, Visibility};
+use crate::visibility::{Draw, FullScreen, Onto, Source, Stage, Visibility};
 use schedule::{Blocks, State};
 
 /// Where the shaders of kernels come from, by entry-point name. The native device needs none.
@@ -554,6 +554,17 @@ impl<'d> Executor<'d> {
                 self.device
                     .dispatch(&program, &args)
                     .map_err(during(&pass.label))?;
+                Ok(None)
+            }
+            Work::FullScreen { vertex, fragment } => {
+                let targets = pass.writes.iter().map(|made| place.texture(*made));
+                let drawn = FullScreen {
+                    label: &pass.label,
+                    vertex: place.stage(vertex)?,
+                    fragment: place.stage(fragment)?,
+                    targets: targets.collect::<Result<_>>()?,
+                };
+                self.visibility.cover(&mut *self.device, &drawn)?;
                 Ok(None)
             }
             Work::Draw {

@@ -48,6 +48,12 @@ impl Named {
                 "it is a {has} kernel, but the pass wants a {stage} kernel here"
             )));
         }
+        if description.is_fragment_form() {
+            return Err(place.kernel(
+                "it is the fragment form of an image pass: name the compute form, with `compute`, and let the \
+                 graph draw it with `set_image_passes`",
+            ));
+        }
         let all = slots::drawn_slots(description);
         // Nothing says yet what a draw does to memory: it would not be ordered with other passes.
         let fragment = matches!(description.stage, Stage::Fragment);

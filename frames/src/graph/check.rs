@@ -180,7 +180,7 @@ impl Graph {
             return Ok(i);
         }
         let variants: Vec<&str> = all()
-            .filter(|k| k.function == place.kernel)
+            .filter(|k| k.function == place.kernel && !k.is_fragment_form())
             .map(|k| k.name.as_str())
             .collect();
         let help = if variants.is_empty() {

@@ -30,6 +30,7 @@
 
 mod add;
 mod check;
+mod forms;
 mod print;
 
 use std::borrow::Cow;
@@ -46,6 +47,7 @@ use hankel_host::device::{Blend, TextureShape};
 
 pub use add::{AddCompute, AddDraw, Written};
 pub use check::GraphError;
+pub use forms::{FULL_SCREEN_VERTICES, ImagePasses};
 pub use print::{PassSummary, Summary};
 
 /// [`Result`](std::result::Result) of making a graph.
@@ -218,6 +220,14 @@ pub enum Work {
     Levels(Vec<Handle>),
     /// Runs a compute kernel.
     Compute(Call),
+    /// Draws a triangle over all pixels of what the pass writes, without depth and blending: an image pass in its
+    /// fragment form.
+    FullScreen {
+        /// The vertex stage: [`FULL_SCREEN_VERTICES`] vertices without attributes.
+        vertex: Call,
+        /// The fragment stage.
+        fragment: Call,
+    },
     /// Draws triangles.
     Draw {
         /// What.
@@ -516,6 +526,7 @@ impl Graph {
         let (first, second) = match &pass.work {
             Work::Clear(_) | Work::Levels(_) => (None, None),
             Work::Compute(call) => (Some(call), None),
+            Work::FullScreen { vertex, fragment } => (Some(vertex), Some(fragment)),
             Work::Draw {
                 vertex, fragment, ..
             } => (Some(vertex), fragment.as_ref()),

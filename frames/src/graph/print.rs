@@ -116,7 +116,7 @@ impl Graph {
             does: match pass.work {
                 Work::Clear(_) => "zeros",
                 Work::Levels(_) => "copies",
-                Work::Compute(_) | Work::Draw { .. } => "",
+                Work::Compute(_) | Work::FullScreen { .. } | Work::Draw { .. } => "",
             },
             writes: written.collect(),
             note: pass.note.clone(),

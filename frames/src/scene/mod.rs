@@ -71,6 +71,7 @@ use hankel_dsl::glam::Vec3;
 use hankel_system::input;
 use serde::Deserialize;
 
+use crate::graph::ImagePasses;
 use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
 
@@ -101,6 +102,8 @@ pub struct Scene {
     pub width: u32,
     /// The picture's height in pixels, 1 to [`Scene::MAX_OUTPUT`].
     pub height: u32,
+    /// How its image passes run, which changes no picture. Scene files do not say it.
+    pub image_passes: ImagePasses,
 }
 
 /// Where triangles come from.

@@ -15,6 +15,7 @@ use super::{
     Area, AreaShape, Camera, DepthRange, FAR_OFF, Fit, Geometry, Light, Medium, Procedural, Scene,
     Shadow, Source, Spot,
 };
+use crate::graph::ImagePasses;
 use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
 
@@ -594,6 +595,7 @@ impl Reader<'_> {
             shadow,
             width: self.integer("output.width", f.output.width, width, pixels.clone())?,
             height: self.integer("output.height", f.output.height, height, pixels)?,
+            image_passes: ImagePasses::default(),
         })
     }
 }

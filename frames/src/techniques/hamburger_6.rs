@@ -4,14 +4,13 @@
 use hankel_dsl::glam::IVec2;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{Bias, MEASURED, SYMMETRIC_6_16, SYMMETRIC_6_32};
-use hankel_shadows::blur::Direction;
 use hankel_shadows::shade::encoding;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{
-    CANNOT_BLEND_FLOATS, Given, TRANSLUCENT, blended_halves, blur, gaussian, opaque_depth, resolve,
-    shade, shade_filtered,
+    CANNOT_BLEND_FLOATS, Given, TRANSLUCENT, blended_halves, blur, opaque_depth, resolve, shade,
+    shade_filtered, taps_along,
 };
 use crate::scene::DepthRange;
 
@@ -154,13 +153,11 @@ fn blur_words(
         return Ok(maps);
     }
     let size = [given.shadow.size, given.shadow.size, 1];
-    let weights = graph.constants("weights", &gaussian(taps));
     for (label, step) in [("blur rows", IVec2::X), ("blur columns", IVec2::Y)] {
-        let direction = graph.constant("direction", &Direction { step });
+        let pass = taps_along(graph, taps, step);
         let pass = graph
             .compute(label, words.blur)
-            .arg("direction", direction)
-            .arg("weights", weights)
+            .arg("taps", pass)
             .note(format!("{taps} taps"));
         let textures = words.textures.iter().zip(&maps);
         let pass = textures.fold(pass, |pass, (name, map)| pass.arg(*name, *map).texels(size));

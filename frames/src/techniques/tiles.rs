@@ -5,12 +5,13 @@
 use hankel_dsl::glam::{IVec2, UVec2, Vec4};
 use hankel_host::device::TextureShape;
 use hankel_moments::{Moments4, quantize_symmetric_4};
-use hankel_shadows::blur::Direction;
 use hankel_shadows::tiles::{ACROSS, EDGE, Listed, TEXELS, Tiles, tiles_of};
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{BILINEAR, DEPTHS, Given, POWER_MOMENTS, gaussian, light_depth, shade};
+use crate::passes::{
+    BILINEAR, DEPTHS, Given, POWER_MOMENTS, gaussian, light_depth, shade, taps_along,
+};
 use crate::visibility::SAMPLES;
 
 pub const HAMBURGER: Technique = Technique {
@@ -115,19 +116,17 @@ fn hamburger(graph: &mut Graph, given: &Given) -> Result<Handle> {
     if taps <= 1 {
         graph.omit("blur", "the filter is one texel wide");
     } else {
-        let weights = graph.constants("weights", &gaussian(taps));
         for (label, name, step) in [
             ("blur rows", "rows", IVec2::X),
             ("blur columns", "columns", IVec2::Y),
         ] {
-            let direction = graph.constant("direction", &Direction { step });
+            let pass = taps_along(graph, taps, step);
             let target = empty(graph, given, name)?;
             let written = graph
                 .compute(label, "blur_tiles")
                 .arg("listed", listed)
                 .arg("list", list)
-                .arg("direction", direction)
-                .arg("weights", weights)
+                .arg("taps", pass)
                 .arg("source", map)
                 .arg("map", target)
                 .at_most(most)

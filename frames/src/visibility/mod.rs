@@ -71,6 +71,14 @@ pub(crate) struct Draw<'a> {
     pub shape: TextureShape,
 }
 
+/// A triangle over all pixels of its targets, with everything on the device.
+pub(crate) struct FullScreen<'a> {
+    pub label: &'a str,
+    pub vertex: Stage<'a>,
+    pub fragment: Stage<'a>,
+    pub targets: Vec<TextureId>,
+}
+
 /// One of the two.
 pub(crate) enum Visibility {
     Raster(Raster),
@@ -97,6 +105,14 @@ impl Visibility {
         match self {
             Self::Raster(raster) => raster.draw(device, draw).map(|()| None),
             Self::Rays(rays) => rays.draw(device, draw, advance),
+        }
+    }
+
+    /// Runs a fragment kernel for each pixel of its targets.
+    pub fn cover(&self, device: &mut dyn Device, drawn: &FullScreen<'_>) -> Result<()> {
+        match self {
+            Self::Raster(_) => raster::cover(device, drawn),
+            Self::Rays(_) => rays::cover(device, drawn),
         }
     }
 

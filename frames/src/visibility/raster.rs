@@ -6,8 +6,9 @@ use hankel_host::device::{
     Blend, Colour, Depth, Device, Draw as DeviceDraw, Pass, TextureId, TextureShape,
 };
 
-use super::{CULL, Draw, FAR, Onto, SAMPLES, SEEN, TOPOLOGY};
+use super::{CULL, Draw, FAR, FullScreen, Onto, SAMPLES, SEEN, TOPOLOGY};
 use crate::error::{Result, during};
+use crate::graph::FULL_SCREEN_VERTICES;
 
 /// What draws need beside their targets: one of each shape, since draws follow one another.
 #[derive(Default)]
@@ -100,4 +101,32 @@ impl Raster {
         }
         self.bytes = 0;
     }
+}
+
+/// Draws a triangle that covers the targets.
+pub fn cover(device: &mut dyn Device, drawn: &FullScreen<'_>) -> Result<()> {
+    let colour = |texture: &TextureId| Colour {
+        texture: *texture,
+        resolve: None,
+        // Nothing that was there is wanted.
+        clear: Some([0.0; 4]),
+        blend: Blend::Off,
+    };
+    let colours: Vec<Colour> = drawn.targets.iter().map(colour).collect();
+    let pass = Pass {
+        label: drawn.label,
+        colours: &colours,
+        depth: None,
+        draws: &[DeviceDraw {
+            vertex: drawn.vertex.program,
+            vertex_args: &drawn.vertex.args,
+            fragment: Some(drawn.fragment.program),
+            fragment_args: &drawn.fragment.args,
+            indices: None,
+            count: FULL_SCREEN_VERTICES,
+            topology: TOPOLOGY,
+            cull: CULL,
+        }],
+    };
+    device.draw(&pass).map_err(during(drawn.label))
 }

@@ -13,7 +13,7 @@ use hankel_host::device::{Bind, Blend, BufferId, Device, Program};
 
 use super::cast::{Caster, Lens, SAMPLES};
 use super::fragments::{Fragments, Varying};
-use super::{Draw, Onto, Stage};
+use super::{Draw, FullScreen, Onto, Stage};
 use crate::error::{FrameError, Result, during};
 
 /// Fragments that are shaded at once.
@@ -271,6 +271,15 @@ impl Rays {
         }
         self.bytes = 0;
     }
+}
+
+/// The native device runs the kernel for each pixel without a rasteriser.
+pub fn cover(device: &mut dyn Device, drawn: &FullScreen<'_>) -> Result<()> {
+    let mut args = drawn.fragment.args.clone();
+    args.extend(drawn.targets.iter().map(|target| Bind::Texture(*target)));
+    device
+        .dispatch(&native(&drawn.fragment), &args)
+        .map_err(during(drawn.label))
 }
 
 /// By what a draw's triangles are kept.

@@ -154,8 +154,10 @@ impl Arguments<'_, '_> {
             return Ok(None);
         }
         Ok(match (self.slots[i].role, self.given[i]) {
+            (Use::StorageTexture { .. } | Use::Interface(_), Given::Texture { shape, .. }) => {
+                Some(shape.size)
+            }
             (Use::Output(_) | Use::Interface(_), _) => Some([self.elements(i)?, 1, 1]),
-            (Use::StorageTexture { .. }, Given::Texture { shape, .. }) => Some(shape.size),
             _ => None,
         })
     }

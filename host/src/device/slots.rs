@@ -60,7 +60,8 @@ pub enum Use<'a> {
         /// What is done with its texels.
         access: TexelAccess,
     },
-    /// What a vertex or fragment stage returns; an argument on the native device only.
+    /// What a vertex or fragment stage returns; an argument on the native device only: a buffer, or of the fragment form
+    /// of an image pass its target.
     Interface(&'a Type),
 }
 
@@ -359,7 +360,13 @@ pub fn check(kernel: &Kernel, slots: &[Slot<'_>], given: &[Given<'_>]) -> Result
         });
     }
     for (slot, given) in slots.iter().zip(given) {
-        check_one(slot, given).map_err(|problem| refuse(kernel, slot, problem))?;
+        let checked = match (slot.role, given) {
+            (Use::Interface(ty), Given::Texture { shape, .. }) if kernel.is_fragment_form() => {
+                check_target(ty, shape)
+            }
+            _ => check_one(slot, given),
+        };
+        checked.map_err(|problem| refuse(kernel, slot, problem))?;
     }
     for (i, slot) in slots
         .iter()
@@ -472,6 +479,49 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
         }
         _ => wanted(),
     }
+}
+
+/// What the channels of a target must be for a value of this type.
+#[must_use]
+pub fn target_channels(ty: &Type) -> Channels {
+    match ty {
+        Type::Scalar {
+            scalar: Scalar::U32,
+        }
+        | Type::Vector {
+            scalar: Scalar::U32,
+            ..
+        } => Channels::Uint,
+        Type::Scalar {
+            scalar: Scalar::I32,
+        }
+        | Type::Vector {
+            scalar: Scalar::I32,
+            ..
+        } => Channels::Sint,
+        _ => Channels::Float,
+    }
+}
+
+/// A texture that the fragment form of an image pass draws into.
+fn check_target(ty: &Type, shape: &TextureShape) -> std::result::Result<(), String> {
+    let wanted = target_channels(ty);
+    let is_plain = shape.dimensions == 2
+        && (shape.levels, shape.layers, shape.samples) == (1, 1, 1)
+        && shape.format != Format::Depth32;
+    if !is_plain {
+        return Err(
+            "it must be a texture of two dimensions, not of depths, with one level, layer and sample".into(),
+        );
+    }
+    if shape.format.texel().numbers() != wanted {
+        return Err(format!(
+            "its format is {}, but the kernel draws {} channels",
+            shape.format.name(),
+            wanted.word()
+        ));
+    }
+    Ok(())
 }
 
 fn check_texture(kind: TextureKind, shape: &TextureShape) -> std::result::Result<(), String> {

@@ -19,7 +19,7 @@ use hankel_dsl::native::describe::{
     TexelFormat, TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
-use hankel_dsl::native::{Address, Compare, Filter, Sampler};
+use hankel_dsl::native::{Address, Compare, Filter, Sampler, fragment};
 use serde::{Deserialize, Serialize};
 
 use crate::crates::KernelEntry;
@@ -125,8 +125,8 @@ pub fn flushes(kernel: &Kernel) -> bool {
 /// The magnitudes of a kernel's hostile inputs. All there are, except where the result would
 /// depend on what nobody promises:
 /// - a stage that flushes subnormal numbers gets none so small that a product of a few is one;
-/// - a kernel that writes a normalised format gets none so large that it overflows on the way:
-///   what becomes of a NaN there is not defined;
+/// - a kernel that writes a normalised format, or draws into one as the fragment form of an image pass may,
+///   gets none so large that it overflows on the way: what becomes of a NaN there is not defined;
 /// - a kernel with a sampler gets none that filtering could overflow with.
 fn magnitudes(kernel: &Kernel) -> (f64, f64) {
     let least = if flushes(kernel) { 1e-5 } else { 0.0 };
@@ -143,7 +143,7 @@ fn magnitudes(kernel: &Kernel) -> (f64, f64) {
         .params
         .iter()
         .any(|p| matches!(p.role, Role::Sampler { .. }));
-    let most = match (normalised, samples) {
+    let most = match (normalised || kernel.is_fragment_form(), samples) {
         (true, _) => 1e8,
         (false, true) => 1e12,
         (false, false) => f64::MAX,
@@ -360,7 +360,10 @@ fn case(
         lengths: BTreeMap::new(),
     };
     let slots = slots::slots(kernel);
-    let given = Own::new(&slots, given)?;
+    let mut given = Own::new(&slots, given)?;
+    if kernel.is_fragment_form() {
+        given.cover_fragments();
+    }
     let size = texels(kernel, &given, &mut values);
     let elements = match (&kernel.stage, size) {
         (Stage::Compute { .. }, Some(size)) => size.iter().map(|&n| n as usize).product(),
@@ -380,7 +383,10 @@ fn case(
             Stage::Compute { .. } if !over_texels => ELEMENTS.max(elements),
             _ => TABLE,
         },
-        size: size.unwrap_or(FLAT),
+        size: size.unwrap_or(match kernel.is_fragment_form() {
+            true => [fragment::COLUMNS, FLAT[1], 1],
+            false => FLAT,
+        }),
         volume: match (&kernel.stage, size) {
             (Stage::Compute { dimensions: 3, .. }, Some(size)) => size,
             _ => VOLUME,
@@ -549,6 +555,29 @@ impl Own {
 
     fn get(&self, name: &str) -> Option<&Input> {
         self.args.get(name)
+    }
+
+    /// Makes textures as wide as the target that fragments are laid out in, by repeating their columns: the
+    /// fragment form of an image pass reads the texel of its pixel, as the compute form does of its index.
+    fn cover_fragments(&mut self) {
+        for input in self.args.values_mut() {
+            let Input::Texture { shape, bytes } = input else {
+                continue;
+            };
+            let [width, height, _] = shape.size;
+            let is_flat = shape.dimensions == 2 && (shape.levels, shape.layers) == (1, 1);
+            if !is_flat || width >= fragment::COLUMNS {
+                continue;
+            }
+            let texel = shape.samples as usize * shape.format.texel().bytes();
+            let row = width as usize * texel;
+            let wide = fragment::COLUMNS as usize * texel;
+            let rows = bytes.chunks_exact(row).take(height as usize);
+            *bytes = rows
+                .flat_map(|row| row.iter().copied().cycle().take(wide))
+                .collect();
+            shape.size[0] = fragment::COLUMNS;
+        }
     }
 }
 

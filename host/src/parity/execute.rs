@@ -215,6 +215,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         rounding: Rounding::Free,
         subgroups: Subgroups::Unused,
         compensated: None,
+        image_pass: None,
     }
 }
 
@@ -351,13 +352,15 @@ fn fragment(
             (Scalar::F32, 1) => TexelFormat::R32Float,
             (Scalar::F32, 4) => TexelFormat::Rgba32Float,
             (Scalar::U32, 1) => TexelFormat::R32Uint,
+            (Scalar::U32, 2) => TexelFormat::Rg32Uint,
             (Scalar::U32, 4) => TexelFormat::Rgba32Uint,
             (Scalar::I32, 1) => TexelFormat::R32Sint,
+            (Scalar::I32, 2) => TexelFormat::Rg32Sint,
             (Scalar::I32, 4) => TexelFormat::Rgba32Sint,
             _ => {
                 return Err(bad(
                     kernel,
-                    "no target format holds its output; return f32, u32, i32, Vec4, UVec4 or IVec4",
+                    "no target format holds its output; return f32, u32, i32, UVec2, IVec2, Vec4, UVec4 or IVec4",
                 ));
             }
         };

@@ -138,7 +138,7 @@ pub use data::{Bool, PackedVec3};
 pub use glam;
 pub use half::{F16, F16x2, F16x4};
 pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
-pub use memory::Buffer;
+pub use memory::{Buffer, array_element};
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]

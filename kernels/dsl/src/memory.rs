@@ -41,3 +41,16 @@ impl<'a, T: Copy> Buffer<'a, T> {
         return self.0[i as usize];
     }
 }
+
+/// Element `i` of an array in a uniform, which must be less than `N`. As with [`Buffer::get`], a shader does not
+/// test that.
+#[inline(always)]
+#[cfg_attr(not(target_arch = "spirv"), track_caller)]
+#[must_use]
+pub fn array_element<T: Copy, const N: usize>(array: &[T; N], i: u32) -> T {
+    #[cfg(target_arch = "spirv")]
+    // SAFETY: the caller's contract; exports with bounds checks test it again.
+    return unsafe { *array.index_unchecked(i as usize) };
+    #[cfg(not(target_arch = "spirv"))]
+    return array[i as usize];
+}

@@ -72,14 +72,14 @@ impl Kernel {
     }
 
     /// Names for the parts of what the function returns.
-    fn values(&self) -> Vec<Ident> {
+    pub fn values(&self) -> Vec<Ident> {
         (0..self.outputs.len())
             .map(|i| format_ident!("__value{i}"))
             .collect()
     }
 
     /// `let (__value0, __value1) = CALL;`
-    fn take_values(&self, call: &TokenStream) -> TokenStream {
+    pub fn take_values(&self, call: &TokenStream) -> TokenStream {
         let values = self.values();
         match &values[..] {
             [] => quote!(#call;),
@@ -145,7 +145,7 @@ impl Kernel {
     }
 
     /// Host: stores the values of invocation `__number` at `__at`.
-    fn host_stores(&self, variant: &Variant) -> TokenStream {
+    pub fn host_stores(&self, variant: &Variant) -> TokenStream {
         let stores = self.values().into_iter().enumerate().map(|(i, value)| {
             let ident = self.output_ident(i);
             if self.output_format(i, variant).is_some() {

@@ -5,16 +5,32 @@ use quote::{format_ident, quote, quote_spanned};
 use syn::spanned::Spanned;
 
 use crate::general::{Form, own};
-use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, StorageKind, Variant, texture_type};
+use crate::kernel::{
+    BuiltIn, Compute, FragmentForm, Kernel, Role, Stage, StorageKind, Variant, texture_type,
+};
 use crate::shader::{output_name, sampler_type};
 use crate::stage::{Passed, Returned};
 use crate::twin;
 
 impl Kernel {
     pub fn expand_host(&self) -> TokenStream {
-        let entries = self.variants.iter().map(|v| {
+        let fragment = self.fragment_variant();
+        let variants = || self.variants.iter().chain(&fragment);
+        let image = self.is_image_pass().then(|| {
+            let entries = variants().map(|v| &v.entry);
+            let run = self.run_image();
+            quote! {
+                #[cfg(any(not(hankel_select), #(hankel_kernel = #entries),*))]
+                #run
+            }
+        });
+        let entries = variants().map(|v| {
             let description = self.description(v);
-            let run = self.run(v);
+            let run = if self.is_image_pass() {
+                self.run_form(v)
+            } else {
+                self.run(v)
+            };
             let entry = &v.entry;
             // `hankel` sets these two: what is only described, or does not run, is not compiled.
             let wanted = quote!(any(not(hankel_select), hankel_kernel = #entry));
@@ -44,6 +60,12 @@ impl Kernel {
                 const _: fn() -> native::Entries = #name::entries;
             }
         });
+        let of_other = match &self.fragment_form {
+            Some(FragmentForm::Of(name)) => Some(quote_spanned! {name.span()=>
+                const _: fn() -> native::Entries = #name::entries;
+            }),
+            _ => None,
+        };
         let uniforms = self.uniform_checks();
         let buffers = self.buffer_checks();
         let twin = (self.form() == Form::Cooperative).then(|| {
@@ -73,9 +95,11 @@ impl Kernel {
                 pub fn entries() -> ::hankel_dsl::native::Entries {
                     use ::hankel_dsl::native::{self, describe, exec, fragment, layout, workgroup};
                     #compensated
+                    #of_other
                     #uniforms
                     #buffers
                     #twin
+                    #image
                     let mut all = native::Entries::new();
                     #(#entries)*
                     all
@@ -153,6 +177,7 @@ impl Kernel {
     fn description(&self, variant: &Variant) -> TokenStream {
         let (entry, function, summary) = (&variant.entry, self.name.to_string(), &self.summary);
         let stage = match &self.stage {
+            _ if variant.fragment => quote!(describe::Stage::Fragment),
             Stage::Vertex => quote!(describe::Stage::Vertex),
             Stage::Fragment => quote!(describe::Stage::Fragment),
             Stage::Compute(c) => {
@@ -197,6 +222,7 @@ impl Kernel {
             }
             None => quote!(None),
         };
+        let image_pass = self.describe_image_pass(variant);
         quote! {
             describe::Kernel {
                 name: #entry.into(),
@@ -217,6 +243,7 @@ impl Kernel {
                 rounding: describe::Rounding::#rounding,
                 subgroups: describe::Subgroups::of(#subgroups, #sized),
                 compensated: #compensated,
+                image_pass: #image_pass,
             }
         }
     }
@@ -318,6 +345,9 @@ impl Kernel {
     }
 
     fn describe_outputs(&self, variant: &Variant) -> Vec<TokenStream> {
+        if variant.fragment {
+            return self.describe_targets();
+        }
         if !matches!(self.stage, Stage::Compute(_)) {
             return self.returned().iter().map(Returned::describe).collect();
         }
@@ -349,8 +379,8 @@ impl Kernel {
             .collect()
     }
 
-    /// `fn run`.
-    fn run(&self, variant: &Variant) -> TokenStream {
+    /// Takes the arguments of a call, but for those that are written to as the result.
+    pub fn take_args(&self, variant: &Variant) -> TokenStream {
         let (count, constants) = (
             self.params
                 .iter()
@@ -417,6 +447,15 @@ impl Kernel {
                 Role::Index | Role::BuiltIn(_) | Role::Shared { .. } => TokenStream::new(),
             }
         });
+        quote! {
+            let mut args = exec::Args::take(call, #count, #constants)?;
+            #(#takes)*
+        }
+    }
+
+    /// `fn run`.
+    fn run(&self, variant: &Variant) -> TokenStream {
+        let takes = self.take_args(variant);
         let body = match &self.stage {
             Stage::Compute(c) => self.run_compute(c, variant),
             _ => self.run_interface(variant),
@@ -432,15 +471,14 @@ impl Kernel {
         quote! {
             fn run(call: &mut native::Call<'_>) -> Result<(), native::CallError> {
                 let (mode, _session) = native::sanitize::begin(#mode);
-                let mut args = exec::Args::take(call, #count, #constants)?;
-                #(#takes)*
+                #takes
                 #body
             }
         }
     }
 
     /// The call of the kernel for invocation `i`.
-    fn host_call(&self, variant: &Variant) -> TokenStream {
+    pub fn host_call(&self, variant: &Variant) -> TokenStream {
         let form = self.form();
         let name = &self.name;
         let generics = variant.scalar.as_ref().map(|s| quote!(::<#s>));
@@ -532,19 +570,6 @@ impl Kernel {
         }
         let checks = self.length_checks();
         let out = self.concrete(&self.outputs[0], variant);
-        if let Some(format) = variant.format {
-            let format = format_ident!("{}", format.variant);
-            let map = if self.dimensions() == 2 {
-                quote!(map_texels2)
-            } else {
-                quote!(map_texels)
-            };
-            let index = self.index_type();
-            return quote! {
-                let output = args.texture_mut("output", describe::TexelFormat::#format)?;
-                exec::#map(mode, output, |__i: #index| #call)
-            };
-        }
         let map = if self.real.is_some() {
             self.lane_map(variant, &call, &out)
         } else {

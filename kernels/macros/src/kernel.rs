@@ -30,8 +30,10 @@ pub struct Kernel {
     pub outputs: Vec<Type>,
     /// Formats of the outputs that are texels, where each has its own: `outputs(…)`.
     pub output_formats: Vec<Option<Format>>,
-    /// Entry points to make.
+    /// Entry points to make; the fragment form of an image pass is beside them.
     pub variants: Vec<Variant>,
+    /// The fragment form of an image pass.
+    pub fragment_form: Option<FragmentForm>,
     pub tolerance: Tolerance,
     pub rounding: Rounding,
     /// The function that makes inputs, as it is named from inside the kernel's module.
@@ -92,6 +94,17 @@ pub struct Variant {
     pub entry: String,
     pub scalar: Option<Ident>,
     pub format: Option<Format>,
+    /// The fragment form of an image pass.
+    pub fragment: bool,
+}
+
+/// Where the fragment form of an image pass comes from.
+#[derive(Clone)]
+pub enum FragmentForm {
+    /// The function itself.
+    Own,
+    /// That of another function, which differs in its formats only.
+    Of(Ident),
 }
 
 /// A texel format: its name here, in `Image!`, and as a variant of `TexelFormat`.
@@ -454,6 +467,7 @@ impl Kernel {
             },
         };
         let variants = args.variants(&name, real.as_ref())?;
+        let (forms, fragment_form) = args.forms.clone().unzip();
         let output_formats = args.output_formats(&outputs)?;
         let compensated = args.compensated.clone();
         let scalar = args.scalar;
@@ -482,6 +496,7 @@ impl Kernel {
             outputs,
             output_formats,
             variants,
+            fragment_form,
             tolerance,
             rounding,
             inputs,
@@ -497,6 +512,9 @@ impl Kernel {
             ));
         }
         kernel.check()?;
+        if let Some(span) = forms {
+            kernel.check_forms(span)?;
+        }
         Ok(kernel)
     }
 
@@ -1043,6 +1061,7 @@ struct Args {
     inputs: Option<syn::Path>,
     compensated: Option<Ident>,
     scalar: bool,
+    forms: Option<(Span, FragmentForm)>,
 }
 
 impl Parse for Args {
@@ -1127,6 +1146,7 @@ impl Parse for Args {
                     args.inputs = Some(input.parse()?);
                 }
                 "scalar" => args.scalar = true,
+                "forms" => args.forms = Some((word.span(), fragment_form(input)?)),
                 "compensated" => {
                     input.parse::<Token![=]>()?;
                     args.compensated = Some(input.parse()?);
@@ -1135,7 +1155,7 @@ impl Parse for Args {
                 _ => {
                     return Err(syn::Error::new(
                         word.span(),
-                        "expected compute, vertex, fragment, threads, precision, texture, outputs, range, cooperative, depends, exact, pinned, scalar, compensated, inputs or parity",
+                        "expected compute, vertex, fragment, threads, precision, texture, outputs, forms, range, cooperative, depends, exact, pinned, scalar, compensated, inputs or parity",
                     ));
                 }
             }
@@ -1146,6 +1166,24 @@ impl Parse for Args {
         }
         Ok(args)
     }
+}
+
+/// `(fragment)`, or `(fragment = NAME)`.
+fn fragment_form(input: ParseStream<'_>) -> syn::Result<FragmentForm> {
+    let content;
+    syn::parenthesized!(content in input);
+    let word: Ident = content.parse()?;
+    if word != "fragment" {
+        return Err(syn::Error::new(
+            word.span(),
+            "an image pass is a compute kernel, which may have one more form: write `forms(fragment)`",
+        ));
+    }
+    if content.is_empty() {
+        return Ok(FragmentForm::Own);
+    }
+    content.parse::<Token![=]>()?;
+    Ok(FragmentForm::Of(content.parse()?))
 }
 
 fn format(name: &Ident) -> syn::Result<Format> {
@@ -1316,6 +1354,7 @@ impl Args {
                     entry,
                     scalar: scalar.clone(),
                     format: *format,
+                    fragment: false,
                 });
             }
         }
@@ -1356,11 +1395,12 @@ impl Args {
                     || self.depends.is_some()
                     || self.range.is_some()
                     || self.outputs.is_some()
+                    || self.forms.is_some()
                     || !self.formats.is_empty()
                 {
                     return Err(syn::Error::new(
                         name.span(),
-                        "threads, range, outputs, cooperative, depends and texture belong to compute kernels",
+                        "threads, range, outputs, forms, cooperative, depends and texture belong to compute kernels",
                     ));
                 }
                 if outputs.is_empty() {

@@ -5,6 +5,7 @@ mod element;
 mod function;
 mod general;
 mod host;
+mod image;
 mod inputs;
 mod kernel;
 mod list;
@@ -27,6 +28,7 @@ use syn::parse_macro_input;
 /// | `precision(f32, f64)` | entry points of a function that is generic over one `R: Real` |
 /// | `texture(FORMAT, …)` | the result is a texel; one entry point for each format |
 /// | `outputs(FORMAT or buffer, …)` | what each of several results is; without it, all are elements of buffers |
+/// | `forms(fragment)` | an image pass in two dimensions, all of whose results are texels, has a fragment entry point, too: `NAME_fragment`, to be drawn over all pixels of render targets, with the pixel as its index. It is one for all formats; `forms(fragment = other)` says that it is that of the function `other`, which differs in nothing else |
 /// | `cooperative(name, …)` | functions marked [`#[cooperative]`](macro@cooperative) that the kernel calls |
 /// | `depends(subgroup_size)` | the result depends on how many invocations a subgroup has, which differs from device to device; without it, it may not |
 /// | `inputs = path::to::function` | makes inputs for parity, see below |

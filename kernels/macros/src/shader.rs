@@ -8,7 +8,9 @@ use crate::kernel::{BuiltIn, Compute, Kernel, Role, Stage, Variant, texture_type
 
 impl Kernel {
     pub fn expand_shader(&self) -> TokenStream {
-        let entries = self.variants.iter().map(|v| self.entry_point(v));
+        let fragment = self.fragment_variant();
+        let variants = self.variants.iter().chain(&fragment);
+        let entries = variants.map(|v| self.entry_point(v));
         quote! {
             ::hankel_dsl::on_spirv! {
                 #[allow(
@@ -35,6 +37,11 @@ impl Kernel {
         let function = format_ident!("{}", variant.entry);
         let entry = &variant.entry;
         let (stage, builtins, body) = match &self.stage {
+            _ if variant.fragment => (
+                quote!(fragment(entry_point_name = #entry)),
+                self.fragment_builtins(),
+                self.fragment_body(variant),
+            ),
             Stage::Compute(c) => {
                 let threads = &c.threads;
                 (
@@ -187,6 +194,7 @@ impl Kernel {
     fn shader_outputs(&self, variant: &Variant) -> TokenStream {
         let binding = self.params.iter().filter(|p| p.role.is_bound()).count() as u32;
         match &self.stage {
+            _ if variant.fragment => self.fragment_targets(),
             Stage::Compute(_) => {
                 self.outputs.iter().enumerate().map(|(i, ty)| {
                     let (binding, output) = (binding + i as u32, self.output_ident(i));
@@ -215,7 +223,7 @@ impl Kernel {
     }
 
     /// The call of the kernel; `at` is the index.
-    fn call(&self, variant: &Variant) -> TokenStream {
+    pub fn call(&self, variant: &Variant) -> TokenStream {
         let form = self.form();
         let name = &self.name;
         let generics = variant.scalar.as_ref().map(|s| quote!(::<#s>));

@@ -3,25 +3,63 @@
 use core::ops::{Add, AddAssign, Mul};
 
 use hankel_dsl::glam::{IVec2, UVec2, Vec4};
-use hankel_dsl::{Buffer, Element, Texture2d, kernel};
+use hankel_dsl::{Element, Texture2d, array_element, kernel};
 
 use crate::grid::within;
 
-/// The direction of a filter pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
+/// The most weights of a filter pass: filters have up to 31 taps.
+pub const MOST_WEIGHTS: usize = 16;
+
+/// A pass of a symmetric separable filter: its direction and its weights, those of the centre and of the taps to one
+/// side. The centre's plus twice the others should be 1.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
-pub struct Direction {
+pub struct Taps {
     /// Step from one tap to the next in texels: (1, 0) or (0, 1).
     #[values(0, 1)]
     pub step: IVec2,
+    /// How many weights there are, 1 to 16.
+    #[range(1..=7)]
+    pub count: u32,
+    /// Fills the structure up.
+    pub padding: u32,
+    /// The centre's weight, then those at distance 1, 2, …; each in `x`, as arrays in uniforms are made of vectors.
+    #[range(0.0..=0.15)]
+    pub weights: [Vec4; MOST_WEIGHTS],
+}
+
+impl Taps {
+    /// A pass along `step`.
+    ///
+    /// # Panics
+    /// With more than [`MOST_WEIGHTS`].
+    #[cfg(not(target_arch = "spirv"))]
+    #[must_use]
+    pub fn new(step: IVec2, weights: &[f32]) -> Self {
+        let mut all = [Vec4::ZERO; MOST_WEIGHTS];
+        for (i, weight) in weights.iter().enumerate() {
+            all[i].x = *weight;
+        }
+        Self {
+            step,
+            count: weights.len() as u32,
+            padding: 0,
+            weights: all,
+        }
+    }
+
+    /// Weight `i`.
+    #[inline(always)]
+    pub(crate) fn weight(&self, i: u32) -> f32 {
+        array_element(&self.weights, i).x
+    }
 }
 
 /// The weighted sum of what `of` takes from the texels around one.
 #[inline(always)]
 pub(crate) fn filtered<T: Add<Output = T> + AddAssign + Mul<f32, Output = T>>(
     at: UVec2,
-    direction: &Direction,
-    weights: Buffer<'_, f32>,
+    taps: &Taps,
     source: Texture2d<'_>,
     of: impl Fn(Vec4) -> T,
 ) -> T {
@@ -31,24 +69,23 @@ pub(crate) fn filtered<T: Add<Output = T> + AddAssign + Mul<f32, Output = T>>(
         let p = at + offset;
         of(source.load(UVec2::new(within(p.x, size.x), within(p.y, size.y))))
     };
-    let mut sum = tap(IVec2::ZERO) * weights.get(0);
-    let mut offset = direction.step;
+    let mut sum = tap(IVec2::ZERO) * taps.weight(0);
+    let mut offset = taps.step;
     let mut i = 1;
-    while i < weights.len() {
-        sum += (tap(offset) + tap(-offset)) * weights.get(i);
-        offset += direction.step;
+    while i < taps.count {
+        sum += (tap(offset) + tap(-offset)) * taps.weight(i);
+        offset += taps.step;
         i += 1;
     }
     sum
 }
 
-/// One pass of a symmetric separable filter; texels beyond the edge repeat the edge. `weights`
-/// holds the centre's weight, then those at distance 1, 2, …; the centre plus twice the others
-/// should be 1.
+/// One pass of a symmetric separable filter; texels beyond the edge repeat the edge.
 #[kernel(
     compute,
     threads(8, 8),
     texture(rgba16unorm, rgba32float),
+    forms(fragment),
     inputs = crate::inputs::maps::blurred,
     parity(
         ulp = 0,
@@ -58,16 +95,8 @@ pub(crate) fn filtered<T: Add<Output = T> + AddAssign + Mul<f32, Output = T>>(
         why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
     )
 )]
-pub fn blur(
-    #[index] at: UVec2,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
-    #[texture] source: Texture2d<'_>,
-) -> Vec4 {
-    filtered(at, direction, weights, source, |texel| texel)
+pub fn blur(#[index] at: UVec2, #[uniform] taps: &Taps, #[texture] source: Texture2d<'_>) -> Vec4 {
+    filtered(at, taps, source, |texel| texel)
 }
 
 /// The same of four channels of 8 bits.
@@ -75,6 +104,7 @@ pub fn blur(
     compute,
     threads(8, 8),
     texture(rgba8unorm),
+    forms(fragment = blur),
     inputs = crate::inputs::maps::blurred,
     parity(
         ulp = 0,
@@ -85,14 +115,10 @@ pub fn blur(
 )]
 pub fn blur_rgba8unorm(
     #[index] at: UVec2,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
+    #[uniform] taps: &Taps,
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
-    filtered(at, direction, weights, source, |texel| texel)
+    filtered(at, taps, source, |texel| texel)
 }
 
 /// The same of four 16-bit floats.
@@ -100,6 +126,7 @@ pub fn blur_rgba8unorm(
     compute,
     threads(8, 8),
     texture(rgba16float),
+    forms(fragment = blur),
     inputs = crate::inputs::maps::blurred_warps,
     parity(
         ulp = 1,
@@ -109,14 +136,10 @@ pub fn blur_rgba8unorm(
 )]
 pub fn blur_rgba16float(
     #[index] at: UVec2,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
+    #[uniform] taps: &Taps,
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
-    filtered(at, direction, weights, source, |texel| texel)
+    filtered(at, taps, source, |texel| texel)
 }
 
 /// The same of one 32-bit float.
@@ -124,17 +147,14 @@ pub fn blur_rgba16float(
     compute,
     threads(8, 8),
     texture(r32float),
+    forms(fragment),
     inputs = crate::inputs::maps::blurred_warps,
     parity(non_finite, why = "sums of products: those of absurd numbers overflow")
 )]
 pub fn blur_r32float(
     #[index] at: UVec2,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
+    #[uniform] taps: &Taps,
     #[texture] source: Texture2d<'_>,
 ) -> f32 {
-    filtered(at, direction, weights, source, |texel| texel.x)
+    filtered(at, taps, source, |texel| texel.x)
 }

@@ -126,13 +126,14 @@ fn shadow_8(
 /// Resolves to textures of one format; drivers may round a tie either way.
 macro_rules! resolves {
     ($format:ident, $step:literal, $why:literal;
-     $(#[$doc:meta])* $four:ident,
-     $(#[$doc_8:meta])* $eight:ident) => {
+     $(#[$doc:meta])* $four:ident, forms($($form:tt)*),
+     $(#[$doc_8:meta])* $eight:ident, forms($($form_8:tt)*)) => {
         $(#[$doc])*
         #[kernel(
             compute,
             threads(8, 8),
             outputs($format, $format),
+            forms($($form)*),
             inputs = crate::inputs::maps::depths,
             parity(ulp = 0, absolute = $step, why = $why)
         )]
@@ -152,6 +153,7 @@ macro_rules! resolves {
             compute,
             threads(8, 8),
             outputs($format, $format, $format, $format),
+            forms($($form_8)*),
             inputs = crate::inputs::maps::depths,
             parity(ulp = 0, absolute = $step, why = $why)
         )]
@@ -173,18 +175,18 @@ resolves! {
     rgba8unorm, 4e-3,
     "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step";
     /// Means of a texel's cosines and sines of four terms, in 8 bits.
-    resolve_convolution_rgba8unorm,
+    resolve_convolution_rgba8unorm, forms(fragment),
     /// Means of a texel's cosines and sines of eight terms, in 8 bits: of terms 1 to 4, then of terms 5 to 8.
-    resolve_convolution_8_rgba8unorm
+    resolve_convolution_8_rgba8unorm, forms(fragment)
 }
 
 resolves! {
     rgba16unorm, 1.6e-5,
     "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step";
     /// Means of a texel's cosines and sines of four terms, in 16 bits.
-    resolve_convolution_rgba16unorm,
+    resolve_convolution_rgba16unorm, forms(fragment = resolve_convolution_rgba8unorm),
     /// Means of a texel's cosines and sines of eight terms, in 16 bits: of terms 1 to 4, then of terms 5 to 8.
-    resolve_convolution_8_rgba16unorm
+    resolve_convolution_8_rgba16unorm, forms(fragment = resolve_convolution_8_rgba8unorm)
 }
 
 shading! {

@@ -45,3 +45,13 @@ impl Transform {
 pub fn light_depth(#[attribute] position: Vec3, #[uniform] light: &Transform) -> Vec4 {
     light.apply(position)
 }
+
+/// A vertex of a triangle that covers the target: the fragment forms of image passes are drawn with it, as three
+/// vertices without attributes.
+#[kernel(vertex)]
+pub fn full_screen(#[vertex_index] vertex: u32) -> Vec4 {
+    // The target is from -1 to 1.
+    let x = if vertex == 1 { 3.0 } else { -1.0 };
+    let y = if vertex == 2 { 3.0 } else { -1.0 };
+    Vec4::new(x, y, 0.0, 1.0)
+}

@@ -47,6 +47,7 @@ pub(crate) fn exponential(exponent: f32, z: f32) -> f32 {
     compute,
     threads(8, 8),
     texture(r32float),
+    forms(fragment),
     pinned,
     inputs = crate::inputs::maps::exponential_depths
 )]
@@ -68,6 +69,7 @@ pub fn resolve_esm(
     compute,
     threads(8, 8),
     texture(rgba16float, rgba32float),
+    forms(fragment),
     pinned,
     inputs = crate::inputs::maps::warped_depths,
     parity(

@@ -4,6 +4,7 @@
 //! | pass | kernel |
 //! | --- | --- |
 //! | depth from the light, 4x multisampled | [`light_depth`](depth::light_depth) |
+//! | for image passes that are drawn: a triangle over all pixels | [`full_screen`](depth::full_screen) |
 //! | resolve to four moments, quantised | [`resolve_unit`](resolve::resolve_unit), [`resolve_symmetric`](resolve::resolve_symmetric), [`resolve_plain`](resolve::resolve_plain) |
 //! | to six | [`resolve_symmetric_6`](six::resolve_symmetric_6), [`resolve_plain_6`](six::resolve_plain_6) |
 //! | to six in words | [`resolve_packed_10`](packed::resolve_packed_10), [`resolve_packed_16`](packed::resolve_packed_16) |
@@ -26,6 +27,9 @@
 //! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march), [`scatter_march_spot`](scattering::scatter_march_spot) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
+//!
+//! Passes that give a texel for each index have a fragment form, too, if their `#[kernel]` says `forms(fragment)`:
+//! `NAME_fragment`, one for all formats.
 #![no_std]
 
 #[cfg(not(target_arch = "spirv"))]
@@ -61,6 +65,7 @@ pub mod trigonometric;
 
 hankel_dsl::kernels![
     depth::light_depth,
+    depth::full_screen,
     resolve::resolve_unit,
     resolve::resolve_symmetric,
     resolve::resolve_plain,

@@ -64,6 +64,7 @@ fn share(at: u32, tap: u32, size: u32) -> f32 {
     compute,
     threads(8, 8),
     texture(rgba16unorm, rgba32float),
+    forms(fragment),
     inputs = crate::inputs::mips::halved,
     parity(
         ulp = 0,
@@ -82,6 +83,7 @@ pub fn halve(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec4 {
     compute,
     threads(8, 8),
     texture(rgba8unorm),
+    forms(fragment = halve),
     inputs = crate::inputs::mips::halved,
     parity(
         ulp = 0,
@@ -99,6 +101,7 @@ pub fn halve_rgba8unorm(#[index] at: UVec2, #[texture] source: Texture2d<'_>) ->
     compute,
     threads(8, 8),
     texture(rgba16float),
+    forms(fragment = halve),
     inputs = crate::inputs::mips::halved,
     parity(
         ulp = 1,
@@ -115,6 +118,7 @@ pub fn halve_rgba16float(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -
     compute,
     threads(8, 8),
     texture(r32float),
+    forms(fragment),
     inputs = crate::inputs::mips::halved,
     parity(non_finite, why = "sums of products: those of absurd numbers overflow")
 )]

@@ -61,6 +61,7 @@ fn powers(z: f32) -> Texels {
     compute,
     threads(8, 8),
     outputs(rgba32float, rgba32float),
+    forms(fragment),
     inputs = crate::inputs::maps::depths
 )]
 pub fn resolve_plain_8(

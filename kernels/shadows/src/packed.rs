@@ -4,13 +4,13 @@
 //! write them, unlike textures of 16-bit channels.
 
 use hankel_dsl::glam::{IVec2, UVec2, UVec4, Vec2, Vec3, Vec4};
-use hankel_dsl::{Buffer, Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
+use hankel_dsl::{Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
 use hankel_moments::{
     Moments6, Quantized6, dequantize_symmetric_6, hamburger_6, pack_10, pack_16, unpack_10,
     unpack_16,
 };
 
-use crate::blur::Direction;
+use crate::blur::Taps;
 use crate::grid::within;
 use crate::shade::{Light, shade_with};
 use crate::six::quantized;
@@ -59,6 +59,7 @@ fn words_16(first: Vec4, second: Vec4) -> (u32, u32, u32) {
     compute,
     threads(8, 8),
     texture(rg32uint),
+    forms(fragment),
     pinned,
     inputs = crate::inputs::maps::depths
 )]
@@ -79,6 +80,7 @@ pub fn resolve_packed_10(
     compute,
     threads(8, 8),
     outputs(r32uint, r32uint, r32uint),
+    forms(fragment),
     pinned,
     inputs = crate::inputs::maps::depths
 )]
@@ -99,31 +101,28 @@ pub fn resolve_packed_16(
     compute,
     threads(8, 8),
     texture(rg32uint),
+    forms(fragment),
     pinned,
     inputs = crate::inputs::maps::blurred_10
 )]
 pub fn blur_packed_10(
     #[index] at: UVec2,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
+    #[uniform] taps: &Taps,
     #[texture] map: Texture2d<'_, u32>,
 ) -> UVec2 {
     let size = map.size();
     let tap = |offset: IVec2| map.load(texel(at, offset, size));
-    let weight = weights.get(0);
+    let weight = taps.weight(0);
     let centre = tap(IVec2::ZERO);
     let mut first = first_10(centre) * weight;
     let mut second = second_10(centre) * weight;
-    let mut offset = direction.step;
+    let mut offset = taps.step;
     let mut i = 1;
-    while i < weights.len() {
-        let (before, after, weight) = (tap(-offset), tap(offset), weights.get(i));
+    while i < taps.count {
+        let (before, after, weight) = (tap(-offset), tap(offset), taps.weight(i));
         first += (first_10(after) + first_10(before)) * weight;
         second += (second_10(after) + second_10(before)) * weight;
-        offset += direction.step;
+        offset += taps.step;
         i += 1;
     }
     words_10(first, second)
@@ -135,16 +134,13 @@ pub fn blur_packed_10(
     compute,
     threads(8, 8),
     outputs(r32uint, r32uint, r32uint),
+    forms(fragment),
     pinned,
     inputs = crate::inputs::maps::blurred_16
 )]
 pub fn blur_packed_16(
     #[index] at: UVec2,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
+    #[uniform] taps: &Taps,
     #[texture] low: Texture2d<'_, u32>,
     #[texture] middle: Texture2d<'_, u32>,
     #[texture] high: Texture2d<'_, u32>,
@@ -154,17 +150,17 @@ pub fn blur_packed_16(
         let at = texel(at, offset, size);
         UVec4::new(low.load(at).x, middle.load(at).x, high.load(at).x, 0)
     };
-    let weight = weights.get(0);
+    let weight = taps.weight(0);
     let centre = tap(IVec2::ZERO);
     let mut first = first_16(centre) * weight;
     let mut second = second_16(centre) * weight;
-    let mut offset = direction.step;
+    let mut offset = taps.step;
     let mut i = 1;
-    while i < weights.len() {
-        let (before, after, weight) = (tap(-offset), tap(offset), weights.get(i));
+    while i < taps.count {
+        let (before, after, weight) = (tap(-offset), tap(offset), taps.weight(i));
         first += (first_16(after) + first_16(before)) * weight;
         second += (second_16(after) + second_16(before)) * weight;
-        offset += direction.step;
+        offset += taps.step;
         i += 1;
     }
     words_16(first, second)

@@ -58,6 +58,7 @@ pub(crate) fn mean_symmetric(depth: Texture2dMultisampled<'_>, at: UVec2, sample
     compute,
     threads(8, 8),
     texture(rgba16unorm),
+    forms(fragment),
     inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,
@@ -82,6 +83,7 @@ pub fn resolve_unit(
     compute,
     threads(8, 8),
     texture(rgba16unorm),
+    forms(fragment),
     inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,
@@ -104,6 +106,7 @@ pub fn resolve_symmetric(
     compute,
     threads(8, 8),
     texture(rgba32float),
+    forms(fragment),
     inputs = crate::inputs::maps::depths
 )]
 pub fn resolve_plain(

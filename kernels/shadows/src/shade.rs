@@ -394,6 +394,7 @@ pub fn shade_pcf_gaussian(
     compute,
     threads(8, 8),
     texture(rgba16float, rgba32float),
+    forms(fragment),
     parity(
         ulp = 1,
         exact(rgba32float),

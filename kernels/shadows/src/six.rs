@@ -137,6 +137,7 @@ fn symmetric(z: f32) -> Moments6<f32> {
     compute,
     threads(8, 8),
     outputs(rgba16unorm, rgba16unorm),
+    forms(fragment),
     inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,
@@ -172,6 +173,7 @@ pub(crate) fn quantized(depth: Texture2dMultisampled<'_>, at: UVec2, samples: u3
     compute,
     threads(8, 8),
     outputs(rgba32float, rgba32float),
+    forms(fragment),
     inputs = crate::inputs::maps::depths
 )]
 pub fn resolve_plain_6(

@@ -14,7 +14,7 @@ use hankel_dsl::{
 };
 use hankel_moments::hamburger_4;
 
-use crate::blur::{Direction, filtered};
+use crate::blur::{Taps, filtered};
 use crate::grid::within;
 use crate::resolve::mean_symmetric;
 use crate::shade::{
@@ -271,18 +271,14 @@ pub fn blur_tiles(
     #[storage]
     #[distinct]
     list: Buffer<'_, u32>,
-    #[uniform] direction: &Direction,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
+    #[uniform] taps: &Taps,
     #[texture] source: Texture2d<'_>,
     #[texture] map: StorageTexture2d<'_, Rgba16Unorm>,
 ) {
     let size = source.size();
     let texel = texel(at, listed, list, size);
     if (texel.x < size.x) & (texel.y < size.y) {
-        map.store(texel, filtered(texel, direction, weights, source, |t| t));
+        map.store(texel, filtered(texel, taps, source, |t| t));
     }
 }
 

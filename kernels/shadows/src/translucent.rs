@@ -95,6 +95,7 @@ pub fn translucent_moments(
     compute,
     threads(8, 8),
     texture(rgba16unorm),
+    forms(fragment),
     inputs = crate::inputs::translucent::blended,
     parity(
         ulp = 0,
@@ -159,6 +160,7 @@ pub fn translucent_moments_6(
     compute,
     threads(8, 8),
     outputs(rgba16unorm, rgba16unorm),
+    forms(fragment),
     inputs = crate::inputs::translucent::blended_6,
     parity(
         ulp = 0,
@@ -222,6 +224,7 @@ pub fn tint(
     compute,
     threads(8, 8),
     texture(rgba16float),
+    forms(fragment),
     parity(
         ulp = 1,
         non_finite,

@@ -128,6 +128,7 @@ fn moments(z: f32) -> Vec4 {
     compute,
     threads(8, 8),
     texture(rgba32float),
+    forms(fragment),
     inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,
@@ -150,6 +151,7 @@ pub fn resolve_trigonometric_plain(
     compute,
     threads(8, 8),
     texture(rgba16unorm),
+    forms(fragment),
     inputs = crate::inputs::maps::depths,
     parity(
         ulp = 0,

@@ -4,9 +4,9 @@ use hankel_dsl::access::{Read, ReadWrite};
 use hankel_dsl::format::{R32Float, R32Sint, R32Uint, Rgba8Sint, Rgba16Float, Rgba32Float};
 use hankel_dsl::glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec3, Vec4};
 use hankel_dsl::{
-    ComparisonSampler, DepthTextureCube, Sampler, StorageTexture2d, StorageTexture2dArray,
+    ComparisonSampler, DepthTextureCube, Element, Sampler, StorageTexture2d, StorageTexture2dArray,
     StorageTexture3d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
-    TextureCubeArray, kernel,
+    TextureCubeArray, array_element, kernel,
 };
 
 /// Texels of integers, as they are: of all levels, of layers, of a volume.
@@ -58,6 +58,88 @@ pub fn signed_pairs(#[index] at: UVec2) -> IVec2 {
 #[kernel(compute, threads(8, 8), texture(r32sint))]
 pub fn single(#[index] at: UVec2) -> i32 {
     at.x as i32 - 2 * at.y as i32
+}
+
+/// What two forms of an image pass read.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Palette {
+    /// Colours.
+    pub colours: [Vec4; 4],
+    /// From a texel to the next.
+    #[values(1, 2, 3)]
+    pub step: UVec2,
+    /// Fills the structure up.
+    pub padding: UVec2,
+}
+
+/// An image pass in two forms: colours by the texel, some of which are darker.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba16unorm, rgba32float),
+    forms(fragment),
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        exact(rgba32float),
+        non_finite,
+        why = "one step of the format: rounding of a tie is the driver's choice; absurd colours overflow"
+    )
+)]
+pub fn two_forms(
+    #[index] at: UVec2,
+    #[uniform] palette: &Palette,
+    #[constant(id = 0, default = 1)]
+    #[values(1, 3)]
+    shade: u32,
+    #[texture] source: Texture2d<'_>,
+) -> Vec4 {
+    let size = source.size();
+    let colour = array_element(&palette.colours, (at.x * palette.step.x + at.y) & 3);
+    let texel = source.load(UVec2::new(at.x % size.x, at.y % size.y));
+    colour * texel / shade as f32
+}
+
+/// The same in 8 bits, whose fragment form is that one.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba8unorm),
+    forms(fragment = two_forms),
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        non_finite,
+        why = "one step of the format: rounding of a tie is the driver's choice; absurd colours overflow"
+    )
+)]
+pub fn two_forms_rgba8unorm(
+    #[index] at: UVec2,
+    #[uniform] palette: &Palette,
+    #[constant(id = 0, default = 1)]
+    #[values(1, 3)]
+    shade: u32,
+    #[texture] source: Texture2d<'_>,
+) -> Vec4 {
+    two_forms(at, palette, shade, source)
+}
+
+/// An image pass in two forms with several results, of several types.
+#[kernel(
+    compute,
+    threads(8, 8),
+    outputs(r32uint, rg32uint, rgba32sint, r32float),
+    forms(fragment)
+)]
+pub fn several_forms(
+    #[index] at: UVec2,
+    #[texture] source: Texture2d<'_, u32>,
+) -> (u32, UVec2, IVec4, f32) {
+    let size = source.size();
+    let texel = source.load(UVec2::new(at.x % size.x, at.y % size.y));
+    let whole = IVec4::new(at.x as i32, -(at.y as i32), texel.z as i32, -1);
+    (texel.x ^ at.y, at, whole, at.x as f32 * 0.5)
 }
 
 /// Every texel halves, in place.

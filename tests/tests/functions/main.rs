@@ -217,6 +217,7 @@ fn entry(function: &Function) -> KernelEntry {
         rounding: Rounding::Pinned,
         subgroups: Subgroups::Unused,
         compensated: None,
+        image_pass: None,
     };
     let (run, words, described) = (function.run, arguments(function).len(), function.clone());
     KernelEntry::new(kernel, move |call| {

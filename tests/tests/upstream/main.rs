@@ -342,6 +342,7 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         rounding: describe::Rounding::Free,
         subgroups: describe::Subgroups::Unused,
         compensated: None,
+        image_pass: None,
     }
 }
 

@@ -1017,14 +1017,7 @@ impl VulkanDevice {
                 )));
             };
             let format = self.image(colour.texture)?.shape.format;
-            let numbers = match ty {
-                Type::Scalar { scalar } | Type::Vector { scalar, .. } => match scalar {
-                    Scalar::U32 => Channels::Uint,
-                    Scalar::I32 => Channels::Sint,
-                    _ => Channels::Float,
-                },
-                _ => Channels::Float,
-            };
+            let numbers = slots::target_channels(ty);
             if format.texel().numbers() != numbers {
                 return Err(bad(format!(
                     "colour target {location} is {}, but kernel `{}` writes {}",

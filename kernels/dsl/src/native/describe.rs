@@ -14,7 +14,8 @@ use super::call::{Address, Compare, Filter};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kernel {
     /// The entry point's name in SPIR-V: the function's name, with the precision (`_f64`) or the
-    /// output's texel format (`_rgba16unorm`) appended where one function makes several.
+    /// output's texel format (`_rgba16unorm`) appended where one function makes several. The fragment
+    /// form of an image pass ends in `_fragment`.
     pub name: String,
     /// The name of the Rust function.
     pub function: String,
@@ -44,6 +45,42 @@ pub struct Kernel {
     /// The function of the kernel that computes the same, from the same parameters, in about twice the digits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compensated: Option<String>,
+    /// Of an image pass with two forms: what its other form is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_pass: Option<ImagePass>,
+}
+
+/// A form of an image pass that comes from one function in two: a compute kernel that writes texels of
+/// storage textures, and a fragment kernel that returns them as colours.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum ImagePass {
+    /// The compute form.
+    Compute {
+        /// The entry point of the fragment form, which has the same parameters.
+        fragment: String,
+    },
+    /// The fragment form. It is drawn over all pixels of its targets, by a triangle that covers them, without
+    /// depth and blending; its [index](Role::Index) is the pixel. A target may have any format of the channels
+    /// that the kernel returns: the format is not part of the shader.
+    Fragment,
+}
+
+impl Kernel {
+    /// The entry point of the fragment form, of a kernel that is the compute form of an image pass.
+    #[must_use]
+    pub fn fragment_form(&self) -> Option<&str> {
+        match &self.image_pass {
+            Some(ImagePass::Compute { fragment }) => Some(fragment),
+            _ => None,
+        }
+    }
+
+    /// Whether it is the fragment form of an image pass.
+    #[must_use]
+    pub fn is_fragment_form(&self) -> bool {
+        self.image_pass == Some(ImagePass::Fragment)
+    }
 }
 
 /// What a kernel does with subgroups.
@@ -381,7 +418,7 @@ pub enum Role {
         /// The value unless specialised.
         default: u32,
     },
-    /// The invocation's own index; bound to nothing.
+    /// The invocation's own index; in the fragment form of an image pass the pixel. Bound to nothing.
     Index,
     /// What the device knows of the invocation; bound to nothing.
     BuiltIn {

@@ -15,7 +15,8 @@ use glam::{IVec4, UVec2, UVec3, UVec4, Vec4};
 use rayon::prelude::*;
 
 use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef, texture_bytes};
-use super::describe::{TexelAccess, TexelFormat, TextureKind};
+use super::describe::{self, TexelAccess, TexelFormat, TextureKind};
+use super::fragment;
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
 use super::sanitize::{self, Access, Space};
@@ -119,6 +120,74 @@ impl<'a> Args<'a> {
                 size,
             })
         }
+    }
+
+    /// What an image pass writes: a storage texture of this format; without one a render target. That is a texture
+    /// of any format of the kernel's channels, or the fragments of a run, row by row, as 32-bit numbers.
+    pub fn image<T: Texel<Channels: Channels>>(
+        &mut self,
+        name: &'static str,
+        format: Option<TexelFormat>,
+    ) -> Result<TextureMut<'a>, CallError> {
+        if let Some(format) = format {
+            return self.texture_mut(name, format);
+        }
+        match self.args.next() {
+            Some(Arg::TextureMut(t)) => {
+                let wanted = <T::Channels as Channels>::NUMBERS;
+                if t.format.numbers() != wanted {
+                    let problem = format!(
+                        "it is {}, the kernel draws {} channels",
+                        t.format.name(),
+                        wanted.word()
+                    );
+                    return Err(CallError::Texture { name, problem });
+                }
+                check_size(name, t.size, t.format, t.bytes.len())?;
+                Ok(t)
+            }
+            Some(Arg::BytesMut(bytes)) => {
+                let format = target_format::<T>();
+                let count = bytes.len() / format.bytes();
+                if count * format.bytes() != bytes.len() {
+                    return Err(CallError::Size {
+                        name,
+                        bytes: bytes.len(),
+                        size: format.bytes(),
+                    });
+                }
+                let rows = (count as u32).div_ceil(fragment::COLUMNS);
+                Ok(TextureMut {
+                    size: [fragment::COLUMNS, rows, 1],
+                    format,
+                    bytes,
+                })
+            }
+            _ => Err(CallError::Kind {
+                name,
+                expected: "a texture or a buffer that can be written",
+            }),
+        }
+    }
+
+    /// [`Args::image`] whose texels any invocation writes.
+    pub fn image_texels<T: Texel<Channels: Channels>>(
+        &mut self,
+        name: &'static str,
+        format: Option<TexelFormat>,
+    ) -> Result<Texels<'a>, CallError> {
+        let TextureMut {
+            size,
+            format,
+            bytes,
+        } = self.image::<T>(name, format)?;
+        let words = shared_words(name, bytes, format.bytes())?;
+        sanitize::name(name, words, format.bytes());
+        Ok(Texels {
+            size,
+            format,
+            memory: Memory::Shared(words),
+        })
     }
 
     /// The texels of a storage texture.
@@ -310,6 +379,15 @@ impl Texels<'_> {
     /// Width, height, depth or layers.
     pub fn size(self) -> [u32; 3] {
         self.size
+    }
+
+    /// How many texels there are: of the fragments of a run, the last row may not be whole.
+    pub fn count(self) -> usize {
+        let bytes = match self.memory {
+            Memory::Shared(words) => size_of_val(words),
+            Memory::Constant(bytes) => bytes.len(),
+        };
+        bytes / self.format.bytes()
     }
 
     /// Writes the texel at `at`, which lies inside.
@@ -505,8 +583,19 @@ pub fn for_each(
     extent: [u32; 3],
     f: impl Fn(UVec3, u32) + Sync,
 ) -> Result<(), CallError> {
-    let [width, height, depth] = extent.map(|n| n as usize);
-    let (row, count) = (width.max(1), width * height * depth);
+    let count = extent.iter().map(|n| *n as usize).product();
+    for_each_of(mode, extent, count, f)
+}
+
+/// [`for_each`] of the first `count` invocations.
+pub fn for_each_of(
+    mode: Mode,
+    extent: [u32; 3],
+    count: usize,
+    f: impl Fn(UVec3, u32) + Sync,
+) -> Result<(), CallError> {
+    let [width, height, _] = extent.map(|n| n as usize);
+    let row = width.max(1);
     let at = |i: usize| {
         let line = i / row;
         UVec3::new(
@@ -613,6 +702,8 @@ fn lane_chunk<S: Simd, B: LaneBody>(
 
 /// All channels of a texel, as a texture stores them.
 pub trait Channels: Sized {
+    /// What they are.
+    const NUMBERS: describe::Channels;
     /// Writes them to the bytes of one texel.
     fn store(self, format: TexelFormat, bytes: &mut [u8]);
     /// Reads them.
@@ -620,6 +711,8 @@ pub trait Channels: Sized {
 }
 
 impl Channels for Vec4 {
+    const NUMBERS: describe::Channels = describe::Channels::Float;
+
     #[inline]
     fn store(self, format: TexelFormat, bytes: &mut [u8]) {
         format.store(bytes, self);
@@ -631,6 +724,8 @@ impl Channels for Vec4 {
 }
 
 impl Channels for UVec4 {
+    const NUMBERS: describe::Channels = describe::Channels::Uint;
+
     #[inline]
     #[track_caller]
     fn store(self, format: TexelFormat, bytes: &mut [u8]) {
@@ -648,6 +743,8 @@ impl Channels for UVec4 {
 }
 
 impl Channels for IVec4 {
+    const NUMBERS: describe::Channels = describe::Channels::Sint;
+
     #[inline]
     #[track_caller]
     fn store(self, format: TexelFormat, bytes: &mut [u8]) {
@@ -661,6 +758,21 @@ impl Channels for IVec4 {
     #[inline]
     fn load(format: TexelFormat, bytes: &[u8]) -> Self {
         format.load_integer(bytes).as_ivec4()
+    }
+}
+
+/// The format of 32-bit numbers that holds a value.
+fn target_format<T: Texel<Channels: Channels>>() -> TexelFormat {
+    use describe::Channels as C;
+    match (<T::Channels as Channels>::NUMBERS, size_of::<T>()) {
+        (C::Float, 4) => TexelFormat::R32Float,
+        (C::Float, _) => TexelFormat::Rgba32Float,
+        (C::Uint, 4) => TexelFormat::R32Uint,
+        (C::Uint, 8) => TexelFormat::Rg32Uint,
+        (C::Uint, _) => TexelFormat::Rgba32Uint,
+        (C::Sint, 4) => TexelFormat::R32Sint,
+        (C::Sint, 8) => TexelFormat::Rg32Sint,
+        (C::Sint, _) => TexelFormat::Rgba32Sint,
     }
 }
 

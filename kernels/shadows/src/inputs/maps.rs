@@ -17,7 +17,7 @@ use hankel_moments::{
     quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4, to_unorm,
 };
 
-use crate::blur::Direction;
+use crate::blur::Taps;
 use crate::convolution::Series;
 use crate::exponential::Exponents;
 use crate::shade::{Light, encoding};
@@ -551,7 +551,7 @@ pub fn shaded_16(request: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// Six moments in 10 bits each, and the weights of a filter.
+/// Six moments in 10 bits each, and the taps of a filter.
 #[must_use]
 pub fn blurred_10(_: &Request) -> Vec<Given> {
     filters("a map of words", |given| {
@@ -559,7 +559,7 @@ pub fn blurred_10(_: &Request) -> Vec<Given> {
     })
 }
 
-/// Six moments in 16 bits each, and the weights of a filter.
+/// Six moments in 16 bits each, and the taps of a filter.
 #[must_use]
 pub fn blurred_16(_: &Request) -> Vec<Given> {
     filters("maps of words", |given| {
@@ -705,13 +705,13 @@ pub fn warped_depths(request: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// A map of moments and the weights of a filter.
+/// A map of moments and the taps of a filter.
 #[must_use]
 pub fn blurred(_: &Request) -> Vec<Given> {
     with_filter("a map of moments", &texels(encoding::SYMMETRIC))
 }
 
-/// A map of warps and the weights of a filter.
+/// A map of warps and the taps of a filter.
 #[must_use]
 pub fn blurred_warps(_: &Request) -> Vec<Given> {
     let [_, (_, narrow, _)] = EXPONENTS;
@@ -735,10 +735,7 @@ fn filters(what: &str, with: impl Fn(Given) -> Given) -> Vec<Given> {
                 .collect();
             let total = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
             let weights: Vec<f32> = raw.iter().map(|w| (w / total) as f32).collect();
-            let given = Given::new(what)
-                .uniform("direction", &Direction { step })
-                .buffer("weights", &weights);
-            with(given)
+            with(Given::new(what).uniform("taps", &Taps::new(step, &weights)))
         })
         .collect()
 }

@@ -129,7 +129,7 @@ pub fn listed_depths(request: &Request) -> Vec<Given> {
     maps::depths(request).into_iter().map(with_list).collect()
 }
 
-/// A list of tiles, a map of moments and the weights of a filter.
+/// A list of tiles, a map of moments and the taps of a filter.
 #[must_use]
 pub fn listed_moments(request: &Request) -> Vec<Given> {
     maps::blurred(request).into_iter().map(with_list).collect()
