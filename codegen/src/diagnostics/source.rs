@@ -7,6 +7,9 @@
 //! - in kernels and what they call: recursion, statics, trait objects, function pointers, numbers of
 //!   8, 16 and 128 bits.
 //!
+//! It also says how the crate is to be compiled: whether it iterates over arrays, and has functions of
+//! slices.
+//!
 //! What it does not see, rust-gpu refuses later. Calls are followed by name within the crate; a name
 //! that several functions have is not followed.
 
@@ -19,6 +22,24 @@ use syn::visit::Visit;
 
 use super::{Diagnostic, Level, Place, shown};
 
+/// What was found in a kernel crate.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// What has to be written otherwise.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What its kernels do with arrays.
+    pub arrays: Arrays,
+}
+
+/// What kernels do with arrays that goes by way of `core`'s slices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Arrays {
+    /// They iterate, or call methods of slices.
+    pub iterated: bool,
+    /// There are functions that take a slice.
+    pub passed_as_slices: bool,
+}
+
 /// A function of the crate.
 struct Function {
     file: usize,
@@ -30,6 +51,7 @@ struct Function {
     names: BTreeSet<String>,
     /// What no shader has: where, what, and what to do.
     refused: Vec<(Span, String, &'static str)>,
+    arrays: Arrays,
 }
 
 #[derive(Default)]
@@ -44,7 +66,7 @@ struct Crate {
 /// Looks through the crate whose Cargo.toml lies in `folder`. A file that cannot be read or parsed is
 /// left to rustc.
 #[must_use]
-pub fn check(folder: &Path) -> Vec<Diagnostic> {
+pub fn check(folder: &Path) -> Found {
     let mut all = Crate::default();
     for path in rust_files(&folder.join("src")) {
         let Ok(text) = std::fs::read_to_string(&path) else {
@@ -60,7 +82,10 @@ pub fn check(folder: &Path) -> Vec<Diagnostic> {
             .visit_file(&parsed);
         }
     }
-    all.diagnostics()
+    Found {
+        diagnostics: all.diagnostics(),
+        arrays: all.arrays(),
+    }
 }
 
 /// Rust sources below a folder, in order; not those of programs.
@@ -136,6 +161,16 @@ impl Crate {
         found.sort();
         found.dedup();
         found
+    }
+
+    /// Names that several functions have count here, too: what is compiled otherwise computes the same.
+    fn arrays(&self) -> Arrays {
+        let mut arrays = Arrays::default();
+        for function in self.reached().iter().flat_map(|name| &self.functions[name]) {
+            arrays.iterated |= function.arrays.iterated;
+            arrays.passed_as_slices |= function.arrays.passed_as_slices;
+        }
+        arrays
     }
 
     fn unlisted(&self) -> Vec<Diagnostic> {
@@ -247,6 +282,7 @@ impl Items<'_> {
             calls: body.calls,
             names: body.names,
             refused: body.refused,
+            arrays: body.arrays,
         };
         let name = signature.ident.to_string();
         self.all.functions.entry(name).or_default().push(function);
@@ -302,6 +338,39 @@ struct Body {
     calls: BTreeMap<String, Span>,
     names: BTreeSet<String>,
     refused: Vec<(Span, String, &'static str)>,
+    arrays: Arrays,
+}
+
+/// Methods of arrays and slices. Those that other types have, too, are left out: nobody needs them who
+/// needs none of these.
+const METHODS: [&str; 14] = [
+    "iter",
+    "iter_mut",
+    "into_iter",
+    "as_slice",
+    "as_mut_slice",
+    "swap",
+    "fill",
+    "reverse",
+    "first",
+    "first_mut",
+    "last",
+    "last_mut",
+    "contains",
+    "copy_from_slice",
+];
+
+/// Whether an expression is a range, perhaps from its end or in steps: loops over these need nothing.
+fn is_range(expression: &syn::Expr) -> bool {
+    match expression {
+        syn::Expr::Range(_) => true,
+        syn::Expr::Paren(inner) => is_range(&inner.expr),
+        syn::Expr::Group(inner) => is_range(&inner.expr),
+        syn::Expr::MethodCall(call) => {
+            ["rev", "step_by"].iter().any(|it| call.method == it) && is_range(&call.receiver)
+        }
+        _ => false,
+    }
 }
 
 /// Whether a path may mean a function of this crate. One through another crate's name, or a type's,
@@ -347,6 +416,31 @@ impl<'ast> Visit<'ast> for Body {
         syn::visit::visit_type_path(self, ty);
     }
 
+    fn visit_expr_for_loop(&mut self, repeat: &'ast syn::ExprForLoop) {
+        self.arrays.iterated |= !is_range(&repeat.expr);
+        syn::visit::visit_expr_for_loop(self, repeat);
+    }
+
+    fn visit_expr_method_call(&mut self, call: &'ast syn::ExprMethodCall) {
+        let is_adapted =
+            is_range(&call.receiver) && !["rev", "step_by"].iter().any(|it| call.method == it);
+        self.arrays.iterated |= is_adapted || METHODS.iter().any(|it| call.method == it);
+        syn::visit::visit_expr_method_call(self, call);
+    }
+
+    fn visit_expr_index(&mut self, index: &'ast syn::ExprIndex) {
+        self.arrays.iterated |= is_range(&index.index);
+        syn::visit::visit_expr_index(self, index);
+    }
+
+    fn visit_type_reference(&mut self, ty: &'ast syn::TypeReference) {
+        if let syn::Type::Slice(_) = &*ty.elem {
+            self.arrays.iterated = true;
+            self.arrays.passed_as_slices = true;
+        }
+        syn::visit::visit_type_reference(self, ty);
+    }
+
     fn visit_type_trait_object(&mut self, ty: &'ast syn::TypeTraitObject) {
         self.refused.push((
             ty.dyn_token.map_or_else(Span::call_site, |it| it.span),
@@ -370,11 +464,16 @@ impl<'ast> Visit<'ast> for Body {
 mod tests {
     use super::*;
 
-    fn told(source: &str) -> Vec<String> {
+    fn found(source: &str) -> Found {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("src")).unwrap();
         std::fs::write(folder.path().join("src/lib.rs"), source).unwrap();
         check(folder.path())
+    }
+
+    fn told(source: &str) -> Vec<String> {
+        found(source)
+            .diagnostics
             .into_iter()
             .map(|it| {
                 let place = it.place.unwrap();
@@ -401,6 +500,41 @@ mod tests {
             "#[kernel]\npub fn one(x: f32) -> f32 { other::one(x) }\nhankel_dsl::kernels![one];\n",
         );
         assert!(none.is_empty(), "{none:?}");
+    }
+
+    #[test]
+    fn who_iterates_over_arrays_is_known() {
+        let arrays = |body: &str| {
+            let source = format!(
+                "fn other(x: &[f32]) {{}}\n#[kernel] fn k(a: [f32; 4]) {{ {body} }}\nkernels![k];"
+            );
+            let arrays = found(&source).arrays;
+            (arrays.iterated, arrays.passed_as_slices)
+        };
+        let none = [
+            "for i in 0..4 { b += a[i]; }",
+            "for i in (0..4).rev().step_by(2) { b += a[i]; }",
+            "for i in 0..=n { b += a[i].min(c).max(d); }",
+            "let b = o.map(|x| x + 1).unwrap_or(table.get(i)); a == b",
+        ];
+        for body in none {
+            assert_eq!(arrays(body), (false, false), "{body}");
+        }
+        let iterated = [
+            "for x in a { b += x; }",
+            "for x in &a { b += x; }",
+            "for (i, x) in a.iter().enumerate() {}",
+            "let b: f32 = (0..4).map(|i| a[i]).sum();",
+            "for i in (0..16).filter(|i| n >> i & 1 == 1) {}",
+            "a.swap(0, 1);",
+            "if (3..=9).contains(&n) {}",
+            "for x in &a[1..] {}",
+        ];
+        for body in iterated {
+            assert_eq!(arrays(body), (true, false), "{body}");
+        }
+        assert_eq!(arrays("other(&a)"), (true, true));
+        assert_eq!(arrays("let b: &[f32] = &a;"), (true, true));
     }
 
     #[test]
