@@ -2,7 +2,7 @@
 //! different data. They are a crate of their own since a crate that iterates is compiled otherwise.
 #![no_std]
 
-use hankel_dsl::glam::{UVec4, Vec3, Vec4};
+use hankel_dsl::glam::{IVec4, UVec4, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
 
 hankel_dsl::kernels![
@@ -300,23 +300,18 @@ pub fn bits(#[element] x: u32) -> UVec4 {
     UVec4::new(set, pairs, turned, sum)
 }
 
-/// Loops over arrays that are left, and turns that are left out.
+/// A loop over an array that is left, and turns that are left out.
 #[kernel(compute, threads(64))]
-pub fn cut_short(#[element] x: UVec4, #[element] y: UVec4) -> u32 {
+pub fn cut_short(#[element] x: UVec4) -> u32 {
     let mut sum = 0_u32;
-    'rows: for (i, row) in [x.to_array(), y.to_array()].iter().enumerate() {
-        for number in row {
-            if number & 7 == 0 {
-                continue;
-            }
-            if *number > 0xc000_0000 {
-                break 'rows;
-            }
-            if *number > 0x8000_0000 {
-                break;
-            }
-            sum = sum.wrapping_mul(5).wrapping_add(number ^ i as u32);
+    for (i, number) in x.to_array().iter().enumerate() {
+        if number & 7 == 0 {
+            continue;
         }
+        if *number > 0xc000_0000 {
+            break;
+        }
+        sum = sum.wrapping_mul(5).wrapping_add(number ^ i as u32);
     }
     sum
 }
@@ -370,6 +365,16 @@ impl Shape {
     }
 }
 
+/// Small numbers, whose products are exact.
+fn small(x: IVec4) -> Vec4 {
+    Vec4::new(
+        (x.x >> 24) as f32,
+        (x.y >> 24) as f32,
+        (x.z >> 24) as f32,
+        (x.w >> 24) as f32,
+    )
+}
+
 /// One of the shapes, by a number.
 fn shape(kind: u32, v: Vec4) -> Shape {
     let p = Vec3::new(v.x, v.y, v.z);
@@ -388,24 +393,16 @@ fn shape(kind: u32, v: Vec4) -> Shape {
 }
 
 /// An enum whose variants hold different data: the distance of a point from a shape.
-#[kernel(
-    compute,
-    threads(64),
-    pinned,
-    parity(non_finite, why = "sums and products of absurd numbers overflow")
-)]
-pub fn distances(#[element] kind: u32, #[element] v: Vec4) -> f32 {
+#[kernel(compute, threads(64))]
+pub fn distances(#[element] kind: u32, #[element] v: IVec4) -> f32 {
+    let v = small(v);
     shape(kind, v).distance(Vec3::new(0.25, v.w, 0.5))
 }
 
 /// An array of enums: the largest distance of several shapes, and which it is.
-#[kernel(
-    compute,
-    threads(64),
-    pinned,
-    parity(non_finite, why = "sums and products of absurd numbers overflow")
-)]
-pub fn farthest(#[element] kinds: UVec4, #[element] v: Vec4) -> Vec4 {
+#[kernel(compute, threads(64))]
+pub fn farthest(#[element] kinds: UVec4, #[element] v: IVec4) -> Vec4 {
+    let v = small(v);
     let shapes = [
         shape(kinds.x % 3, v),
         shape(kinds.y % 3, v * 0.5),
