@@ -68,19 +68,28 @@ struct Crate {
 #[must_use]
 pub fn check(folder: &Path) -> Found {
     let mut all = Crate::default();
+    let mut parsed = Vec::new();
     for path in rust_files(&folder.join("src")) {
-        let Ok(text) = std::fs::read_to_string(&path) else {
-            continue;
-        };
-        if let Ok(parsed) = syn::parse_file(&text) {
-            all.files.push(path);
-            let file = all.files.len() - 1;
-            Items {
-                all: &mut all,
-                file,
-            }
-            .visit_file(&parsed);
+        let text = std::fs::read_to_string(&path).ok();
+        if let Some(file) = text.and_then(|text| syn::parse_file(&text).ok()) {
+            parsed.push((path, file));
         }
+    }
+    let elsewhere: BTreeSet<PathBuf> = parsed
+        .iter()
+        .flat_map(|(path, file)| files_elsewhere(path, &file.items))
+        .collect();
+    for (path, parsed) in &parsed {
+        if path.ancestors().any(|part| elsewhere.contains(part)) {
+            continue;
+        }
+        all.files.push(path.clone());
+        let file = all.files.len() - 1;
+        Items {
+            all: &mut all,
+            file,
+        }
+        .visit_file(parsed);
     }
     Found {
         diagnostics: all.diagnostics(),
@@ -108,6 +117,27 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// Files and folders of the modules that a file declares, and that are not part of the shaders.
+fn files_elsewhere(path: &Path, items: &[syn::Item]) -> Vec<PathBuf> {
+    let is_root = ["lib.rs", "mod.rs"].iter().any(|name| path.ends_with(name));
+    let folder = match is_root {
+        true => path.parent().unwrap_or(path).to_owned(),
+        false => path.with_extension(""),
+    };
+    items
+        .iter()
+        .filter_map(|item| match item {
+            syn::Item::Mod(module) if module.content.is_none() => Some(module),
+            _ => None,
+        })
+        .filter(|module| is_elsewhere(&module.attrs))
+        .flat_map(|module| {
+            let name = module.ident.to_string();
+            [folder.join(format!("{name}.rs")), folder.join(name)]
+        })
+        .collect()
+}
+
 impl Crate {
     fn place(&self, file: usize, span: Span) -> Place {
         let (start, end) = (span.start(), span.end());
@@ -124,7 +154,7 @@ impl Crate {
 
     fn diagnostics(&self) -> Vec<Diagnostic> {
         let mut found = self.unlisted();
-        for name in self.reached() {
+        for name in self.reached(false) {
             let [function] = self.functions[&name].as_slice() else {
                 continue;
             };
@@ -166,7 +196,11 @@ impl Crate {
     /// Names that several functions have count here, too: what is compiled otherwise computes the same.
     fn arrays(&self) -> Arrays {
         let mut arrays = Arrays::default();
-        for function in self.reached().iter().flat_map(|name| &self.functions[name]) {
+        for function in self
+            .reached(true)
+            .iter()
+            .flat_map(|name| &self.functions[name])
+        {
             arrays.iterated |= function.arrays.iterated;
             arrays.passed_as_slices |= function.arrays.passed_as_slices;
         }
@@ -193,8 +227,9 @@ impl Crate {
             .collect()
     }
 
-    /// Kernels that are listed, and the crate's functions that they call, by name.
-    fn reached(&self) -> BTreeSet<String> {
+    /// Kernels that are listed, and the crate's functions that they call, by name; by way of names that
+    /// several functions have only if that is wanted.
+    fn reached(&self, through_all: bool) -> BTreeSet<String> {
         let is_kernel = |name: &str| self.functions[name].iter().any(|it| it.is_kernel);
         let mut open: Vec<&String> = self.functions.keys().filter(|it| is_kernel(it)).collect();
         let mut reached = BTreeSet::new();
@@ -202,13 +237,14 @@ impl Crate {
             if !reached.insert(name.clone()) {
                 continue;
             }
-            let [function] = self.functions[name].as_slice() else {
+            let functions = self.functions[name].as_slice();
+            if functions.len() > 1 && !through_all {
                 continue;
-            };
+            }
             open.extend(
-                function
-                    .names
+                functions
                     .iter()
+                    .flat_map(|function| &function.names)
                     .filter(|other| self.functions.contains_key(*other)),
             );
         }
@@ -535,6 +571,32 @@ mod tests {
         }
         assert_eq!(arrays("other(&a)"), (true, true));
         assert_eq!(arrays("let b: &[f32] = &a;"), (true, true));
+        let through_a_method = found(
+            "impl A { fn at(self) -> f32 { sum(self.a) } }\nimpl B { fn at(self) -> f32 { self.b } }\n\
+             fn sum(a: [f32; 4]) -> f32 { a.iter().sum() }\n\
+             #[kernel] fn k(a: A) -> f32 { a.at() }\nkernels![k];",
+        );
+        assert!(through_a_method.arrays.iterated);
+    }
+
+    #[test]
+    fn the_kernels_of_this_repository_are_compiled_as_they_were() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for folder in [
+            "kernels/moments",
+            "kernels/shadows",
+            "tests/conformance",
+            "tests/listing",
+            "examples/ports",
+        ] {
+            let found = check(&root.join(folder));
+            assert_eq!(found, Found::default(), "{folder}");
+        }
+        let all = Arrays {
+            iterated: true,
+            passed_as_slices: true,
+        };
+        assert_eq!(check(&root.join("tests/iteration")).arrays, all);
     }
 
     #[test]
