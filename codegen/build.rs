@@ -58,7 +58,7 @@ fn main() {
     }
 }
 
-/// Every Rust file below a folder, by its path with `/`, with `\n` at the ends of lines.
+/// Every Rust file and patch below a folder, by its path with `/`, with `\n` at the ends of lines.
 fn sources(root: &Path) -> BTreeMap<String, String> {
     fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, String>) {
         for entry in std::fs::read_dir(folder).expect("src can be read") {
@@ -67,7 +67,8 @@ fn sources(root: &Path) -> BTreeMap<String, String> {
             let path = entry.path();
             if path.is_dir() {
                 walk(&path, &format!("{prefix}{name}/"), found);
-            } else if name.ends_with(".rs") && !name.starts_with('.') {
+            } else if (name.ends_with(".rs") || name.ends_with(".patch")) && !name.starts_with('.')
+            {
                 let text = std::fs::read_to_string(&path).expect("sources can be read");
                 found.insert(format!("{prefix}{name}"), text.replace("\r\n", "\n"));
             }
@@ -95,6 +96,12 @@ fn used(files: &BTreeMap<String, String>) -> BTreeSet<&str> {
         }
         for (path, text) in files.iter().filter(|(path, _)| module(path) == name) {
             assert!(!text.is_empty(), "{path} is empty");
+            // A patch names crates of its own.
+            let text = if path.ends_with(".rs") {
+                text.as_str()
+            } else {
+                ""
+            };
             for (place, _) in text.match_indices("crate::") {
                 let rest = &text[place + "crate::".len()..];
                 let names: Vec<&str> = match rest.strip_prefix('{') {

@@ -19,10 +19,12 @@ use rustc_codegen_spirv_types::{CompileResult, ModuleResult, SpirvTarget, Target
 use semver::Version;
 use serde::Deserialize;
 
+use crate::diagnostics::source::Arrays;
 use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
+use crate::library;
 use crate::spirv::{self, divide, trim};
 
 /// What the modules are compiled for.
@@ -198,19 +200,22 @@ pub fn compile(
             problem: "there is no such file".into(),
         })?;
     let found = diagnostics::source::check(folder);
-    if !found.is_empty() {
-        return Err(Error::Source(found));
+    if !found.diagnostics.is_empty() {
+        return Err(Error::Source(found.diagnostics));
     }
     let target_dir = std::path::absolute(target_dir)
         .during("resolve", target_dir)?
         .join(TARGET_SUBFOLDER);
-    let flags = wanted.flags();
+    let mut flags = wanted.flags();
+    flags.extend(of_arrays(found.arrays).map(Into::into));
     let build = std::iter::once(manifest.as_os_str()).chain(flags.iter().map(OsStr::new));
     let last = LastBuild::of(&target_dir, build)?;
     last.forget_if_overlooked()?;
     let version = compiler.version()?;
     let sysroot = compiler.ask("rustc", &["--print", "sysroot"])?;
-    let own = [target_dir.clone(), sysroot.into(), compiler.backend.clone()];
+    let sysroot = PathBuf::from(sysroot);
+    let library = library::patched(&sysroot, &target_dir)?;
+    let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -220,7 +225,9 @@ pub fn compile(
             &manifest,
             folder,
             &target_dir,
-            wanted,
+            &library,
+            &flags,
+            wanted.names(),
             progress,
         )?;
         let artefact = last_artefact(&messages).ok_or_else(|| Error::Manifest {
@@ -257,6 +264,23 @@ pub fn compile(
     })
 }
 
+/// rustc's flags for a crate whose kernels do such things with arrays.
+///
+/// An iterator and a slice are pointers, which rust-gpu can only follow within a function. So rustc
+/// inlines everything in these crates before rust-gpu sees it; in others it does not, since that reads
+/// vectors part by part, and says less of what stands in the source.
+fn of_arrays(arrays: Arrays) -> impl Iterator<Item = &'static str> {
+    const ITERATED: [&str; 3] = [
+        "-Zmir-enable-passes=+Inline",
+        "-Zinline-mir-threshold=100000",
+        "-Zinline-mir-hint-threshold=100000",
+    ];
+    // Else only what is generic or `#[inline]` can be inlined.
+    const PASSED_AS_SLICES: &str = "-Zcross-crate-inline-threshold=always";
+    let iterated = arrays.iterated.then_some(ITERATED).into_iter().flatten();
+    iterated.chain(arrays.passed_as_slices.then_some(PASSED_AS_SLICES))
+}
+
 /// Runs cargo; gives its messages.
 fn run(
     compiler: &Compiler,
@@ -264,11 +288,15 @@ fn run(
     manifest: &Path,
     folder: &Path,
     target_dir: &Path,
-    wanted: Wanted<'_>,
+    library: &Path,
+    flags: &[String],
+    names: &[&str],
     progress: &mut (dyn FnMut(&str) + Send),
 ) -> Result<String> {
     let mut cargo = cargo(compiler, version, manifest, folder, target_dir)?;
-    cargo.arg("--").args(wanted.flags());
+    // cargo has no other word for where the library's sources are.
+    cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", library);
+    cargo.arg("--").args(flags);
     let program = PathBuf::from(cargo.get_program());
     cargo.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut running = Program::start(&mut cargo).map_err(|source| Error::Run {
@@ -305,7 +333,7 @@ fn run(
         .wait()
         .map_err(|source| Error::Run { program, source })?;
     if !status.success() {
-        return Err(failure(manifest, wanted.names(), &said, &messages));
+        return Err(failure(manifest, names, &said, &messages));
     }
     Ok(messages)
 }

@@ -121,6 +121,12 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// The compiler's `core` is none that the patch for shaders fits.
+    #[error("{}: the compiler has another `core` than the one that is patched for shaders", path.display())]
+    Library {
+        /// The file that differs.
+        path: PathBuf,
+    },
     /// What a kernel crate is made from cannot be told.
     #[error("{}: {problem}", path.display())]
     Inputs {
@@ -388,6 +394,11 @@ impl Error {
                     .into()
             }
             Self::Manifest { .. } => "Give the path of a kernel crate's Cargo.toml.".into(),
+            Self::Library { .. } => {
+                "Use the compiler that this Hankel is for: `hankel toolchain status` says which, and \
+                 `hankel toolchain install` installs it."
+                    .into()
+            }
             Self::Run { .. } => {
                 "`hankel toolchain status` says which compiler is used and what is missing.".into()
             }

@@ -32,6 +32,7 @@ mod gather;
 pub mod headers;
 pub mod inputs;
 mod language;
+mod library;
 pub mod lint;
 pub mod manifest;
 pub mod placement;

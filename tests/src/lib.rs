@@ -54,6 +54,16 @@ impl Crate {
         )
     }
 
+    /// Kernels that iterate over arrays, and enums that hold data.
+    #[must_use]
+    pub fn iteration() -> Self {
+        Self::new(
+            hankel_iteration::entries(),
+            "tests/iteration",
+            "snapshots/iteration",
+        )
+    }
+
     /// The published form of four moment shadow mapping.
     #[must_use]
     pub fn listing() -> Self {

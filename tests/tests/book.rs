@@ -1,4 +1,4 @@
-//! The chapter on kernels: its examples are those of the conformance crate, which runs everywhere.
+//! The chapter on kernels: its examples are those of the crates of kernels here, which run everywhere.
 
 use std::fs;
 
@@ -14,25 +14,26 @@ fn examples(text: &str) -> Vec<&str> {
 
 #[test]
 fn every_example_is_compiled_and_runs() {
-    let folder = root().join("tests/conformance/src");
     let mut sources = String::new();
-    for file in fs::read_dir(&folder).expect("the crate is there") {
-        let path = file.expect("it can be listed").path();
-        sources += &fs::read_to_string(path).expect("it is text");
+    for folder in ["tests/conformance/src", "tests/iteration/src"] {
+        for file in fs::read_dir(root().join(folder)).expect("the crate is there") {
+            let path = file.expect("it can be listed").path();
+            sources += &fs::read_to_string(path).expect("it is text");
+        }
     }
     let text = fs::read_to_string(root().join("docs/kernels.md")).expect("the chapter is there");
     let examples = examples(&text);
     assert!(examples.len() > 20, "{} examples", examples.len());
     let listed: Vec<String> = hankel_conformance::entries()
         .iter()
+        .chain(&hankel_iteration::entries())
         .map(|entry| entry.kernel.function.clone())
         .collect();
     for example in examples {
         for part in example.split("\n\n/// ") {
             assert!(
                 sources.contains(part),
-                "this is in no file of {}:\n{part}",
-                folder.display()
+                "this is in no file of the crates:\n{part}"
             );
         }
         let kernels = example.split("#[kernel").skip(1);

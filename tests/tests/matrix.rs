@@ -45,7 +45,10 @@ fn matrix_in(columns: &[Column], known: Known, subjects: &[Subject]) -> Report {
 }
 
 fn subjects() -> Vec<Subject> {
-    let krate = Crate::conformance();
+    subjects_of(&Crate::conformance())
+}
+
+fn subjects_of(krate: &Crate) -> Vec<Subject> {
     let entries: Vec<KernelEntry> = krate.entries.iter().cloned().map(Into::into).collect();
     Subject::with_constants(
         &krate.generate(),
@@ -66,6 +69,15 @@ fn every_kind_of_kernel_passes_in_every_column() {
         .flat_map(|row| row.cells.values())
         .filter(|cell| cell.outcome == Outcome::Passed)
         .count();
+    assert!(passing > 190, "only {passing} cells passed\n{report}");
+}
+
+#[test]
+fn iterators_and_enums_with_data_pass_in_every_column() {
+    let report = matrix(&subjects_of(&Crate::iteration()));
+    assert!(report.passed, "{report}");
+    let cells = report.kernels.iter().flat_map(|row| row.cells.values());
+    let passing = cells.filter(|cell| cell.outcome == Outcome::Passed).count();
     assert!(passing > 190, "only {passing} cells passed\n{report}");
 }
 

@@ -21,6 +21,7 @@ fn committed_spirv_follows_from_its_sources() {
     let crates = [
         Crate::shadows(),
         Crate::conformance(),
+        Crate::iteration(),
         Crate::listing(),
         Crate::ports(),
     ];

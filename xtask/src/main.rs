@@ -49,7 +49,7 @@ struct Committed {
     kernels: Vec<Kernel>,
 }
 
-fn committed() -> [Committed; 4] {
+fn committed() -> [Committed; 5] {
     let kernels = |entries: Vec<Entry>| entries.into_iter().map(|e| e.kernel).collect();
     [
         Committed {
@@ -63,6 +63,12 @@ fn committed() -> [Committed; 4] {
             manifest: "tests/conformance/Cargo.toml",
             folder: "snapshots/conformance",
             kernels: kernels(hankel_conformance::entries()),
+        },
+        Committed {
+            crate_name: "hankel-iteration",
+            manifest: "tests/iteration/Cargo.toml",
+            folder: "snapshots/iteration",
+            kernels: kernels(hankel_iteration::entries()),
         },
         Committed {
             crate_name: "hankel-listing",

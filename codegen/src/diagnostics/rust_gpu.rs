@@ -60,13 +60,15 @@ fn file_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
 const KNOWN: [(&[&str], &str); 29] = [
     (
         &["cannot offset a pointer"],
-        "a shader cannot walk through an array or a slice by pointer, as iterators, `swap` and \
-         sub-slices do: count an index, `for i in 0..N { … a[i] … }`",
+        "a shader cannot walk through memory by pointer, as `sort`, `windows` and `chunks` do: count an \
+         index, `for i in 0..N { … a[i] … }`",
     ),
     (
         &["cannot cast between pointer types"],
-        "memory has one type in a shader. An enum whose variants hold different types: a structure \
-         with a tag and a field for each. A slice of an array: the array itself, or its reference",
+        "memory has one type in a shader. An enum whose variants hold different types: first the variant \
+         that holds most, `enum Shape { Box(Vec3, Vec3), Ball(Vec3, f32), Height(f32) }`, and not in an \
+         `Option`; or a structure with a tag and a field for each. Of two arrays, `chain` chooses while the \
+         kernel runs: two loops",
     ),
     (
         &["OpSwitch", "is duplicated"],

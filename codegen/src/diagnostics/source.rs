@@ -7,6 +7,9 @@
 //! - in kernels and what they call: recursion, statics, trait objects, function pointers, numbers of
 //!   8, 16 and 128 bits.
 //!
+//! It also says how the crate is to be compiled: whether it iterates over arrays, and has functions of
+//! slices.
+//!
 //! What it does not see, rust-gpu refuses later. Calls are followed by name within the crate; a name
 //! that several functions have is not followed.
 
@@ -19,6 +22,24 @@ use syn::visit::Visit;
 
 use super::{Diagnostic, Level, Place, shown};
 
+/// What was found in a kernel crate.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// What has to be written otherwise.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What its kernels do with arrays.
+    pub arrays: Arrays,
+}
+
+/// What kernels do with arrays that goes by way of `core`'s slices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Arrays {
+    /// They iterate, or call methods of slices.
+    pub iterated: bool,
+    /// There are functions that take a slice.
+    pub passed_as_slices: bool,
+}
+
 /// A function of the crate.
 struct Function {
     file: usize,
@@ -30,6 +51,7 @@ struct Function {
     names: BTreeSet<String>,
     /// What no shader has: where, what, and what to do.
     refused: Vec<(Span, String, &'static str)>,
+    arrays: Arrays,
 }
 
 #[derive(Default)]
@@ -44,23 +66,35 @@ struct Crate {
 /// Looks through the crate whose Cargo.toml lies in `folder`. A file that cannot be read or parsed is
 /// left to rustc.
 #[must_use]
-pub fn check(folder: &Path) -> Vec<Diagnostic> {
+pub fn check(folder: &Path) -> Found {
     let mut all = Crate::default();
+    let mut parsed = Vec::new();
     for path in rust_files(&folder.join("src")) {
-        let Ok(text) = std::fs::read_to_string(&path) else {
-            continue;
-        };
-        if let Ok(parsed) = syn::parse_file(&text) {
-            all.files.push(path);
-            let file = all.files.len() - 1;
-            Items {
-                all: &mut all,
-                file,
-            }
-            .visit_file(&parsed);
+        let text = std::fs::read_to_string(&path).ok();
+        if let Some(file) = text.and_then(|text| syn::parse_file(&text).ok()) {
+            parsed.push((path, file));
         }
     }
-    all.diagnostics()
+    let elsewhere: BTreeSet<PathBuf> = parsed
+        .iter()
+        .flat_map(|(path, file)| files_elsewhere(path, &file.items))
+        .collect();
+    for (path, parsed) in &parsed {
+        if path.ancestors().any(|part| elsewhere.contains(part)) {
+            continue;
+        }
+        all.files.push(path.clone());
+        let file = all.files.len() - 1;
+        Items {
+            all: &mut all,
+            file,
+        }
+        .visit_file(parsed);
+    }
+    Found {
+        diagnostics: all.diagnostics(),
+        arrays: all.arrays(),
+    }
 }
 
 /// Rust sources below a folder, in order; not those of programs.
@@ -83,6 +117,27 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// Files and folders of the modules that a file declares, and that are not part of the shaders.
+fn files_elsewhere(path: &Path, items: &[syn::Item]) -> Vec<PathBuf> {
+    let is_root = ["lib.rs", "mod.rs"].iter().any(|name| path.ends_with(name));
+    let folder = match is_root {
+        true => path.parent().unwrap_or(path).to_owned(),
+        false => path.with_extension(""),
+    };
+    items
+        .iter()
+        .filter_map(|item| match item {
+            syn::Item::Mod(module) if module.content.is_none() => Some(module),
+            _ => None,
+        })
+        .filter(|module| is_elsewhere(&module.attrs))
+        .flat_map(|module| {
+            let name = module.ident.to_string();
+            [folder.join(format!("{name}.rs")), folder.join(name)]
+        })
+        .collect()
+}
+
 impl Crate {
     fn place(&self, file: usize, span: Span) -> Place {
         let (start, end) = (span.start(), span.end());
@@ -99,7 +154,7 @@ impl Crate {
 
     fn diagnostics(&self) -> Vec<Diagnostic> {
         let mut found = self.unlisted();
-        for name in self.reached() {
+        for name in self.reached(false) {
             let [function] = self.functions[&name].as_slice() else {
                 continue;
             };
@@ -138,6 +193,20 @@ impl Crate {
         found
     }
 
+    /// Names that several functions have count here, too: what is compiled otherwise computes the same.
+    fn arrays(&self) -> Arrays {
+        let mut arrays = Arrays::default();
+        for function in self
+            .reached(true)
+            .iter()
+            .flat_map(|name| &self.functions[name])
+        {
+            arrays.iterated |= function.arrays.iterated;
+            arrays.passed_as_slices |= function.arrays.passed_as_slices;
+        }
+        arrays
+    }
+
     fn unlisted(&self) -> Vec<Diagnostic> {
         let Some(listed) = &self.listed else {
             return Vec::new();
@@ -158,8 +227,9 @@ impl Crate {
             .collect()
     }
 
-    /// Kernels that are listed, and the crate's functions that they call, by name.
-    fn reached(&self) -> BTreeSet<String> {
+    /// Kernels that are listed, and the crate's functions that they call, by name; by way of names that
+    /// several functions have only if that is wanted.
+    fn reached(&self, through_all: bool) -> BTreeSet<String> {
         let is_kernel = |name: &str| self.functions[name].iter().any(|it| it.is_kernel);
         let mut open: Vec<&String> = self.functions.keys().filter(|it| is_kernel(it)).collect();
         let mut reached = BTreeSet::new();
@@ -167,13 +237,14 @@ impl Crate {
             if !reached.insert(name.clone()) {
                 continue;
             }
-            let [function] = self.functions[name].as_slice() else {
+            let functions = self.functions[name].as_slice();
+            if functions.len() > 1 && !through_all {
                 continue;
-            };
+            }
             open.extend(
-                function
-                    .names
+                functions
                     .iter()
+                    .flat_map(|function| &function.names)
                     .filter(|other| self.functions.contains_key(*other)),
             );
         }
@@ -247,6 +318,7 @@ impl Items<'_> {
             calls: body.calls,
             names: body.names,
             refused: body.refused,
+            arrays: body.arrays,
         };
         let name = signature.ident.to_string();
         self.all.functions.entry(name).or_default().push(function);
@@ -302,6 +374,39 @@ struct Body {
     calls: BTreeMap<String, Span>,
     names: BTreeSet<String>,
     refused: Vec<(Span, String, &'static str)>,
+    arrays: Arrays,
+}
+
+/// Methods of arrays and slices. Those that other types have, too, are left out: nobody needs them who
+/// needs none of these.
+const METHODS: [&str; 14] = [
+    "iter",
+    "iter_mut",
+    "into_iter",
+    "as_slice",
+    "as_mut_slice",
+    "swap",
+    "fill",
+    "reverse",
+    "first",
+    "first_mut",
+    "last",
+    "last_mut",
+    "contains",
+    "copy_from_slice",
+];
+
+/// Whether an expression is a range, perhaps from its end or in steps: loops over these need nothing.
+fn is_range(expression: &syn::Expr) -> bool {
+    match expression {
+        syn::Expr::Range(_) => true,
+        syn::Expr::Paren(inner) => is_range(&inner.expr),
+        syn::Expr::Group(inner) => is_range(&inner.expr),
+        syn::Expr::MethodCall(call) => {
+            ["rev", "step_by"].iter().any(|it| call.method == it) && is_range(&call.receiver)
+        }
+        _ => false,
+    }
 }
 
 /// Whether a path may mean a function of this crate. One through another crate's name, or a type's,
@@ -347,6 +452,31 @@ impl<'ast> Visit<'ast> for Body {
         syn::visit::visit_type_path(self, ty);
     }
 
+    fn visit_expr_for_loop(&mut self, repeat: &'ast syn::ExprForLoop) {
+        self.arrays.iterated |= !is_range(&repeat.expr);
+        syn::visit::visit_expr_for_loop(self, repeat);
+    }
+
+    fn visit_expr_method_call(&mut self, call: &'ast syn::ExprMethodCall) {
+        let is_adapted =
+            is_range(&call.receiver) && !["rev", "step_by"].iter().any(|it| call.method == it);
+        self.arrays.iterated |= is_adapted || METHODS.iter().any(|it| call.method == it);
+        syn::visit::visit_expr_method_call(self, call);
+    }
+
+    fn visit_expr_index(&mut self, index: &'ast syn::ExprIndex) {
+        self.arrays.iterated |= is_range(&index.index);
+        syn::visit::visit_expr_index(self, index);
+    }
+
+    fn visit_type_reference(&mut self, ty: &'ast syn::TypeReference) {
+        if let syn::Type::Slice(_) = &*ty.elem {
+            self.arrays.iterated = true;
+            self.arrays.passed_as_slices = true;
+        }
+        syn::visit::visit_type_reference(self, ty);
+    }
+
     fn visit_type_trait_object(&mut self, ty: &'ast syn::TypeTraitObject) {
         self.refused.push((
             ty.dyn_token.map_or_else(Span::call_site, |it| it.span),
@@ -370,11 +500,16 @@ impl<'ast> Visit<'ast> for Body {
 mod tests {
     use super::*;
 
-    fn told(source: &str) -> Vec<String> {
+    fn found(source: &str) -> Found {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("src")).unwrap();
         std::fs::write(folder.path().join("src/lib.rs"), source).unwrap();
         check(folder.path())
+    }
+
+    fn told(source: &str) -> Vec<String> {
+        found(source)
+            .diagnostics
             .into_iter()
             .map(|it| {
                 let place = it.place.unwrap();
@@ -401,6 +536,67 @@ mod tests {
             "#[kernel]\npub fn one(x: f32) -> f32 { other::one(x) }\nhankel_dsl::kernels![one];\n",
         );
         assert!(none.is_empty(), "{none:?}");
+    }
+
+    #[test]
+    fn who_iterates_over_arrays_is_known() {
+        let arrays = |body: &str| {
+            let source = format!(
+                "fn other(x: &[f32]) {{}}\n#[kernel] fn k(a: [f32; 4]) {{ {body} }}\nkernels![k];"
+            );
+            let arrays = found(&source).arrays;
+            (arrays.iterated, arrays.passed_as_slices)
+        };
+        let none = [
+            "for i in 0..4 { b += a[i]; }",
+            "for i in (0..4).rev().step_by(2) { b += a[i]; }",
+            "for i in 0..=n { b += a[i].min(c).max(d); }",
+            "let b = o.map(|x| x + 1).unwrap_or(table.get(i)); a == b",
+        ];
+        for body in none {
+            assert_eq!(arrays(body), (false, false), "{body}");
+        }
+        let iterated = [
+            "for x in a { b += x; }",
+            "for x in &a { b += x; }",
+            "for (i, x) in a.iter().enumerate() {}",
+            "let b: f32 = (0..4).map(|i| a[i]).sum();",
+            "for i in (0..16).filter(|i| n >> i & 1 == 1) {}",
+            "a.swap(0, 1);",
+            "if (3..=9).contains(&n) {}",
+            "for x in &a[1..] {}",
+        ];
+        for body in iterated {
+            assert_eq!(arrays(body), (true, false), "{body}");
+        }
+        assert_eq!(arrays("other(&a)"), (true, true));
+        assert_eq!(arrays("let b: &[f32] = &a;"), (true, true));
+        let through_a_method = found(
+            "impl A { fn at(self) -> f32 { sum(self.a) } }\nimpl B { fn at(self) -> f32 { self.b } }\n\
+             fn sum(a: [f32; 4]) -> f32 { a.iter().sum() }\n\
+             #[kernel] fn k(a: A) -> f32 { a.at() }\nkernels![k];",
+        );
+        assert!(through_a_method.arrays.iterated);
+    }
+
+    #[test]
+    fn the_kernels_of_this_repository_are_compiled_as_they_were() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for folder in [
+            "kernels/moments",
+            "kernels/shadows",
+            "tests/conformance",
+            "tests/listing",
+            "examples/ports",
+        ] {
+            let found = check(&root.join(folder));
+            assert_eq!(found, Found::default(), "{folder}");
+        }
+        let all = Arrays {
+            iterated: true,
+            passed_as_slices: true,
+        };
+        assert_eq!(check(&root.join("tests/iteration")).arrays, all);
     }
 
     #[test]

@@ -279,10 +279,25 @@ fn without_repetitions(source: &str) -> String {
 
 /// Arrays of functions without the zeros that naga gives every variable, which glslang's HLSL refuses
 /// for arrays (`tests/upstream/glslang-zero-array`). Nothing reads them: a Rust array has values
-/// before anybody can.
+/// before anybody can. Where an array of zeros is a value, its zeros are listed.
 fn without_zero_arrays(source: &str) -> String {
     let mut plain = String::with_capacity(source.len());
     for line in source.split_inclusive('\n') {
+        let value = line.trim().strip_prefix("return (");
+        if let Some(array) = value.and_then(|rest| rest.strip_suffix(")0;"))
+            && let Some((element, lengths)) = array.split_once('[')
+            && let Some(zeros) = lengths
+                .split(['[', ']'])
+                .filter(|length| !length.is_empty())
+                .map(|length| length.parse::<usize>().ok())
+                .product::<Option<usize>>()
+        {
+            let zeros = vec![format!("({element})0"); zeros].join(", ");
+            plain.push_str(&format!(
+                "    {element} ret[{lengths} = {{ {zeros} }};\n    return ret;\n"
+            ));
+            continue;
+        }
         let declared = line.trim_end().strip_suffix(")0;").and_then(|rest| {
             let (declared, ty) = rest.split_once(" = (")?;
             let is_array = declared.ends_with(']') && ty.ends_with(']');
@@ -424,6 +439,10 @@ mod tests {
                 "static int all[2] = (int[2])0;\n    float4 a[3][2] = (float4[3][2])0;\n    uint n = (uint)0;\n"
             ),
             "static int all[2] = (int[2])0;\n    float4 a[3][2];\n    uint n = (uint)0;\n"
+        );
+        assert_eq!(
+            without_zero_arrays("zeros() {\n    return (uint[2][1])0;\n}\n    return (uint)0;\n"),
+            "zeros() {\n    uint ret[2][1] = { (uint)0, (uint)0 };\n    return ret;\n}\n    return (uint)0;\n"
         );
     }
 
