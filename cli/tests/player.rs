@@ -172,16 +172,25 @@ fn image_passes_are_played_as_draws() {
         );
         let frame = json(&desk, "drawn/frame.json");
         assert_eq!(frame["image_passes"], "fragment");
-        let kinds: Vec<&str> = frame["passes"]
-            .as_array()
-            .expect("a list")
+        let kinds = |frame: &Value| -> Vec<String> {
+            let passes = frame["passes"].as_array().expect("a list").iter();
+            let kind = |pass: &Value| pass["kind"].as_str().expect("a word").to_owned();
+            passes.map(kind).collect()
+        };
+        let computed = kinds(&json(&desk, "computed/frame.json"));
+        let drawn: Vec<&str> = computed
             .iter()
-            .map(|pass| pass["kind"].as_str().expect("a word"))
+            .map(|kind| {
+                if kind == "draw" {
+                    "draw"
+                } else {
+                    "full-screen"
+                }
+            })
             .collect();
-        assert_eq!(
-            kinds,
-            ["draw", "full-screen", "full-screen", "full-screen", "draw"]
-        );
+        assert_eq!(kinds(&frame), drawn, "{technique} {format}");
+        // Resolve, and the filter along rows and columns, of each texture of the map.
+        assert!(drawn.len() >= 5 && drawn.contains(&"full-screen"));
         let text = desk.read("drawn/frame.json");
         assert!(!text.contains("storage-binding"), "{technique} {format}");
         assert!(desk.read("computed/frame.json").contains("storage-binding"));

@@ -219,17 +219,11 @@ pub fn compile(
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
-        let messages = run(
-            compiler,
-            &version,
-            &manifest,
-            folder,
-            &target_dir,
-            &library,
-            &flags,
-            wanted.names(),
-            progress,
-        )?;
+        let mut cargo = cargo(compiler, &version, &manifest, folder, &target_dir)?;
+        // cargo has no other word for where the library's sources are.
+        cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", &library);
+        cargo.arg("--").args(&flags);
+        let messages = run(cargo, &manifest, wanted.names(), progress)?;
         let artefact = last_artefact(&messages).ok_or_else(|| Error::Manifest {
             path: manifest.clone(),
             problem: "cargo made no SPIR-V of it: its [lib] needs crate-type = [\"lib\", \"dylib\"] and a kernel".into(),
@@ -283,20 +277,11 @@ fn of_arrays(arrays: Arrays) -> impl Iterator<Item = &'static str> {
 
 /// Runs cargo; gives its messages.
 fn run(
-    compiler: &Compiler,
-    version: &str,
+    mut cargo: Command,
     manifest: &Path,
-    folder: &Path,
-    target_dir: &Path,
-    library: &Path,
-    flags: &[String],
     names: &[&str],
     progress: &mut (dyn FnMut(&str) + Send),
 ) -> Result<String> {
-    let mut cargo = cargo(compiler, version, manifest, folder, target_dir)?;
-    // cargo has no other word for where the library's sources are.
-    cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", library);
-    cargo.arg("--").args(flags);
     let program = PathBuf::from(cargo.get_program());
     cargo.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut running = Program::start(&mut cargo).map_err(|source| Error::Run {

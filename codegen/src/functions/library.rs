@@ -74,7 +74,7 @@ impl Parse for List {
 /// # Errors
 /// What has no form, with file and line.
 pub fn read(crates: &[CrateText]) -> Result<Vec<Library>, Refusal> {
-    Ok(read_where(crates, &mut |_| true)?)
+    read_where(crates, &mut |_| true)
 }
 
 /// As [`read`], with those functions alone that fit one of the patterns (`*` stands for any letters; none: all),
