@@ -1,6 +1,11 @@
 //! Kernels that iterate over arrays, slices and ranges, and kernels of enums whose variants hold
 //! different data. They are a crate of their own since a crate that iterates is compiled otherwise.
 #![no_std]
+#![allow(
+    clippy::manual_contains,
+    clippy::manual_is_multiple_of,
+    reason = "the closures of `any` and `find` are what is tested"
+)]
 
 use hankel_dsl::glam::{IVec4, UVec4, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
