@@ -73,7 +73,8 @@ pub struct Palette {
     pub padding: UVec2,
 }
 
-/// An image pass in two forms: colours by the texel, some of which are darker.
+/// An image pass in two forms: texels, each in a colour of the palette.
+/// The constant is in no arithmetic of floats, which compilers and drivers reassociate.
 #[kernel(
     compute,
     threads(8, 8),
@@ -92,13 +93,13 @@ pub fn two_forms(
     #[uniform] palette: &Palette,
     #[constant(id = 0, default = 1)]
     #[values(1, 3)]
-    shade: u32,
+    rows: u32,
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
     let size = source.size();
-    let colour = array_element(&palette.colours, (at.x * palette.step.x + at.y) & 3);
+    let colour = array_element(&palette.colours, (at.x * palette.step.x + at.y * rows) & 3);
     let texel = source.load(UVec2::new(at.x % size.x, at.y % size.y));
-    colour * texel / shade as f32
+    colour * texel
 }
 
 /// The same in 8 bits, whose fragment form is that one.
@@ -119,10 +120,10 @@ pub fn two_forms_rgba8unorm(
     #[uniform] palette: &Palette,
     #[constant(id = 0, default = 1)]
     #[values(1, 3)]
-    shade: u32,
+    rows: u32,
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
-    two_forms(at, palette, shade, source)
+    two_forms(at, palette, rows, source)
 }
 
 /// An image pass in two forms with several results, of several types.
