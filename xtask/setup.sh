@@ -66,9 +66,10 @@ if [ "${for_tests:-no}" = yes ]; then
     if ! cmp -s xtask/tools/package-lock.json "$HANKEL_TOOLS/package-lock.json" ||
         [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ] ||
         [ ! -e "$HANKEL_TOOLS/node_modules/three/package.json" ] ||
-        [ ! -e "$HANKEL_TOOLS/node_modules/typescript/package.json" ]; then
-        echo "Installing Dawn for Node.js, three.js and TypeScript (npm: webgpu, MIT and BSD-3-Clause;" \
-            "three and @types/three, MIT; typescript, Apache-2.0)"
+        [ ! -e "$HANKEL_TOOLS/node_modules/typescript/package.json" ] ||
+        [ ! -e "$HANKEL_TOOLS/node_modules/wesl/package.json" ]; then
+        echo "Installing Dawn for Node.js, three.js, TypeScript and WESL's linker (npm: webgpu, MIT and" \
+            "BSD-3-Clause; three, @types/three and wesl, MIT; typescript, Apache-2.0)"
         cp xtask/tools/package.json xtask/tools/package-lock.json "$HANKEL_TOOLS"
         npm ci --silent --prefix "$HANKEL_TOOLS"
     fi
@@ -80,6 +81,14 @@ if [ "${for_tests:-no}" = yes ]; then
             compushady-0.17.5/compushady/backends/libdxcompiler_x86_64.so.3.7
         tar -xzOf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" compushady-0.17.5/LICENSE \
             >"$HANKEL_TOOLS/compushady-LICENSE"
+    fi
+    slang=$HANKEL_TOOLS/slang
+    if ! command -v slangc >/dev/null 2>&1 && [ ! -x "$slang/slangtorch/bin/slangc" ]; then
+        echo "Installing slangc (PyPI: slangtorch, Apache-2.0 with LLVM exceptions)"
+        pip3 download --quiet --no-deps --only-binary :all: --platform manylinux_2_27_x86_64 \
+            --python-version 3.11 --dest "$HANKEL_TOOLS" --require-hashes --requirement xtask/tools/wheels.txt
+        python3 -m zipfile -e "$HANKEL_TOOLS/slangtorch-1.3.22-py3-none-manylinux_2_27_x86_64.whl" "$slang"
+        chmod +x "$slang/slangtorch/bin/slangc"
     fi
     if [ ! -e "$HANKEL_TOOLS/bevy/bevy_render/LICENSE-MIT" ]; then
         echo "Fetching Bevy's shaders (crates.io: bevy_pbr, bevy_render 0.19.1, MIT or Apache-2.0)"

@@ -37,6 +37,8 @@ pub enum Tool {
     Dawn,
     /// Chromium, or a browser that is made of it.
     Chromium,
+    /// Slang's compiler.
+    Slang,
 }
 
 /// Version of the npm package `webgpu` that is asked for.
@@ -47,7 +49,10 @@ const DXC_PACKAGE: &str = "compushady-0.17.5";
 const DXC_LIBRARY: &str = "libdxcompiler_x86_64.so.3.7";
 const DXC_SHA256: &str = "fb549976da7abff1ee56bdfa4f5ab156b95e971d4270b5b4447b61682d105809";
 
-/// The driver around that library.
+/// The PyPI package that carries slangc.
+const SLANG_PACKAGE: &str = "slangtorch-1.3.22";
+
+/// The driver around DXC's library.
 const DXC_DRIVER: &str = include_str!("dxc.cpp");
 
 /// How long a tool may take to say its version.
@@ -133,7 +138,7 @@ pub struct Tools {
 
 impl Tool {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Vulkan,
         Self::SwiftShader,
         Self::Egl,
@@ -143,6 +148,7 @@ impl Tool {
         Self::Node,
         Self::Dawn,
         Self::Chromium,
+        Self::Slang,
     ];
 
     /// The name on the command line and in messages.
@@ -158,6 +164,7 @@ impl Tool {
             Self::Node => "Node.js",
             Self::Dawn => "Dawn for Node.js",
             Self::Chromium => "Chromium",
+            Self::Slang => "slangc",
         }
     }
 
@@ -172,6 +179,7 @@ impl Tool {
             Self::Node => "runs Dawn, and serves Chromium its page",
             Self::Dawn => "runs WGSL through Tint",
             Self::Chromium => "runs WGSL in a page",
+            Self::Slang => "compiles modules of functions in Slang, in the tests",
         }
     }
 
@@ -186,6 +194,7 @@ impl Tool {
             Self::Node => "MIT and others",
             Self::Dawn => "MIT; Dawn: BSD-3-Clause",
             Self::Chromium => "BSD-3-Clause and others",
+            Self::Slang => "Apache-2.0 with LLVM exceptions",
         }
     }
 
@@ -202,6 +211,9 @@ impl Tool {
             Self::Node => of_debian("nodejs"),
             Self::Dawn => tools.folder.join("node_modules/webgpu/LICENSE.md"),
             Self::Dxc => tools.folder.join("compushady-LICENSE"),
+            Self::Slang => tools
+                .slang()
+                .join(format!("{SLANG_PACKAGE}.dist-info/licenses/LICENSE")),
         }
     }
 
@@ -223,6 +235,12 @@ impl Tool {
             Self::Dawn => {
                 format!("npm install --no-save --prefix {folder} webgpu@{DAWN_VERSION}")
             }
+            Self::Slang => format!(
+                "pip download --no-deps --only-binary :all: --dest {folder} {} && \
+                 python3 -m zipfile -e {folder}/{SLANG_PACKAGE}-*.whl {folder}/slang && \
+                 chmod +x {folder}/slang/slangtorch/bin/slangc",
+                SLANG_PACKAGE.replacen('-', "==", 1)
+            ),
         }
     }
 }
@@ -320,6 +338,7 @@ impl Tools {
             Tool::Node => said(program(&["node"], "HANKEL_NODE"), &["--version"]),
             Tool::Dawn => self.dawn(),
             Tool::Chromium => said(self.chromium(), &["--version"]),
+            Tool::Slang => said(self.slangc(), &["-version"]),
         }
     }
 
@@ -347,6 +366,20 @@ impl Tools {
     #[must_use]
     pub fn node(&self) -> Option<PathBuf> {
         program(&["node"], "HANKEL_NODE")
+    }
+
+    /// Slang's compiler: a system's, or the one that the set-up puts into the tools' folder.
+    #[must_use]
+    pub fn slangc(&self) -> Option<PathBuf> {
+        program(&["slangc"], "HANKEL_SLANGC").or_else(|| {
+            let own = self.slang().join("slangtorch/bin/slangc");
+            (variable("HANKEL_SLANGC").is_none() && own.is_file()).then_some(own)
+        })
+    }
+
+    /// Where the package with Slang's compiler is unpacked.
+    fn slang(&self) -> PathBuf {
+        self.folder.join("slang")
     }
 
     /// The browser.

@@ -197,15 +197,20 @@ fn sample_texts() -> [String; 2] {
     [form.text(&libraries[0], &naming, "0"), types]
 }
 
-/// Lays the modules into a folder from which three.js can be imported.
-fn lay(folder: &Path, tools: &Tools) {
+/// Links the folder of npm's packages into a folder, from which `package` can then be imported.
+pub fn link_node_modules(folder: &Path, tools: &Tools, package: &str) {
     let modules = tools.node_modules();
     assert!(
-        modules.join("three").is_dir(),
-        "three is not in {}: `./check` installs it",
+        modules.join(package).is_dir(),
+        "{package} is not in {}: `./check` installs it",
         modules.display()
     );
     std::os::unix::fs::symlink(modules, folder.join("node_modules")).expect("a link");
+}
+
+/// Lays the modules into a folder from which three.js can be imported.
+fn lay(folder: &Path, tools: &Tools) {
+    link_node_modules(folder, tools, "three");
     let write = |name: &str, text: &str| {
         std::fs::write(folder.join(name), text).expect("a file");
     };
@@ -219,7 +224,7 @@ fn lay(folder: &Path, tools: &Tools) {
 }
 
 /// What a program said; it must succeed.
-fn said(command: &mut Command) -> String {
+pub fn said(command: &mut Command) -> String {
     let done = command
         .output()
         .unwrap_or_else(|e| panic!("{command:?}: {e}"));
