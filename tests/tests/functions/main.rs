@@ -674,6 +674,22 @@ fn every_function_computes_the_native_bits_in_every_language() {
     agree(&subjects, columns, tools, known);
 }
 
+/// A function's stubs by a form of the library, one in each language.
+fn in_form(
+    function: &Function,
+    form: &str,
+    codes: impl IntoIterator<Item = (Language, Code)>,
+) -> Subject {
+    let name = format!("{}_{form}", stub_name(function));
+    let mut entry = entry(function);
+    entry.kernel.name.clone_from(&name);
+    Subject {
+        name,
+        entry,
+        codes: codes.into_iter().map(|(l, code)| (l, Ok(code))).collect(),
+    }
+}
+
 /// Runs subjects in columns, all of which must run, and all cells must agree with the native function or be as they
 /// are known.
 fn agree(subjects: &[Subject], columns: Vec<Column>, tools: Tools, known: Known) {

@@ -17,11 +17,12 @@ use naga_oil::compose::{
 
 use super::tsl::{link_node_modules, said};
 use super::{
-    HLSL_HOST, PREFIX, agree, code, entry, hlsl_entry, natives, place, stub_name, text, tools, wgsl,
+    HLSL_HOST, PREFIX, agree, code, hlsl_entry, in_form, natives, place, stub_name, text, tools,
+    wgsl,
 };
 
-/// What of the host imports the library besides the stub: how many elements it takes. A stub that got another
-/// constant than the library's would write nothing.
+/// Another module of the host that imports the library, too. `most` gives the count only if the library's constant
+/// reached it: else the stub writes nothing.
 const MOST: &str = "\
 struct Light { color: vec4<f32> }
 fn lerp(a: u32, b: u32, t: bool) -> u32 { return select(a, b, t); }
@@ -38,17 +39,6 @@ fn importing(function: &Function, imports: &str) -> String {
         "{imports}\n{}",
         text.replace(count, &format!("most({count})"))
     )
-}
-
-fn subject(function: &Function, form: &str, language: Language, code: Code) -> Subject {
-    let name = format!("{}_{form}", stub_name(function));
-    let mut entry = entry(function);
-    entry.kernel.name.clone_from(&name);
-    Subject {
-        name,
-        entry,
-        codes: [(language, Ok(code))].into(),
-    }
 }
 
 /// A stub's code in WGSL.
@@ -88,7 +78,7 @@ fn slang(functions: &[Function], tools: &Tools) -> Vec<Subject> {
     let slangc = tools.slangc().expect("slangc: `./check` installs it");
     said(
         Command::new(slangc)
-            // Without the library that optimises SPIR-V, which its package has not.
+            // Its package lacks the library that optimises SPIR-V.
             .args(["stubs.slang", "-target", "spirv", "-O0"])
             .args(["-profile", "spirv_1_3", "-fp-mode", "precise"])
             .args(["-fvk-use-entrypoint-name", "-fvk-t-shift", "0", "all"])
@@ -111,7 +101,7 @@ fn slang(functions: &[Function], tools: &Tools) -> Vec<Subject> {
                 sizes_slot: None,
                 sized: Vec::new(),
             };
-            subject(f, "slang", Language::Spirv, code)
+            in_form(f, "slang", [(Language::Spirv, code)])
         })
         .collect()
 }
@@ -145,7 +135,7 @@ fn wesl(functions: &[Function], tools: &Tools) -> Vec<Subject> {
         .iter()
         .map(|f| {
             let text = texts.remove(&stub_name(f)).expect("the stub");
-            subject(f, "wesl", Language::Wgsl, in_wgsl(f, text))
+            in_form(f, "wesl", [(Language::Wgsl, in_wgsl(f, text))])
         })
         .collect()
 }
@@ -192,7 +182,7 @@ fn naga_oil(functions: &[Function]) -> Vec<Subject> {
             let flags = naga::back::wgsl::WriterFlags::empty();
             let text = naga::back::wgsl::write_string(&module, &info, flags)
                 .unwrap_or_else(|e| panic!("{}: {e}", f.name));
-            subject(f, "naga_oil", Language::Wgsl, in_wgsl(f, text))
+            in_form(f, "naga_oil", [(Language::Wgsl, in_wgsl(f, text))])
         })
         .collect()
 }

@@ -15,7 +15,7 @@ use hankel_dsl::native::function::Function;
 use hankel_matrix::subject::Subject;
 use hankel_matrix::tools::Tools;
 
-use super::{PREFIX, beside, entry, glsl, natives, stub_name, text, tools, wgsl};
+use super::{PREFIX, beside, glsl, in_form, natives, text, tools, wgsl};
 
 /// What the host of a sample looks up: twice, within itself, and with names of its own that a loop in a
 /// shader may have. Counts are powers of two: no driver rounds such a quotient in a way of its own.
@@ -253,21 +253,11 @@ pub fn subjects(tools: &Tools) -> Vec<Subject> {
     let high = "precision highp float;\nprecision highp int;";
     let subject = |f: &Function| {
         let texts = &texts[&format!("{PREFIX}_{}", f.name)];
-        let name = format!("{}_tsl", stub_name(f));
-        let mut entry = entry(f);
-        entry.kernel.name.clone_from(&name);
-        Subject {
-            name,
-            entry,
-            codes: [
-                (Language::Wgsl, Ok(wgsl(f, &texts["wgsl"]))),
-                (
-                    Language::Essl310,
-                    Ok(glsl(f, &texts["glsl"], "310 es", high)),
-                ),
-            ]
-            .into(),
-        }
+        let codes = [
+            (Language::Wgsl, wgsl(f, &texts["wgsl"])),
+            (Language::Essl310, glsl(f, &texts["glsl"], "310 es", high)),
+        ];
+        in_form(f, "tsl", codes)
     };
     natives().iter().chain(&samples()).map(subject).collect()
 }
