@@ -103,10 +103,24 @@ fn compensated_bounds_are_as_exact_as_their_inputs() {
     assert!(cells > 300, "{cells}");
 }
 
+/// The rows that rounding leaves least of: their sensitivities need derivatives above 1e25.
+#[test]
+fn compensated_bounds_within_a_tight_surface_are_as_exact_as_their_inputs() {
+    let mut options = options(&["self"], 10_000);
+    options.orders = vec![6];
+    options.precisions = vec![Precision::F64];
+    let stress = run(&options, &mut [&mut Native::scalar()], &mut |_| ()).unwrap();
+    let compensated = |c: &&Cell| c.solver == Solver::Compensated;
+    let cell = stress.cells.iter().find(compensated).unwrap();
+    assert!(cell.valid > 400, "{cell:?}");
+    assert!(cell.over.unwrap().greatest <= 4.0, "{cell:?}");
+}
+
 #[test]
 fn derivatives_are_measured_by_what_rounding_does_to_them() {
     let stress = native(&Options {
         derivative_rows: 100,
+        orders: vec![1, 2, 3],
         ..options(&["paper", "generic-unit", "silhouettes-biased"], 100)
     });
     let plain: Vec<_> = stress
@@ -163,7 +177,6 @@ fn derivatives_that_are_no_number_are_found() {
 fn compensated_derivatives_are_as_exact_as_their_inputs() {
     let stress = native(&Options {
         derivative_rows: 100,
-        orders: vec![1, 2, 3],
         ..options(&[], 100)
     });
     let mut cells = 0;
@@ -186,7 +199,7 @@ fn compensated_derivatives_are_as_exact_as_their_inputs() {
     }
     assert!(beyond.is_empty(), "{}", beyond.join("\n"));
     // By family, n and format; without compensation, one in ten rows of some family is far beyond that.
-    assert!(cells > 100 && plain > 100.0, "{cells} {plain}");
+    assert!(cells > 200 && plain > 100.0, "{cells} {plain}");
 }
 
 #[test]

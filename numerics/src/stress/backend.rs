@@ -68,6 +68,9 @@ impl Aligned {
     }
 }
 
+/// The name of one row after the other.
+pub const NATIVE: &str = "native";
+
 /// The name of SIMD lanes, which must give the scalar bits.
 pub const LANES: &str = "lanes";
 
@@ -104,7 +107,7 @@ impl Native {
 
 impl Backend for Native {
     fn name(&self) -> String {
-        let name = if self.mode.lanes { LANES } else { "native" };
+        let name = if self.mode.lanes { LANES } else { NATIVE };
         name.into()
     }
 

@@ -3,21 +3,29 @@
 
 use std::ops::RangeInclusive;
 
-use hankel_moments::MAX_MOMENTS;
+use hankel_moments::bound_adjoint_compensated;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::reference::{Rounding, difference, gradient_of, is_in_range};
+use super::backend::NATIVE;
+use super::gradient::gradients;
+use super::reference::{Rounding, STEP, is_in_range, wide_moments};
 use super::{Backend, BackendError, Map, Solver, StressError};
 use crate::families::{Family, Format, Precision, Row, scaled, validity};
 use crate::numbers::Wide;
 use crate::speed::Quantiles;
 
-/// Derivatives above this are left out: kernels limit factors of derivatives to ten times that.
-const MOST: f64 = 1e24;
+/// Orders whose compensated derivatives are functions of the library, and no kernels.
+const OF_LIBRARY: RangeInclusive<usize> = 4..=6;
 
-/// Orders that are measured: beyond, second derivatives in 300 bits take minutes for a few rows.
-const ORDERS: RangeInclusive<usize> = 1..=3;
+/// Derivatives to moments above this are left out, and with them the others of the bound, which the move of the
+/// polynomial to powers of depth mixes with them: kernels limit them to ten times that.
+const MOST_F32: f64 = 1e24;
+const MOST_F64: f64 = 1e99;
+
+/// Derivatives below this, of moments with a total from 1 to 2, count as that: factors of theirs may underflow, and the
+/// kernels promise no more.
+const LEAST: f64 = 1e-12;
 
 /// What came out for the derivatives of one family, order and precision, by one solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,12 +70,31 @@ impl Truth {
             return None;
         }
         let rounding = Rounding::new::<T>(exponent);
-        let both = [0.0, 1.0].map(|overestimation| of_bound(n, &row, overestimation, &rounding));
-        let [lower, upper] = both;
+        let m = wide_moments(n, &row);
+        let eta = Wide::from(row.eta);
+        let (exact, roots) = gradients(&m, eta, None);
+        let mut sensitivities = [0, 1].map(|bound: usize| rounding.of_gradient(&exact[bound]));
+        for direction in 0..=2 * n + 1 {
+            let (mut m, mut eta) = (m.clone(), eta);
+            let rounded = if let Some(moment) = m.get_mut(direction) {
+                *moment += Wide::from(STEP);
+                rounding.of_moment(row.m[direction])
+            } else {
+                eta += Wide::from(STEP);
+                rounding.of(row.eta, 0)
+            };
+            let (there, _) = gradients(&m, eta, Some(&roots));
+            for ((sensitivities, there), here) in sensitivities.iter_mut().zip(there).zip(&exact) {
+                for ((sensitivity, there), here) in sensitivities.iter_mut().zip(there).zip(here) {
+                    let by_step = f64::from((there - *here) / Wide::from(STEP));
+                    *sensitivity += by_step.abs() * rounded;
+                }
+            }
+        }
         Some(Self {
             index,
-            exact: [lower.0, upper.0],
-            sensitivities: [lower.1, upper.1],
+            exact,
+            sensitivities,
             exponent,
         })
     }
@@ -79,13 +106,18 @@ impl Truth {
             self.exact.iter().zip(&self.sensitivities).zip(computed)
         {
             let last = exact.len() - 1;
+            let most = match T::PRECISION {
+                Precision::F32 => MOST_F32,
+                Precision::F64 => MOST_F64,
+            };
+            let is_beyond = exact[..last].iter().any(|d| f64::from(*d).abs() > most);
             for (k, ((exact, sensitivity), computed)) in
                 exact.iter().zip(sensitivities).zip(computed).enumerate()
             {
                 // Only the derivative to the query point has the unit of the moments.
                 let e = if k == last { self.exponent } else { 0 };
                 let unscaled = f64::from(*exact) * 2.0_f64.powi(e / 2) * 2.0_f64.powi(e - e / 2);
-                if unscaled.abs() > MOST {
+                if unscaled.abs() > MOST_F32 && k == last || is_beyond && k < last {
                     continue;
                 }
                 let computed = computed.widen() * 2.0_f64.powi(-e / 2) * 2.0_f64.powi(-e + e / 2);
@@ -107,53 +139,39 @@ impl Truth {
     }
 }
 
-/// The derivatives of a blend of the bounds, and their sensitivities.
-fn of_bound(
-    n: usize,
-    row: &Row<f64>,
-    overestimation: f64,
-    rounding: &Rounding,
-) -> (Vec<Wide>, Vec<f64>) {
-    let (m, eta) = (row.m.map(Wide::from), Wide::from(row.eta));
-    let at = |m: [Wide; MAX_MOMENTS], eta: Wide| {
-        let gradient = gradient_of(n, m, eta, Wide::from(overestimation));
-        let mut all = gradient.m[..=2 * n].to_vec();
-        all.push(gradient.eta);
-        all
-    };
-    let exact = at(m, eta);
-    let greatest = exact[..=2 * n]
-        .iter()
-        .map(|d| f64::from(*d).abs())
-        .fold(0.0, f64::max);
-    let mut sensitivities: Vec<f64> = exact
-        .iter()
-        .enumerate()
-        .map(|(k, d)| {
-            let d = f64::from(*d);
-            if k <= 2 * n {
-                rounding.of(d.abs().max(rounding.epsilon() * greatest), 0)
-            } else {
-                rounding.of_moment(d)
-            }
-        })
-        .collect();
-    for direction in 0..=2 * n + 1 {
-        let (there, back, twice) = difference(n, m, eta, direction, at);
-        let rounded = if direction <= 2 * n {
-            rounding.of_moment(row.m[direction])
-        } else {
-            rounding.of(row.eta, 0)
-        };
-        for ((sensitivity, there), back) in sensitivities.iter_mut().zip(there).zip(back) {
-            *sensitivity += f64::from((there - back) / twice).abs() * rounded;
-        }
+impl Rounding {
+    /// What rounding each derivative once does to it. One that is less than epsilon times the greatest of its row, or
+    /// than [`LEAST`], counts as that.
+    fn of_gradient(&self, gradient: &[Wide]) -> Vec<f64> {
+        let sizes = || gradient.iter().map(|d| f64::from(*d).abs());
+        let moments = gradient.len() - 1;
+        let least = self.epsilon() * sizes().take(moments).fold(0.0, f64::max);
+        let of_moments = sizes()
+            .take(moments)
+            .map(|d| self.of(d.max(least).max(LEAST), 0));
+        let of_query = sizes().skip(moments).map(|d| self.of_moment(d.max(LEAST)));
+        of_moments.chain(of_query).collect()
     }
-    (exact, sensitivities)
 }
 
-/// Measures the adjoints of an order on the first `count` rows of a family; nothing for an order that is not
-/// measured.
+/// The compensated derivatives of rows, from the library's function: to the moments, then to the query point.
+fn by_library<T: Format>(n: usize, rows: &[Row<T>], overestimation: f64) -> Vec<T> {
+    let gradient = match n {
+        4 => bound_adjoint_compensated::<T, 4>,
+        5 => bound_adjoint_compensated::<T, 5>,
+        _ => bound_adjoint_compensated::<T, 6>,
+    };
+    let (overestimation, upstream) = (T::round(overestimation), T::round(1.0));
+    rows.par_iter()
+        .flat_map_iter(|row| {
+            let d = gradient(row.m, row.eta, overestimation, upstream);
+            let of_moments = d.m.into_iter().take(2 * n + 1);
+            of_moments.chain(std::iter::once(d.eta))
+        })
+        .collect()
+}
+
+/// Measures the adjoints of an order on the first `count` rows of a family.
 pub(super) fn measure<T: Format>(
     family: &Family,
     n: usize,
@@ -162,9 +180,6 @@ pub(super) fn measure<T: Format>(
     backend: &mut dyn Backend,
 ) -> Result<Vec<Derivatives>, StressError> {
     let mut all = Vec::new();
-    if !ORDERS.contains(&n) {
-        return Ok(all);
-    }
     let judged: Vec<(Row<T>, Truth)> = (0..count)
         .into_par_iter()
         .filter_map(|index| {
@@ -181,10 +196,15 @@ pub(super) fn measure<T: Format>(
         let Some(function) = solver.adjoint(n) else {
             continue;
         };
-        let Some(map) = Map::find(&function, T::PRECISION)? else {
-            continue;
+        let map = Map::find(&function, T::PRECISION)?;
+        let of_library = OF_LIBRARY.contains(&n) && backend.name() == NATIVE;
+        let mut run = |overestimation| match &map {
+            Some(map) => map.run(backend, n, &rows, overestimation),
+            None => Ok(by_library(n, &rows, overestimation)),
         };
-        let mut run = |overestimation| map.run(backend, n, &rows, overestimation);
+        if map.is_none() && !(solver == Solver::Compensated && of_library) {
+            continue;
+        }
         let (lower, upper) = match run(0.0).and_then(|lower| Ok((lower, run(1.0)?))) {
             Err(StressError::Backend {
                 error: BackendError::Lacks(_),

@@ -11,6 +11,7 @@
 mod backend;
 mod circle;
 mod derivatives;
+mod gradient;
 mod reference;
 pub mod shadows;
 mod tables;

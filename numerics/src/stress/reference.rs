@@ -4,6 +4,7 @@ use hankel_dsl::Real;
 use hankel_moments::{Bounds, Canonical, Gradient, MAX_MOMENTS, bound, bound_adjoint, canonical};
 use serde::{Deserialize, Serialize};
 
+use super::gradient::gradients;
 use crate::families::{Format, Row, Validity, scaled, validity};
 use crate::judge::{DepthFunction, Judge, Range};
 use crate::numbers::{DoubleDouble, Wide};
@@ -187,7 +188,7 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
     let (shares, sensitivities) = if left < NEEDS_WIDE {
         (
             shares_wide(n, &row),
-            rounding.sensitivities::<Wide>(n, &row),
+            rounding.sensitivities(&row, &exact_gradients(n, &row)),
         )
     } else {
         let mass = DoubleDouble::from(mass);
@@ -195,7 +196,7 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
         let bounds = bounds_of(n, m, DoubleDouble::from(row.eta));
         (
             [bounds.lower / mass, bounds.upper / mass],
-            rounding.sensitivities::<DoubleDouble>(n, &row),
+            rounding.sensitivities(&row, &gradients_by_library(n, &row)),
         )
     };
     Judgement {
@@ -256,30 +257,53 @@ impl Rounding {
     }
 
     /// Of both bounds, as shares of the total: a rounding of the result, which is the total at most,
-    /// and what a rounding of each number is worth by the bounds' derivatives.
-    fn sensitivities<R: Real + From<f64>>(&self, n: usize, row: &Row<f64>) -> [f64; 2]
-    where
-        f64: From<R>,
-    {
-        let m = row.m.map(R::from);
-        [0.0, 1.0].map(|overestimation| {
-            let gradient = gradient_of(n, m, R::from(row.eta), R::from(overestimation));
-            let of_query = f64::from(gradient.eta).abs() * self.of(row.eta, 0);
-            let of_moments =
-                (0..=2 * n).map(|k| f64::from(gradient.m[k]).abs() * self.of_moment(row.m[k]));
+    /// and what a rounding of each number is worth by the bounds' gradients.
+    fn sensitivities(&self, row: &Row<f64>, gradients: &[Vec<f64>; 2]) -> [f64; 2] {
+        gradients.each_ref().map(|gradient| {
+            let last = gradient.len() - 1;
+            let of_query = gradient[last].abs() * self.of(row.eta, 0);
+            let of_moments = (0..last).map(|k| gradient[k].abs() * self.of_moment(row.m[k]));
             let sum: f64 = of_moments.chain([of_query]).sum();
             ((self.of_moment(row.m[0]) + sum) / row.m[0]).min(1.0)
         })
     }
 }
 
-fn shares_wide(n: usize, row: &Row<f64>) -> [DoubleDouble; 2] {
-    let m = row.m.map(Wide::from);
-    let bounds = bounds_of(n, m, Wide::from(row.eta));
-    [bounds.lower, bounds.upper].map(|b| DoubleDouble::from(b / m[0]))
+/// Gradients of the lower and of the upper bound, to the moments and then to the query point, in twice the digits of
+/// `f64`; derivatives above 1e25 are limited.
+fn gradients_by_library(n: usize, row: &Row<f64>) -> [Vec<f64>; 2] {
+    let m = row.m.map(DoubleDouble::from);
+    [0.0, 1.0].map(|overestimation| {
+        let eta = DoubleDouble::from(row.eta);
+        let gradient = gradient_of(n, m, eta, DoubleDouble::from(overestimation));
+        let of_moments = gradient.m[..=2 * n].iter().copied().map(f64::from);
+        of_moments.chain([f64::from(gradient.eta)]).collect()
+    })
 }
 
-/// How well the reference agrees with itself in 300 bits, and with the linear programme.
+/// [`gradients_by_library`] in 300 bits and without a limit, for rows that little is left of.
+fn exact_gradients(n: usize, row: &Row<f64>) -> [Vec<f64>; 2] {
+    let (exact, _) = gradients(&wide_moments(n, row), Wide::from(row.eta), None);
+    exact.map(|gradient| gradient.into_iter().map(f64::from).collect())
+}
+
+/// Both bounds as shares of the total, in 300 bits and by another way than the library's: they are the integrals of
+/// the polynomials whose coefficients their gradients are.
+fn shares_wide(n: usize, row: &Row<f64>) -> [DoubleDouble; 2] {
+    let m = wide_moments(n, row);
+    let (exact, _) = gradients(&m, Wide::from(row.eta), None);
+    exact.map(|gradient| {
+        let products = gradient.iter().zip(&m).map(|(d, m)| *d * *m);
+        let bound = products.fold(Wide::from(0.0), |sum, product| sum + product);
+        DoubleDouble::from(bound / m[0])
+    })
+}
+
+pub(super) fn wide_moments(n: usize, row: &Row<f64>) -> Vec<Wide> {
+    row.m[..=2 * n].iter().copied().map(Wide::from).collect()
+}
+
+/// How well the reference agrees with another algorithm in 300 bits, and with the linear programme.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Agreement {
     /// Rows compared with 300 bits.

@@ -14,7 +14,7 @@
 use hankel_dsl::{Real, lit, unroll};
 
 use super::kernel::Kernel;
-use super::recurrence::{Recurrence, finite};
+use super::recurrence::{Recurrence, finite, power_of_two};
 use super::roots::{least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, Plain, Twofold};
 use super::{MAX, MAX_MOMENTS};
@@ -31,8 +31,8 @@ pub struct Gradient<R> {
 /// What [`blend`](super::Bounds::blend) makes of [`bound`](super::bound) as seen from behind: the
 /// derivatives to moments and query point, times `d_bound`.
 ///
-/// Takes anything that [`bound`](super::bound) takes. Each factor of a derivative is limited to
-/// 1e25, `d_bound` to 1e12, and the derivative to the query point, which is in proportion to the total,
+/// Takes anything that [`bound`](super::bound) takes. A derivative is limited to 1e25, in 64 bits to 1e100, times
+/// `d_bound`, which is limited to 1e12, and the derivative to the query point, which is in proportion to the total,
 /// to 1e37.
 #[inline(always)]
 pub fn bound_adjoint<R: Real, const N: usize>(
@@ -47,10 +47,11 @@ pub fn bound_adjoint<R: Real, const N: usize>(
 
 /// [`bound_adjoint`] of [`bound_compensated`](super::bound_compensated), in about twice the digits throughout.
 ///
-/// For N up to 3, no derivative has an error of more than four times what rounding each argument and the result
-/// once does to it. That is measured, not proved, in `f32` and `f64`, for rows of the families that
+/// No derivative has an error of more than four times what rounding each argument and the result once does to it.
+/// That is measured, not proved, in `f32` and `f64`, for rows of the families that
 /// [`bound_compensated`](super::bound_compensated) is measured on; a derivative that is less than the number
-/// type's epsilon times the greatest of its row counts as that. For N from 4 on it is not promised.
+/// type's epsilon times the greatest of its row counts as that, and one below 1e-12 as 1e-12. It is not so where a
+/// derivative to a moment is beyond the limit of [`bound_adjoint`]: others of its row are wrong, too.
 #[inline(always)]
 pub fn bound_adjoint_compensated<R: Real, const N: usize>(
     m: [R; MAX_MOMENTS],
@@ -91,8 +92,15 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     let one: R = lit!(1.0);
     let recurrence = Recurrence::<R, A>::new::<N>(m, eta, floor);
     let kernel = Kernel::<R, A>::new::<N>(&recurrence);
+    // The unit of u: in twice the digits a power of two, so that going back to lengths rounds nothing.
+    let reach = if const { A::TWICE } {
+        let square = kernel.reach * kernel.reach;
+        power_of_two(square.clamp(lit!(1e-24), lit!(1e24)))
+    } else {
+        kernel.reach
+    };
     let (e, own_weight) = if const { A::TWICE } {
-        kernel.fine::<N>()
+        kernel.fine::<N>(reach)
     } else {
         let mut e = [A::of(one); MAX + 1];
         unroll!(i in 1..(N + 1), max 7, {
@@ -101,54 +109,163 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
         (e, A::of(kernel.own))
     };
 
-    // All in powers of u times the reach. (K(u) / K(0))², K(u) being Σ e_i u^i.
-    let own = squared::<R, A, N>(&e);
-    let minor = minor::<R, A, N>(&kernel, &e);
+    // All in powers of u times the reach. (K(u) / K(0)) is Σ e_i u^i.
+    let (rest, factor) = minor::<R, A, N>(&kernel, &e, kernel.reach / reach);
     let blend = overestimation.saturate();
     let own_share = R::select(kernel.turned, blend - one, blend);
     let minor_share = R::select(kernel.turned, -one, one);
     let minor_share = R::select(kernel.few.gt(zero), minor_share, zero);
-    let mut q = [A::of(zero); MAX_MOMENTS];
-    unroll!(i in 0..(2 * N + 1), max 13, {
-        q[i] = own[i].times_plain(own_share).plus(minor[i].times_plain(minor_share));
-    });
-    q[0] = A::select(kernel.turned, A::of(one).plus(q[0]), q[0]);
-
-    // In powers of x - eta.
-    let limit: R = lit!(1e25);
     let sign = R::select(kernel.turned, -one, one);
-    let per_length = A::of(sign * (kernel.reach / recurrence.unit));
-    let mut power = per_length;
-    unroll!(i in 1..(2 * N + 1), max 13, {
-        q[i] = q[i].times_within(power, limit);
-        power = power.times_within(per_length, limit);
-    });
+    let per_length = sign * (reach / recurrence.unit);
+    let limit = limit::<R>();
     let present = recurrence.total.gt(zero);
-    let factor = R::select(present, finite(d_bound, lit!(1e12)), zero);
+    let upstream = R::select(present, finite(d_bound, lit!(1e12)), zero);
+    let query = finite(eta, lit!(1e12));
+    let (mut q, slope);
+    if const { A::TWICE } {
+        let of_own = e[1].scaled(lit!(2.0)).times_plain(own_share);
+        let of_minor = factor[1].times_plain(minor_share);
+        slope = of_own.plus(of_minor).scaled(per_length);
+        // Each factor in powers of x before they are multiplied: for a query point far from all others, the move
+        // cancels, and of a square twice as many digits.
+        let root_limit: R = if const { R::IS_WIDE } {
+            lit!(1e100)
+        } else {
+            lit!(1e18)
+        };
+        let e = moved::<R, A, N>(&e, per_length, query, root_limit);
+        let rest = moved::<R, A, N>(&rest, per_length, query, root_limit);
+        let factor = match const { N / 2 } {
+            0 => factor,
+            1 => moved::<R, A, 2>(&factor, per_length, query, limit),
+            2 => moved::<R, A, 4>(&factor, per_length, query, limit),
+            _ => moved::<R, A, 6>(&factor, per_length, query, limit),
+        };
+        q = blended::<R, A, N>(&e, own_share, &rest, &factor, minor_share);
+        q[0] = A::select(kernel.turned, A::of(one).plus(q[0]), q[0]);
+    } else {
+        q = blended::<R, A, N>(&e, own_share, &rest, &factor, minor_share);
+        q[0] = A::select(kernel.turned, A::of(one).plus(q[0]), q[0]);
+
+        // In powers of x - eta.
+        let per_length = A::of(per_length);
+        let most_power: R = if const { R::IS_WIDE } {
+            lit!(1e200)
+        } else {
+            lit!(1e37)
+        };
+        let mut power = per_length;
+        unroll!(i in 1..(2 * N + 1), max 13, {
+            q[i] = q[i].times_within(power, limit);
+            power = power.times_within(per_length, most_power);
+        });
+        slope = q[1];
+
+        // In powers of x: Horner's scheme, repeated.
+        unroll!(j in 0..(2 * N), max 13, {
+            unroll!(i in 0..(2 * N), max 13, {
+                // Each time one coefficient less: from the highest but one down to j.
+                if const { i + j < 2 * N } {
+                    let carried = q[2 * N - i].times_plain(query);
+                    q[2 * N - 1 - i] = q[2 * N - 1 - i].minus(carried).within(-limit, limit);
+                }
+            });
+        });
+    }
     // The total is the last factor: it may be large where the others are small.
-    let d_eta = own_weight.times(q[1]).rounded().clamp(-limit, limit) * -factor;
+    let d_eta = own_weight.times(slope).rounded().clamp(-limit, limit) * -upstream;
     let most: R = lit!(1e37);
     let d_eta = d_eta * recurrence.total.min(most / d_eta.abs().max(one));
-
-    // In powers of x: Horner's scheme, repeated.
-    let eta = finite(eta, lit!(1e12));
-    unroll!(j in 0..(2 * N), max 13, {
-        unroll!(i in 0..(2 * N), max 13, {
-            // Each time one coefficient less: from the highest but one down to j.
-            if const { i + j < 2 * N } {
-                let carried = q[2 * N - i].times_plain(eta);
-                q[2 * N - 1 - i] = q[2 * N - 1 - i].minus(carried).within(-limit, limit);
-            }
-        });
-    });
     let mut gradient = Gradient {
         m: [zero; MAX_MOMENTS],
         eta: d_eta,
     };
     unroll!(i in 0..(2 * N + 1), max 13, {
-        gradient.m[i] = q[i].rounded() * factor;
+        gradient.m[i] = q[i].rounded() * upstream;
     });
     gradient
+}
+
+/// The largest magnitude of a derivative.
+#[inline(always)]
+fn limit<R: Real>() -> R {
+    if const { R::IS_WIDE } {
+        lit!(1e100)
+    } else {
+        lit!(1e25)
+    }
+}
+
+/// A polynomial in `(x - at) per_length`, a power of two, in powers of `x`: Horner's scheme, repeated.
+#[inline(always)]
+fn moved<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
+    p: &Fine<A>,
+    per_length: R,
+    at: R,
+    limit: R,
+) -> Fine<A> {
+    let mut p = *p;
+    // Not by powers of the length, which may be beyond range where the products are not.
+    unroll!(j in 1..(DEGREE + 1), max 7, {
+        unroll!(i in 1..(DEGREE + 1), max 7, {
+            if const { i >= j } {
+                p[i] = p[i].scaled(per_length);
+            }
+        });
+    });
+    unroll!(i in 1..(DEGREE + 1), max 7, {
+        p[i] = p[i].within(-limit, limit);
+    });
+    unroll!(j in 0..DEGREE, max 7, {
+        unroll!(i in 0..DEGREE, max 7, {
+            // Each time one coefficient less: from the highest but one down to j.
+            if const { i + j < DEGREE } {
+                let carried = p[DEGREE - i].times_plain(at);
+                p[DEGREE - 1 - i] = p[DEGREE - 1 - i].minus(carried).within(-limit, limit);
+            }
+        });
+    });
+    p
+}
+
+/// `own_share e² + minor_share rest² factor`
+#[inline(always)]
+fn blended<R: Real, A: Arithmetic<R>, const N: usize>(
+    e: &Fine<A>,
+    own_share: R,
+    rest: &Fine<A>,
+    factor: &Fine<A>,
+    minor_share: R,
+) -> [A; MAX_MOMENTS] {
+    let limit = limit::<R>();
+    let own = squared::<R, A, N>(e);
+    let mut minor = [A::of(lit!(0.0)); MAX_MOMENTS];
+    if const { N > 1 } {
+        let square = squared::<R, A, N>(rest);
+        unroll!(i in 0..(MAX + 1), max 7, {
+            unroll!(j in 0..(2 * MAX), max 13, {
+                // In powers of the distance to the query point, the factor has no constant.
+                if const { (A::TWICE || i > 0) && i <= N / 2 * 2 && i + j <= 2 * N } {
+                    let product = if const { A::TWICE } {
+                        factor[i].times_within(square[j], limit)
+                    } else {
+                        factor[i].times(square[j])
+                    };
+                    minor[i + j] = minor[i + j].plus(product);
+                }
+            });
+        });
+    }
+    let mut q = [A::of(lit!(0.0)); MAX_MOMENTS];
+    unroll!(i in 0..(2 * N + 1), max 13, {
+        let of_own = if const { A::TWICE } {
+            own[i].within(-limit, limit)
+        } else {
+            own[i]
+        };
+        q[i] = of_own.times_plain(own_share).plus(minor[i].times_plain(minor_share));
+    });
+    q
 }
 
 /// Coefficients of a monic polynomial, highest power first.
@@ -167,16 +284,17 @@ fn squared<R: Real, A: Arithmetic<R>, const N: usize>(p: &Fine<A>) -> [A; MAX_MO
 }
 
 /// The polynomial that is 1 at the negative roots, 0 at the others and at 0, and stationary at all
-/// roots.
+/// roots: it is the first result's square times the second.
 #[inline(always)]
 fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
     kernel: &Kernel<R, A>,
     e: &Fine<A>,
-) -> [A; MAX_MOMENTS] {
+    per_reach: R,
+) -> (Fine<A>, Fine<A>) {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     if const { N == 1 } {
-        return [A::of(zero); MAX_MOMENTS];
+        return (*e, [A::of(zero); MAX + 1]);
     }
     let (first, second, third) = if const { N == 2 } {
         (least_of_quadratic(&kernel.e), zero, zero)
@@ -191,31 +309,38 @@ fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
     } else {
         least_three(&kernel.e)
     };
-    let first = exact_root::<R, A, N>(e, first);
+    let first = exact_root::<R, A, N>(e, first * per_reach);
     let rest = deflated::<R, A, N>(e, first);
     let single = single::<R, A, N>(&rest, first);
     if const { N < 4 } {
-        return single;
+        return (rest, single);
     }
-    let second = exact_root::<R, A, N>(e, second);
-    let rest = deflated::<R, A, N>(&rest, second);
+    let select = |mask: R::Mask, a: (Fine<A>, Fine<A>), b: (Fine<A>, Fine<A>)| {
+        let mut both = b;
+        unroll!(i in 0..(N + 1), max 7, {
+            both.0[i] = A::select(mask, a.0[i], b.0[i]);
+            both.1[i] = A::select(mask, a.1[i], b.1[i]);
+        });
+        both
+    };
+    let of_single = (rest, single);
+    let second = exact_root::<R, A, N>(e, second * per_reach);
+    let rest = if const { N == 4 } {
+        deflated::<R, A, 3>(&rest, second)
+    } else if const { N == 5 } {
+        deflated::<R, A, 4>(&rest, second)
+    } else {
+        deflated::<R, A, 5>(&rest, second)
+    };
     let double = double::<R, A, N>(&rest, first, second);
-    let is_double = kernel.few.gt(one);
-    let mut minor = single;
-    unroll!(i in 0..(2 * N + 1), max 13, {
-        minor[i] = A::select(is_double, double[i], single[i]);
-    });
+    let of_two = select(kernel.few.gt(one), (rest, double), of_single);
     if const { N < 6 } {
-        return minor;
+        return of_two;
     }
-    let third = exact_root::<R, A, N>(e, third);
-    let rest = deflated::<R, A, N>(&rest, third);
+    let third = exact_root::<R, A, N>(e, third * per_reach);
+    let rest = deflated::<R, A, 4>(&rest, third);
     let triple = triple::<R, A, N>(&rest, first, second, third);
-    let is_triple = kernel.few.gt(lit!(2.0));
-    unroll!(i in 0..(2 * N + 1), max 13, {
-        minor[i] = A::select(is_triple, triple[i], minor[i]);
-    });
-    minor
+    select(kernel.few.gt(lit!(2.0)), (rest, triple), of_two)
 }
 
 /// How often a root is improved: each time its error is cubed, until it is that of the coefficients.
@@ -250,14 +375,44 @@ fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A
     root
 }
 
-/// The polynomial without the root: coefficients that are left over are 0.
+/// The polynomial of degree DEGREE without the root: coefficients that are left over are 0.
+///
+/// Division from the highest power down loses the digits of small coefficients where the root is one of the largest,
+/// division from the lowest power up those of large ones where it is one of the smallest. In twice the digits each
+/// coefficient is taken from the division with the lesser rounding error (G. Peters, J. Wilkinson, *Practical
+/// Problems Arising in the Solution of Polynomial Equations*, 1971, section 4).
 #[inline(always)]
-fn deflated<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: A) -> Fine<A> {
+fn deflated<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -> Fine<A> {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
     let mut rest = *e;
-    unroll!(i in 1..N, max 7, {
+    unroll!(i in 1..DEGREE, max 7, {
         rest[i] = e[i].plus(v.times(rest[i - 1]));
     });
-    rest[N] = A::of(lit!(0.0));
+    if const { A::TWICE } {
+        let size = v.rounded().abs();
+        let per_root = v.inverse();
+        let per_size = per_root.rounded().abs();
+        let mut down = [one; MAX + 1];
+        unroll!(i in 1..DEGREE, max 7, {
+            down[i] = e[i].rounded().abs().max(size * down[i - 1]);
+        });
+        let mut from_below = A::of(zero);
+        let mut up = zero;
+        unroll!(j in 0..MAX, max 7, {
+            if const { j + 1 < DEGREE } {
+                let i = const { less(DEGREE, 1 + j) };
+                from_below = from_below.minus(e[i + 1]).times(per_root);
+                up = up.max(e[i + 1].rounded().abs()) * per_size;
+                rest[i] = A::select(up.lt(down[i]), from_below, rest[i]);
+            }
+        });
+    }
+    unroll!(i in 0..(MAX + 1), max 7, {
+        if const { i >= DEGREE } {
+            rest[i] = A::of(zero);
+        }
+    });
     rest
 }
 
@@ -277,10 +432,10 @@ const fn less(n: usize, by: usize) -> usize {
     n.saturating_sub(by)
 }
 
-/// `u rest(u)²` times the straight line that makes it 1 and stationary at the root; `rest` has
-/// degree N - 1.
+/// What is to be multiplied by `rest(u)²` so that it is 1 and stationary at the root, by powers of `u`: `u` times a
+/// straight line; `rest` has degree N - 1.
 #[inline(always)]
-fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> [A; MAX_MOMENTS] {
+fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
     let quotient = divided(rest, v);
@@ -298,30 +453,26 @@ fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> [A
     let tilt = twice.minus(A::of(whole::<R>(2 * N - 1)));
     let constant = at_root.times(A::of(one).minus(tilt));
     let linear = at_root.times(v.times(tilt));
-    let square = squared::<R, A, N>(rest);
-    let mut q = [A::of(zero); MAX_MOMENTS];
-    unroll!(i in 1..(2 * N + 1), max 13, {
-        q[i] = constant.times(square[i - 1]);
-        if const { i > 1 } {
-            q[i] = q[i].plus(linear.times(square[i - 2]));
-        }
-    });
-    q
+    let mut factor = [A::of(zero); MAX + 1];
+    factor[1] = constant;
+    factor[2] = linear;
+    factor
 }
 
-/// `u rest(u)²` times the cubic that makes it 1 and stationary at both roots; `rest` has degree
-/// N - 2.
+/// `a per`, moved between `-limit` and `limit`.
+#[inline(always)]
+fn limited<R: Real, A: Arithmetic<R>>(a: A, per: A, limit: R) -> A {
+    a.times(per).within(-limit, limit)
+}
+
+/// [`single`] for two roots, of which `rest`, of degree N - 2, has none: `u` times a cubic.
 ///
 /// In the reciprocal, the cubic meets `s(v)² = (v^N / rest(v))²` doubly at both roots. With the
 /// straight line `l` that meets `s`, it is `l² + (v - v_1)(v - v_2) t`, where the straight line `t`
 /// meets `2 l` times the second divided difference of `s`. Divided differences of a quotient of
 /// polynomials follow from theirs by Leibniz' rule, without cancellation where both roots meet.
 #[inline(always)]
-fn double<R: Real, A: Arithmetic<R>, const N: usize>(
-    rest: &Fine<A>,
-    v1: A,
-    v2: A,
-) -> [A; MAX_MOMENTS] {
+fn double<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: A) -> Fine<A> {
     let zero = A::of(lit!(0.0));
     let one = A::of(lit!(1.0));
     let two: R = lit!(2.0);
@@ -358,21 +509,34 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(
         p2 = v2.times(p2);
     });
     let (per_r1, per_r2) = (r1.inverse(), r2.inverse());
-    // And of the quotient.
-    let limit: R = lit!(1e9);
-    let quotient = |rest: A, per: A| rest.times(per).within(-limit, limit);
-    let s1 = quotient(p1, per_r1);
-    let s2 = quotient(p2, per_r2);
-    let s12 = quotient(p12.minus(r12.times(s2)), per_r1);
-    let s22 = quotient(p22.minus(r22.times(s2)), per_r2);
-    let s112 = quotient(p112.minus(r11.times(s12)).minus(r112.times(s2)), per_r1);
-    let s122 = quotient(p122.minus(r12.times(s22)).minus(r122.times(s2)), per_r1);
-    let s1122 = quotient(
+    // And of the quotient, which is x² times factors x / (x + w), x being -v and w the other roots. The k-th derivative
+    // over k! is at most x^(2 - k) times Σ binomial(2, j) binomial(k - j + 3, 3), j from 0 to 2, for four such factors:
+    // 1, 6, 19, 44. Divided differences are its means over all weighted averages of their points (Hermite and Genocchi).
+    // There x is at least the first root's x times that root's weight, of which the mean reciprocal is 3 for two of
+    // four points.
+    let (x1, x2) = (v1.rounded().abs(), v2.rounded().abs());
+    let nearest: R = lit!(1e-30);
+    let s1 = limited(p1, per_r1, x1 * lit!(2.0) * x1);
+    let s2 = limited(p2, per_r2, x2 * lit!(2.0) * x2);
+    let s12 = limited(p12.minus(r12.times(s2)), per_r1, x1 * lit!(6.0));
+    let s22 = limited(p22.minus(r22.times(s2)), per_r2, x2 * lit!(6.0));
+    let s112 = limited(
+        p112.minus(r11.times(s12)).minus(r112.times(s2)),
+        per_r1,
+        lit!(19.0),
+    );
+    let s122 = limited(
+        p122.minus(r12.times(s22)).minus(r122.times(s2)),
+        per_r1,
+        lit!(19.0),
+    );
+    let s1122 = limited(
         p1122
             .minus(r11.times(s122))
             .minus(r112.times(s22))
             .minus(r1122.times(s2)),
         per_r1,
+        R::literal::<{ 132.0_f64.to_bits() }>() / x1.max(nearest),
     );
     // l = s1 + s12 (v - v1), t = t0 + t1 (v - v1).
     let t0 = s1.times(s112).scaled(two);
@@ -380,8 +544,9 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(
     let l0 = s1.minus(s12.times(v1));
     let t0 = t0.minus(t1.times(v1));
     let (sum, product) = (v1.plus(v2), v1.times(v2));
-    let cubic = [
-        // Coefficients of u^0 to u^3, of v^3 to v^0.
+    [
+        // Coefficients of u^1 to u^4: of the cubic, those of v^3 to v^0.
+        zero,
         t1,
         s12.times(s12).plus(t0).minus(t1.times(sum)),
         l0.times(s12)
@@ -389,30 +554,12 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(
             .minus(t0.times(sum))
             .plus(t1.times(product)),
         l0.times(l0).plus(t0.times(product)),
-    ];
-    times_square::<R, A, N, 4>(cubic, rest)
+        zero,
+        zero,
+    ]
 }
 
-/// `u rest(u)²` times a polynomial of `TERMS` coefficients, that of `u^0` first.
-#[inline(always)]
-fn times_square<R: Real, A: Arithmetic<R>, const N: usize, const TERMS: usize>(
-    factors: [A; TERMS],
-    rest: &Fine<A>,
-) -> [A; MAX_MOMENTS] {
-    let square = squared::<R, A, N>(rest);
-    let mut q = [A::of(lit!(0.0)); MAX_MOMENTS];
-    unroll!(i in 0..TERMS, max 7, {
-        unroll!(j in 0..(2 * MAX), max 13, {
-            if const { i + j < 2 * N } {
-                q[i + j + 1] = q[i + j + 1].plus(factors[i].times(square[j]));
-            }
-        });
-    });
-    q
-}
-
-/// [`double`] for three roots of which `rest`, of degree N - 3, has none: `u rest(u)²` times the polynomial of
-/// degree 5 that makes it 1 and stationary at all three.
+/// [`single`] for three roots, of which `rest`, of degree N - 3, has none: `u` times a polynomial of degree 5.
 ///
 /// In the reciprocal it is `l² + (v - v_1)(v - v_2)(v - v_3) t`, where the parabola `l` meets `s` and the
 /// parabola `t` meets `2 l` times the third divided difference of `s`.
@@ -422,7 +569,7 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
     v1: A,
     v2: A,
     v3: A,
-) -> [A; MAX_MOMENTS] {
+) -> Fine<A> {
     let zero = A::of(lit!(0.0));
     let one = A::of(lit!(1.0));
     let two: R = lit!(2.0);
@@ -457,53 +604,66 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
         p3 = v3.times(p3);
     });
     let (per_r1, per_r2, per_r3) = (r1.inverse(), r2.inverse(), r3.inverse());
-    // And of the quotient.
-    let limit: R = lit!(1e12);
-    let quotient = |rest: A, per: A| rest.times(per).within(-limit, limit);
-    let s3 = quotient(p3, per_r3);
-    let s23 = quotient(p23.minus(r23.times(s3)), per_r2);
-    let s123 = quotient(p123.minus(r12.times(s23)).minus(r123.times(s3)), per_r1);
-    let s1123 = quotient(
+    // And of the quotient, with limits as in `double`: x³ times three factors x / (x + w). Derivatives over k! are at most
+    // 1, 6, 18, 38, 66 and 102 times x^(3 - k). The weight of the points at the first two roots has a mean reciprocal of
+    // 4/3 (four points of five) and 2 (three of five), and a mean square reciprocal of 10/3 (four of six).
+    let (x1, x2, x3) = (v1.rounded().abs(), v2.rounded().abs(), v3.rounded().abs());
+    let third: R = lit!(38.0);
+    let per_x2 = one.rounded() / x2.max(lit!(1e-15));
+    let s3 = limited(p3, per_r3, x3 * lit!(2.0) * x3 * x3);
+    let s23 = limited(p23.minus(r23.times(s3)), per_r2, x2 * lit!(6.0) * x2);
+    let s123 = limited(
+        p123.minus(r12.times(s23)).minus(r123.times(s3)),
+        per_r1,
+        x1 * lit!(18.0),
+    );
+    let s1123 = limited(
         p1123
             .minus(r11.times(s123))
             .minus(r112.times(s23))
             .minus(s3),
         per_r1,
+        third,
     );
-    let s1223 = quotient(
+    let s1223 = limited(
         p1223
             .minus(r12.times(s123))
             .minus(r122.times(s23))
             .minus(s3),
         per_r2,
+        third,
     );
-    let s1233 = quotient(
+    let s1233 = limited(
         p1233
             .minus(r13.times(s123))
             .minus(r123.times(s23))
             .minus(s3),
         per_r3,
+        third,
     );
-    let s11223 = quotient(
+    let s11223 = limited(
         p11223
             .minus(r12.times(s1223))
             .minus(r112.times(s123))
             .minus(s23),
         per_r1,
+        per_x2 * lit!(88.0),
     );
-    let s12233 = quotient(
+    let s12233 = limited(
         p12233
             .minus(r23.times(s1233))
             .minus(r123.times(s123))
             .minus(s23),
         per_r2,
+        per_x2 * lit!(132.0),
     );
-    let s112233 = quotient(
+    let s112233 = limited(
         p112233
             .minus(r12.times(s12233))
             .minus(r123.times(s1233))
             .minus(s123),
         per_r1,
+        per_x2 * lit!(340.0) * per_x2,
     );
     // l = s3 + (v - v3) (s23 + (v - v2) s123), and t as well; both by powers of v.
     let t3 = s3.times(s1233).scaled(two);
@@ -526,8 +686,9 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
     let e1 = v1.plus(v2).plus(v3);
     let e2 = v1.times(v2).plus(v1.plus(v2).times(v3));
     let e3 = v1.times(v2).times(v3);
-    // Coefficients of u^0 to u^5, of v^5 to v^0.
-    let quintic = [
+    [
+        // Coefficients of u^1 to u^6: of the quintic, those of v^5 to v^0.
+        zero,
         t[2],
         l[2].times(l[2]).plus(t[1]).minus(t[2].times(e1)),
         l[1].times(l[2])
@@ -545,6 +706,5 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
             .plus(t[0].times(e2))
             .minus(t[1].times(e3)),
         l[0].times(l[0]).minus(t[0].times(e3)),
-    ];
-    times_square::<R, A, N, 6>(quintic, rest)
+    ]
 }

@@ -139,32 +139,7 @@ fn corrected<R: Real, const N: usize>(
     unroll!(i in 0..(N + 1), max 7, {
         let at = u[if const { i < N } { i } else { MAX }];
         let x = eta + at;
-        // 1 and stationary here, 0 and stationary at other points, 0 at the query point; but for
-        // the slope, which comes after.
-        let mut q = [zero; MAX_MOMENTS];
-        q[0] = one;
-        let mut slope = zero;
-        unroll!(j in 0..(2 * N), max 13, {
-            // Two factors for each other point, one for the query point in this one's place.
-            if const { j / 2 != i || j % 2 != 1 } {
-                // 1 + s (t - x); at infinity s is 0.
-                let v = found.reciprocals[const { j / 2 }];
-                let s = if const { j / 2 == i } {
-                    v
-                } else {
-                    -v / (one - v * at)
-                };
-                let constant = one - s * x;
-                slope += s;
-                unroll!(l in 0..(2 * MAX), max 13, {
-                    // With each factor it has one coefficient more.
-                    if const { 2 * MAX - l <= j + 1 } {
-                        q[2 * MAX - l] = constant * q[2 * MAX - l] + s * q[2 * MAX - 1 - l];
-                    }
-                });
-                q[0] = constant * q[0];
-            }
-        });
+        let (q, slope) = basis::<R, N, i>(&found, at, x);
         let mut value = zero;
         let mut moved = zero;
         unroll!(k in 0..(2 * N), max 13, {
@@ -193,4 +168,43 @@ fn corrected<R: Real, const N: usize>(
     });
     next.own = R::select(is_near, next.own, found.own);
     next
+}
+
+/// Hermite's basis polynomial of point I, at `x`, which is `at` from the query point: 1 and stationary there, 0 and
+/// stationary at other points, 0 at the query point. The slope that it has there comes beside it, to be taken off.
+#[inline(always)]
+fn basis<R: Real, const N: usize, const I: usize>(
+    found: &Canonical<R>,
+    at: R,
+    x: R,
+) -> ([R; MAX_MOMENTS], R) {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let mut q = [zero; MAX_MOMENTS];
+    q[0] = one;
+    let mut slope = zero;
+    unroll!(j in 0..(2 * N), max 13, {
+        // Two factors for each other point, one for the query point in this one's place.
+        if const { j / 2 != I || j % 2 != 1 } {
+            // 1 + s (t - x); at infinity s is 0.
+            let v = found.reciprocals[const { j / 2 }];
+            let s = if const { j / 2 == I } {
+                v
+            } else {
+                -v / (one - v * at)
+            };
+            slope += s;
+            multiply::<R, j>(&mut q, one - s * x, s);
+        }
+    });
+    (q, slope)
+}
+
+/// Multiplies a polynomial of degree DEGREE by `constant + s t`.
+#[inline(always)]
+fn multiply<R: Real, const DEGREE: usize>(q: &mut [R; MAX_MOMENTS], constant: R, s: R) {
+    unroll!(l in 0..(DEGREE + 1), max 13, {
+        q[DEGREE + 1 - l] = constant * q[DEGREE + 1 - l] + s * q[DEGREE - l];
+    });
+    q[0] = constant * q[0];
 }

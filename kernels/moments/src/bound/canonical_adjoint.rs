@@ -33,6 +33,12 @@ use super::{MAX, MAX_MOMENTS};
 /// The largest magnitude of a factor.
 const LIMIT: f64 = 1e25;
 
+#[inline(always)]
+fn bounded<R: Real>(x: R) -> R {
+    let limit: R = lit!(LIMIT);
+    x.clamp(-limit, limit)
+}
+
 /// A point other than the query point, with its upstream gradients.
 #[derive(Clone, Copy)]
 struct Node<R> {
@@ -233,8 +239,6 @@ fn interpolated<R: Real, const N: usize>(
 ) -> [R; MAX_MOMENTS] {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let limit: R = lit!(LIMIT);
-    let bounded = |x: R| x.clamp(-limit, limit);
 
     // Divided differences of v^2N: complete homogeneous polynomials.
     let mut h = [zero; MAX_MOMENTS];
@@ -245,11 +249,7 @@ fn interpolated<R: Real, const N: usize>(
     unroll!(j in 0..(2 * N), max 13, {
         let place = places[const { j / 2 }];
         let v = place.t * place.size;
-        unroll!(degree in 1..(2 * MAX + 1), max 13, {
-            if const { degree + j <= 2 * N } {
-                h[degree] = bounded(h[degree] + v * h[degree - 1]);
-            }
-        });
+        add_variable::<R, N, j>(&mut h, v);
         of_power[j] = bounded(h[2 * N - j] * size);
         size = bounded(size * place.size);
         c[j] = of_power[j] * nodes[const { j / 2 }].weight;
@@ -267,51 +267,108 @@ fn interpolated<R: Real, const N: usize>(
         });
     });
 
-    // Divided differences of the upstream gradients: those to weights with slopes of near nodes, and slopes of far
-    // ones, which are 0 at infinity with the weight.
-    let mut of_values = [zero; 2 * MAX];
-    let mut of_slopes = [zero; 2 * MAX];
+    let mut differences = Differences {
+        of_values: [zero; 2 * MAX],
+        of_slopes: [zero; 2 * MAX],
+    };
     unroll!(order in 1..(2 * N), max 13, {
-        unroll!(first in 0..(2 * MAX - 1), max 13, {
-            if const { first + order < 2 * N } {
-                let i = const { first / 2 };
-                let k = const { (first + order) / 2 };
-                if const { order == 1 && first.is_multiple_of(2) } {
-                    let is_near = places[i].size.gt(one);
-                    let slope = slopes[i] * places[i].size * places[i].size;
-                    of_values[first] = R::select(is_near, bounded(slope), zero);
-                    of_slopes[first] = R::select(is_near, zero, slopes[i]);
-                } else if const { order == 1 } {
-                    let step = nodes[k].weight - nodes[i].weight;
-                    of_values[first] = bounded(step * per_difference[i][k]);
-                    of_slopes[first] = zero;
-                } else {
-                    let per = per_difference[i][k];
-                    let (tau_i, tau_k) = (places[i].tau, places[k].tau);
-                    let step = tau_k * of_values[first + 1] - tau_i * of_values[first];
-                    of_values[first] = bounded(step * per);
-                    let step = tau_k * of_slopes[first + 1] - tau_i * of_slopes[first];
-                    of_slopes[first] = bounded(step * per);
-                }
-                let mut term = of_power[first] * (of_values[first] * places[k].tau);
-                if const { first == 0 } {
-                    term += of_slopes[0] * places[k].tau;
-                }
-                c[first + order] = bounded(c[first + order] + term);
-            }
-        });
+        differences.raise::<N, order>(nodes, places, slopes, &per_difference);
+        differences.add_to::<N, order>(&mut c, &of_power, places);
     });
 
     let mut q = [zero; MAX_MOMENTS];
     unroll!(i in 0..(2 * N), max 13, {
         // Multiplied by the factor of this node, and so of a degree more.
         let place = places[(2 * N - 1 - i) / 2];
-        unroll!(j in 0..(2 * MAX), max 13, {
-            if const { j <= i } {
-                q[i + 1 - j] = bounded(place.tau * q[i + 1 - j] - place.t * q[i - j]);
-            }
-        });
+        multiply::<R, i>(&mut q, &place);
         q[i + 1] += c[2 * N - 1 - i];
     });
     q
+}
+
+/// Puts one variable more into the complete homogeneous polynomials of J variables, of degrees up to 2N - J.
+#[inline(always)]
+fn add_variable<R: Real, const N: usize, const J: usize>(h: &mut [R; MAX_MOMENTS], v: R) {
+    unroll!(degree in 1..(2 * MAX + 1), max 13, {
+        if const { degree + J <= 2 * N } {
+            h[degree] = bounded(h[degree] + v * h[degree - 1]);
+        }
+    });
+}
+
+/// Multiplies a polynomial of degree DEGREE by the factor of a node.
+#[inline(always)]
+fn multiply<R: Real, const DEGREE: usize>(q: &mut [R; MAX_MOMENTS], place: &Place<R>) {
+    unroll!(j in 0..(DEGREE + 1), max 13, {
+        q[DEGREE + 1 - j] = bounded(place.tau * q[DEGREE + 1 - j] - place.t * q[DEGREE - j]);
+    });
+}
+
+/// Divided differences of the upstream gradients, by their first node: those to weights with slopes of near nodes,
+/// and slopes of far ones, which are 0 at infinity with the weight.
+struct Differences<R> {
+    of_values: [R; 2 * MAX],
+    of_slopes: [R; 2 * MAX],
+}
+
+impl<R: Real> Differences<R> {
+    /// Those of ORDER from those of one less.
+    #[inline(always)]
+    fn raise<const N: usize, const ORDER: usize>(
+        &mut self,
+        nodes: &[Node<R>; MAX],
+        places: &[Place<R>; MAX],
+        slopes: &[R; MAX],
+        per_difference: &[[R; MAX]; MAX],
+    ) {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let Self {
+            of_values,
+            of_slopes,
+        } = self;
+        unroll!(first in 0..(2 * MAX - 1), max 13, {
+            if const { first + ORDER < 2 * N } {
+            let i = const { first / 2 };
+            let k = const { (first + ORDER) / 2 };
+            if const { ORDER == 1 && first.is_multiple_of(2) } {
+                let is_near = places[i].size.gt(one);
+                let slope = slopes[i] * places[i].size * places[i].size;
+                of_values[first] = R::select(is_near, bounded(slope), zero);
+                of_slopes[first] = R::select(is_near, zero, slopes[i]);
+            } else if const { ORDER == 1 } {
+                let step = nodes[k].weight - nodes[i].weight;
+                of_values[first] = bounded(step * per_difference[i][k]);
+                of_slopes[first] = zero;
+            } else {
+                let per = per_difference[i][k];
+                let (tau_i, tau_k) = (places[i].tau, places[k].tau);
+                let step = tau_k * of_values[first + 1] - tau_i * of_values[first];
+                of_values[first] = bounded(step * per);
+                let step = tau_k * of_slopes[first + 1] - tau_i * of_slopes[first];
+                of_slopes[first] = bounded(step * per);
+            }
+            }
+        });
+    }
+
+    /// Adds what those of ORDER contribute to the coefficients, by Leibniz' rule.
+    #[inline(always)]
+    fn add_to<const N: usize, const ORDER: usize>(
+        &self,
+        c: &mut [R; 2 * MAX],
+        of_power: &[R; 2 * MAX],
+        places: &[Place<R>; MAX],
+    ) {
+        unroll!(first in 0..(2 * MAX - 1), max 13, {
+            if const { first + ORDER < 2 * N } {
+                let tau = places[const { (first + ORDER) / 2 }].tau;
+                let mut term = of_power[first] * (self.of_values[first] * tau);
+                if const { first == 0 } {
+                    term += self.of_slopes[0] * tau;
+                }
+                c[first + ORDER] = bounded(c[first + ORDER] + term);
+            }
+        });
+    }
 }

@@ -188,7 +188,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
 
     /// The coefficients `e` and the query point's weight with all digits that the recurrence has.
     #[inline(always)]
-    pub fn fine<const N: usize>(&self) -> ([A; MAX + 1], A) {
+    pub fn fine<const N: usize>(&self, reach: R) -> ([A; MAX + 1], A) {
         let zero = A::of(lit!(0.0));
         let one = A::of(lit!(1.0));
         let mut y = [one; MAX + 1];
@@ -233,8 +233,8 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
             });
         });
         let square = kernel[0].at_least(lit!(1e-37));
-        let per_reach = one.over(A::of(self.reach));
-        let largest: R = lit!(32.0);
+        let per_reach = A::of(R::literal::<{ 1.0_f64.to_bits() }>() / reach);
+        let largest: R = lit!(1e17);
         let mut e = [one; MAX + 1];
         let mut power = per_reach;
         unroll!(i in 1..(N + 1), max 7, {

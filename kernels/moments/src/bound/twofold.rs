@@ -22,8 +22,8 @@ pub(crate) trait Arithmetic<R: Real>: Copy {
     fn times(self, other: Self) -> Self;
     /// Product with a number of the base type.
     fn times_plain(self, x: R) -> Self;
-    /// Product moved between `-limit` and `limit`, which is at most 1e37, and never infinite on its way: error
-    /// terms of what is infinite are no numbers. `other` must not be above 1e37.
+    /// Product moved between `-limit` and `limit`, which is at most 1e37 (in 64 bits 1e250), and never infinite on its
+    /// way: error terms of what is infinite are no numbers. Nor must `other` be above that.
     fn times_within(self, other: Self, limit: R) -> Self;
     /// Product with a power of two.
     fn scaled(self, power: R) -> Self;
@@ -40,7 +40,7 @@ pub(crate) trait Arithmetic<R: Real>: Copy {
     fn at_least(self, floor: R) -> Self;
     /// Moved between the limits.
     fn within(self, low: R, high: R) -> Self;
-    /// 1 / x, limited to 1e18.
+    /// 1 / x, limited to 1e18, in 64 bits to 1e90.
     fn inverse(self) -> Self;
     /// `a` where `mask` holds, else `b`.
     fn select(mask: R::Mask, a: Self, b: Self) -> Self;
@@ -53,6 +53,16 @@ fn divisor<R: Real>(numerator: R, positive: R) -> R {
     let smallest: R = lit!(1e-37);
     let least = numerator.abs() * lit!(1.0 / (1_u128 << 80) as f64);
     positive.max(least.max(smallest))
+}
+
+/// The magnitude of what [`Arithmetic::inverse`] divides by, at least.
+#[inline(always)]
+fn least_divisor<R: Real>() -> R {
+    if const { R::IS_WIDE } {
+        lit!(1e-90)
+    } else {
+        lit!(1e-18)
+    }
 }
 
 /// The product: rounded, and what that took off. Of a product that is too small for
@@ -138,7 +148,7 @@ impl<R: Real> Arithmetic<R> for Plain<R> {
     }
     #[inline(always)]
     fn inverse(self) -> Self {
-        let least: R = lit!(1e-18);
+        let least = least_divisor::<R>();
         let one: R = lit!(1.0);
         let x = self.0;
         Self(one / R::select(x.lt(lit!(0.0)), x.min(-least), x.max(least)))
@@ -223,7 +233,11 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     #[inline(always)]
     fn times_within(self, other: Self, limit: R) -> Self {
         let one: R = lit!(1.0);
-        let largest: R = lit!(1e37);
+        let largest: R = if const { R::IS_WIDE } {
+            lit!(1e250)
+        } else {
+            lit!(1e37)
+        };
         let most = largest / other.high.abs().max(one);
         self.within(-most, most).times(other).within(-limit, limit)
     }
@@ -279,8 +293,15 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     fn inverse(self) -> Self {
         let one: R = lit!(1.0);
         let sign = R::select(self.high.lt(lit!(0.0)), -one, one);
-        let magnitude = self.scaled(sign).at_least(lit!(1e-18));
-        Self::of(one).over(magnitude).scaled(sign)
+        let magnitude = self.scaled(sign).at_least(least_divisor());
+        // Quotients are limited to 2⁸⁰.
+        let lift = if const { R::IS_WIDE } {
+            R::select(magnitude.high.lt(lit!(1e-20)), lit!(two_to(240)), one)
+        } else {
+            one
+        };
+        let inverse = Self::of(one).over(magnitude.scaled(lift));
+        inverse.scaled(lift).scaled(sign)
     }
     #[inline(always)]
     fn select(mask: R::Mask, a: Self, b: Self) -> Self {
