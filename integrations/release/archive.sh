@@ -37,6 +37,8 @@ if [ -z "$binary" ]; then
         fi
         ;;
     esac
+    # As .cargo/config.toml has it, which cargo reads in that folder alone.
+    export CXXFLAGS="${CXXFLAGS:--USPIRV_CHECK_CONTEXT -DNDEBUG}"
     cargo build --release --locked --manifest-path "$root/Cargo.toml" -p hankel --target "$target"
     binary=${CARGO_TARGET_DIR:-$root/target}/$target/release/hankel$suffix
 fi
