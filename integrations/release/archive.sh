@@ -38,7 +38,7 @@ if [ -z "$binary" ]; then
         ;;
     esac
     # As .cargo/config.toml has it, which cargo reads in that folder alone.
-    export CXXFLAGS="${CXXFLAGS:--USPIRV_CHECK_CONTEXT -DNDEBUG}"
+    export CXXFLAGS="${CXXFLAGS:--USPIRV_CHECK_CONTEXT}"
     cargo build --release --locked --manifest-path "$root/Cargo.toml" -p hankel --target "$target"
     binary=${CARGO_TARGET_DIR:-$root/target}/$target/release/hankel$suffix
 fi

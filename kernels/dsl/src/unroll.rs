@@ -5,6 +5,8 @@
 ///
 /// The compiler reads the block once for every index that there might be. Where such blocks stand
 /// within each other, say how far the range can go, 7 or 13: `unroll!(i in 0..N, max 7, { … })`.
+/// Three of them within each other, or two around a long block, belong into functions with a const
+/// parameter for the outer index: an incremental build's time grows with the square of a function's copies.
 ///
 /// A shader that indexes a local array dynamically spills it to memory, and rust-gpu's loops are
 /// ones that shader compilers rarely unroll. With this, arrays of a few numbers become plain

@@ -28,8 +28,8 @@ pub struct Gradient<R> {
     pub eta: R,
 }
 
-/// What [`blend`](super::Bounds::blend) makes of [`bound`](super::bound) as seen from behind: the
-/// derivatives to moments and query point, times `d_bound`.
+/// The adjoint of [`bound`](super::bound) and [`blend`](super::Bounds::blend): the derivatives of the blend to
+/// moments and query point, times the upstream gradient `d_bound`.
 ///
 /// Takes anything that [`bound`](super::bound) takes. A derivative is limited to 1e25, in 64 bits to 1e100, times
 /// `d_bound`, which is limited to 1e12, and the derivative to the query point, which is in proportion to the total,
@@ -63,8 +63,7 @@ pub fn bound_adjoint_compensated<R: Real, const N: usize>(
     adjoint::<R, Twofold<R>, N>(m, eta, overestimation, d_bound, floor)
 }
 
-/// [`mix_bias`](super::mix_bias) as seen from behind: from the gradient to the mixed moments that
-/// to the given ones.
+/// The adjoint of [`mix_bias`](super::mix_bias): from the gradient to the mixed moments that to the given ones.
 #[inline(always)]
 pub fn mix_bias_adjoint<R: Real, const N: usize>(
     mut d: [R; MAX_MOMENTS],
