@@ -18,14 +18,12 @@ use crate::speed::Quantiles;
 /// Orders whose compensated derivatives are functions of the library, and no kernels.
 const OF_LIBRARY: RangeInclusive<usize> = 4..=6;
 
-/// Derivatives to moments above this are left out, and with them the others of the bound, which the move of the
-/// polynomial to powers of depth mixes with them: kernels limit them to ten times that.
+/// Derivatives above this are left out: the library limits them to ten times that.
 const MOST_F32: f64 = 1e24;
 const MOST_F64: f64 = 1e99;
 
-/// Derivatives below this, of moments with a total from 1 to 2, count as that: factors of theirs may underflow, and the
-/// kernels promise no more.
-const LEAST: f64 = 1e-12;
+/// For twelve moments, derivatives below this count as that: factors of theirs may underflow.
+const LEAST_OF_TWELVE: f64 = 1e-12;
 
 /// What came out for the derivatives of one family, order and precision, by one solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,7 +71,7 @@ impl Truth {
         let m = wide_moments(n, &row);
         let eta = Wide::from(row.eta);
         let (exact, roots) = gradients(&m, eta, None);
-        let mut sensitivities = [0, 1].map(|bound: usize| rounding.of_gradient(&exact[bound]));
+        let mut sensitivities = [0, 1].map(|bound: usize| rounding.of_gradient(n, &exact[bound]));
         for direction in 0..=2 * n + 1 {
             let (mut m, mut eta) = (m.clone(), eta);
             let rounded = if let Some(moment) = m.get_mut(direction) {
@@ -106,18 +104,18 @@ impl Truth {
             self.exact.iter().zip(&self.sensitivities).zip(computed)
         {
             let last = exact.len() - 1;
-            let most = match T::PRECISION {
-                Precision::F32 => MOST_F32,
-                Precision::F64 => MOST_F64,
-            };
-            let is_beyond = exact[..last].iter().any(|d| f64::from(*d).abs() > most);
             for (k, ((exact, sensitivity), computed)) in
                 exact.iter().zip(sensitivities).zip(computed).enumerate()
             {
                 // Only the derivative to the query point has the unit of the moments.
                 let e = if k == last { self.exponent } else { 0 };
                 let unscaled = f64::from(*exact) * 2.0_f64.powi(e / 2) * 2.0_f64.powi(e - e / 2);
-                if unscaled.abs() > MOST_F32 && k == last || is_beyond && k < last {
+                // To the query point, the limit of both formats is that of the product with the total.
+                let most = match T::PRECISION {
+                    Precision::F64 if k < last => MOST_F64,
+                    _ => MOST_F32,
+                };
+                if unscaled.abs() > most {
                     continue;
                 }
                 let computed = computed.widen() * 2.0_f64.powi(-e / 2) * 2.0_f64.powi(-e + e / 2);
@@ -141,15 +139,16 @@ impl Truth {
 
 impl Rounding {
     /// What rounding each derivative once does to it. One that is less than epsilon times the greatest of its row, or
-    /// than [`LEAST`], counts as that.
-    fn of_gradient(&self, gradient: &[Wide]) -> Vec<f64> {
+    /// than [`LEAST_OF_TWELVE`], counts as that.
+    fn of_gradient(&self, n: usize, gradient: &[Wide]) -> Vec<f64> {
         let sizes = || gradient.iter().map(|d| f64::from(*d).abs());
         let moments = gradient.len() - 1;
-        let least = self.epsilon() * sizes().take(moments).fold(0.0, f64::max);
+        let least = if n == 6 { LEAST_OF_TWELVE } else { 0.0 };
+        let of_greatest = self.epsilon() * sizes().take(moments).fold(0.0, f64::max);
         let of_moments = sizes()
             .take(moments)
-            .map(|d| self.of(d.max(least).max(LEAST), 0));
-        let of_query = sizes().skip(moments).map(|d| self.of_moment(d.max(LEAST)));
+            .map(|d| self.of(d.max(of_greatest).max(least), 0));
+        let of_query = sizes().skip(moments).map(|d| self.of_moment(d.max(least)));
         of_moments.chain(of_query).collect()
     }
 }
@@ -197,14 +196,14 @@ pub(super) fn measure<T: Format>(
             continue;
         };
         let map = Map::find(&function, T::PRECISION)?;
-        let of_library = OF_LIBRARY.contains(&n) && backend.name() == NATIVE;
+        let of_library = solver == Solver::Compensated && OF_LIBRARY.contains(&n);
+        if map.is_none() && !(of_library && backend.name() == NATIVE) {
+            continue;
+        }
         let mut run = |overestimation| match &map {
             Some(map) => map.run(backend, n, &rows, overestimation),
             None => Ok(by_library(n, &rows, overestimation)),
         };
-        if map.is_none() && !(solver == Solver::Compensated && of_library) {
-            continue;
-        }
         let (lower, upper) = match run(0.0).and_then(|lower| Ok((lower, run(1.0)?))) {
             Err(StressError::Backend {
                 error: BackendError::Lacks(_),

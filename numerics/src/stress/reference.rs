@@ -4,7 +4,7 @@ use hankel_dsl::Real;
 use hankel_moments::{Bounds, Canonical, Gradient, MAX_MOMENTS, bound, bound_adjoint, canonical};
 use serde::{Deserialize, Serialize};
 
-use super::gradient::gradients;
+use super::gradient::{Gradients, gradients};
 use crate::families::{Format, Row, Validity, scaled, validity};
 use crate::judge::{DepthFunction, Judge, Range};
 use crate::numbers::{DoubleDouble, Wide};
@@ -186,10 +186,12 @@ pub fn judgement<T: Format>(n: usize, row: &Row<T>) -> Judgement {
     let rounding = Rounding::new::<T>(exponent);
     let mass = row.m[0];
     let (shares, sensitivities) = if left < NEEDS_WIDE {
-        (
-            shares_wide(n, &row),
-            rounding.sensitivities(&row, &exact_gradients(n, &row)),
-        )
+        let m = wide_moments(n, &row);
+        let (exact, _) = gradients(&m, Wide::from(row.eta), None);
+        let in_f64 = exact
+            .each_ref()
+            .map(|gradient| gradient.iter().copied().map(f64::from).collect());
+        (shares_of(&exact, &m), rounding.sensitivities(&row, &in_f64))
     } else {
         let mass = DoubleDouble::from(mass);
         let m = row.m.map(DoubleDouble::from);
@@ -270,7 +272,7 @@ impl Rounding {
 }
 
 /// Gradients of the lower and of the upper bound, to the moments and then to the query point, in twice the digits of
-/// `f64`; derivatives above 1e25 are limited.
+/// `f64`; derivatives above 1e100 are limited.
 fn gradients_by_library(n: usize, row: &Row<f64>) -> [Vec<f64>; 2] {
     let m = row.m.map(DoubleDouble::from);
     [0.0, 1.0].map(|overestimation| {
@@ -281,24 +283,23 @@ fn gradients_by_library(n: usize, row: &Row<f64>) -> [Vec<f64>; 2] {
     })
 }
 
-/// [`gradients_by_library`] in 300 bits and without a limit, for rows that little is left of.
-fn exact_gradients(n: usize, row: &Row<f64>) -> [Vec<f64>; 2] {
-    let (exact, _) = gradients(&wide_moments(n, row), Wide::from(row.eta), None);
-    exact.map(|gradient| gradient.into_iter().map(f64::from).collect())
-}
-
-/// Both bounds as shares of the total, in 300 bits and by another way than the library's: they are the integrals of
-/// the polynomials whose coefficients their gradients are.
+/// Both bounds as shares of the total, in 300 bits and by another way than the library's.
 fn shares_wide(n: usize, row: &Row<f64>) -> [DoubleDouble; 2] {
     let m = wide_moments(n, row);
     let (exact, _) = gradients(&m, Wide::from(row.eta), None);
-    exact.map(|gradient| {
-        let products = gradient.iter().zip(&m).map(|(d, m)| *d * *m);
+    shares_of(&exact, &m)
+}
+
+/// Both bounds as shares of the total: they are the integrals of the polynomials whose coefficients their gradients are.
+fn shares_of(gradients: &Gradients, m: &[Wide]) -> [DoubleDouble; 2] {
+    gradients.each_ref().map(|gradient| {
+        let products = gradient.iter().zip(m).map(|(d, m)| *d * *m);
         let bound = products.fold(Wide::from(0.0), |sum, product| sum + product);
         DoubleDouble::from(bound / m[0])
     })
 }
 
+/// Moments up to the highest of an order, in 300 bits.
 pub(super) fn wide_moments(n: usize, row: &Row<f64>) -> Vec<Wide> {
     row.m[..=2 * n].iter().copied().map(Wide::from).collect()
 }

@@ -50,8 +50,8 @@ pub fn bound_adjoint<R: Real, const N: usize>(
 /// No derivative has an error of more than four times what rounding each argument and the result once does to it.
 /// That is measured, not proved, in `f32` and `f64`, for rows of the families that
 /// [`bound_compensated`](super::bound_compensated) is measured on; a derivative that is less than the number
-/// type's epsilon times the greatest of its row counts as that, and one below 1e-12 as 1e-12. It is not so where a
-/// derivative to a moment is beyond the limit of [`bound_adjoint`]: others of its row are wrong, too.
+/// type's epsilon times the greatest of its row counts as that, for N = 6 one below 1e-12 as 1e-12. One beyond the
+/// limit of [`bound_adjoint`] is that limit.
 #[inline(always)]
 pub fn bound_adjoint_compensated<R: Real, const N: usize>(
     m: [R; MAX_MOMENTS],
@@ -63,7 +63,8 @@ pub fn bound_adjoint_compensated<R: Real, const N: usize>(
     adjoint::<R, Twofold<R>, N>(m, eta, overestimation, d_bound, floor)
 }
 
-/// The adjoint of [`mix_bias`](super::mix_bias): from the gradient to the mixed moments that to the given ones.
+/// The adjoint of [`mix_bias`](super::mix_bias): takes the gradient with respect to the mixed moments, and returns that
+/// with respect to the given ones.
 #[inline(always)]
 pub fn mix_bias_adjoint<R: Real, const N: usize>(
     mut d: [R; MAX_MOMENTS],
@@ -312,34 +313,48 @@ fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
     let rest = deflated::<R, A, N>(e, first);
     let single = single::<R, A, N>(&rest, first);
     if const { N < 4 } {
-        return (rest, single);
-    }
-    let select = |mask: R::Mask, a: (Fine<A>, Fine<A>), b: (Fine<A>, Fine<A>)| {
-        let mut both = b;
-        unroll!(i in 0..(N + 1), max 7, {
-            both.0[i] = A::select(mask, a.0[i], b.0[i]);
-            both.1[i] = A::select(mask, a.1[i], b.1[i]);
-        });
-        both
-    };
-    let of_single = (rest, single);
-    let second = exact_root::<R, A, N>(e, second * per_reach);
-    let rest = if const { N == 4 } {
-        deflated::<R, A, 3>(&rest, second)
-    } else if const { N == 5 } {
-        deflated::<R, A, 4>(&rest, second)
+        (rest, single)
     } else {
-        deflated::<R, A, 5>(&rest, second)
-    };
-    let double = double::<R, A, N>(&rest, first, second);
-    let of_two = select(kernel.few.gt(one), (rest, double), of_single);
-    if const { N < 6 } {
-        return of_two;
+        let of_single = (&rest, &single);
+        let second = exact_root::<R, A, N>(e, second * per_reach);
+        let rest = if const { N == 4 } {
+            deflated::<R, A, 3>(&rest, second)
+        } else if const { N == 5 } {
+            deflated::<R, A, 4>(&rest, second)
+        } else {
+            deflated::<R, A, 5>(&rest, second)
+        };
+        let double = double::<R, A, N>(&rest, first, second);
+        let is_double = kernel.few.gt(one);
+        let rest_of_two = selected::<R, A, N>(is_double, &rest, of_single.0);
+        let factor_of_two = selected::<R, A, N>(is_double, &double, of_single.1);
+        if const { N < 6 } {
+            (rest_of_two, factor_of_two)
+        } else {
+            let third = exact_root::<R, A, N>(e, third * per_reach);
+            let rest = deflated::<R, A, 4>(&rest, third);
+            let triple = triple::<R, A, N>(&rest, first, second, third);
+            let is_triple = kernel.few.gt(lit!(2.0));
+            (
+                selected::<R, A, N>(is_triple, &rest, &rest_of_two),
+                selected::<R, A, N>(is_triple, &triple, &factor_of_two),
+            )
+        }
     }
-    let third = exact_root::<R, A, N>(e, third * per_reach);
-    let rest = deflated::<R, A, 4>(&rest, third);
-    let triple = triple::<R, A, N>(&rest, first, second, third);
-    select(kernel.few.gt(lit!(2.0)), (rest, triple), of_two)
+}
+
+/// `a` where `mask` holds, else `b`.
+#[inline(always)]
+fn selected<R: Real, A: Arithmetic<R>, const N: usize>(
+    mask: R::Mask,
+    a: &Fine<A>,
+    b: &Fine<A>,
+) -> Fine<A> {
+    let mut either = *b;
+    unroll!(i in 0..(N + 1), max 7, {
+        either[i] = A::select(mask, a[i], b[i]);
+    });
+    either
 }
 
 /// How often a root is improved: each time its error is cubed, until it is that of the coefficients.
@@ -431,8 +446,8 @@ const fn less(n: usize, by: usize) -> usize {
     n.saturating_sub(by)
 }
 
-/// What is to be multiplied by `rest(u)²` so that it is 1 and stationary at the root, by powers of `u`: `u` times a
-/// straight line; `rest` has degree N - 1.
+/// The factor that makes `rest(u)²` 1 and stationary at the root, by powers of `u`: `u` times a straight line; `rest`
+/// has degree N - 1.
 #[inline(always)]
 fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
     let one: R = lit!(1.0);
