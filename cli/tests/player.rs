@@ -201,6 +201,52 @@ fn image_passes_are_played_as_draws() {
         .code(2);
 }
 
+/// A frame of depths with one sample, and drawn image passes, has all of its shaders in WebGL 2's language, and is
+/// played.
+#[test]
+fn frames_of_single_samples_are_all_in_webgl_2() {
+    let desk = Desk::new();
+    for technique in techniques::ALL.iter().filter(|t| t.resolves) {
+        for map in technique.maps {
+            let (name, format) = (technique.name, map.format.name());
+            let range = map.depth_range.name();
+            let shadow = format!(
+                "[shadow]\ntechnique = \"{name}\"\nformat = \"{format}\"\ndepth_range = \"{range}\"\nmultisampling = 1"
+            );
+            desk.write("scene.toml", SCENE.replace("[shadow]", &shadow));
+            let options = "--target wgsl --target essl300 --image-passes fragment";
+            desk.hankel(&format!("build --scene scene.toml --out frame {options}"))
+                .code(0);
+            let frame = json(&desk, "frame/frame.json");
+            assert_eq!(frame["shadow"]["multisampling"], 1);
+            for (shader, said) in frame["shaders"].as_object().expect("shaders") {
+                let why = &said["unsupported"]["essl300"];
+                // Three targets of 16 bytes are more than every device draws into: it is computed.
+                let is_computed = name == "moments-10" && shader.starts_with("resolve");
+                assert_eq!(why.is_null(), !is_computed, "{name}: {shader}: {why}");
+            }
+            let expected = rendered(&desk, "scene.toml", "--image-passes fragment");
+            let (share, largest) = compare(&played(&desk, "frame"), &expected);
+            assert!(
+                share <= ROUNDED,
+                "{name} {format}: {share} of the pixels, the most by {largest}"
+            );
+        }
+    }
+    // What looks at all samples itself says so.
+    desk.write(
+        "scene.toml",
+        SCENE.replace(
+            "[shadow]",
+            "[shadow]\ntechnique = \"pcf\"\nmultisampling = 1",
+        ),
+    );
+    desk.hankel("render scene.toml --out r.png").fails(
+        2,
+        &["shadow.multisampling", "`pcf` looks at all samples itself"],
+    );
+}
+
 /// What is blended, kept sample by sample, or scattered on the way to the camera, is played too.
 #[test]
 fn glass_and_a_medium_are_played() {

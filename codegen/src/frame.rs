@@ -93,6 +93,9 @@ pub struct Shadow {
     pub depth_range: String,
     /// Texels along an edge of the map.
     pub size: u32,
+    /// Samples of depth in each texel, of which the map is made: 4 or 1.
+    #[serde(default = "four")]
+    pub multisampling: u32,
     /// Taps of the filter along an axis; 1: none.
     pub filter: u32,
     /// What the map holds: `scene` or `camera`. The latter's light has to follow the camera.
@@ -115,6 +118,10 @@ pub struct Shadow {
 
 const fn one() -> u32 {
     1
+}
+
+const fn four() -> u32 {
+    4
 }
 
 /// How a medium's light is made, as scene files say it.

@@ -37,6 +37,7 @@ pub fn export(scene: &Scene, file: &str, mesh: &Mesh) -> Result<Draft> {
         format: shadow.map.format.name().into(),
         depth_range: shadow.map.depth_range.name().into(),
         size: shadow.size,
+        multisampling: shadow.multisampling,
         filter: shadow.filter,
         fit: shadow.fit.name().into(),
         samples: shadow.samples,
@@ -93,6 +94,7 @@ pub fn recorded(shadow: &frame::Shadow) -> Option<Shadow> {
     let fit = [Fit::Scene, Fit::Camera];
     Some(Shadow {
         size: shadow.size,
+        multisampling: shadow.multisampling,
         filter: shadow.filter,
         fit: fit.into_iter().find(|fit| fit.name() == shadow.fit)?,
         mips: shadow.mips,

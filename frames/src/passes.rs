@@ -101,7 +101,11 @@ pub const TRANSLUCENT: &str = "shadow of translucent casters";
 pub const CANNOT_BLEND_FLOATS: &str =
     "not every device can blend 32-bit floats: a map of 16 bits shows it";
 
-/// Depth as the light sees it, of opaque casters only.
+/// Why maps of depths with one sample hold opaque casters only.
+pub const CANNOT_BLEND_ONE: &str =
+    "they are blended into all samples of a map: `multisampling = 4` shows it";
+
+/// Depth as the light sees it, of opaque casters only, with as many samples as the scene asks for.
 ///
 /// # Errors
 /// [`crate::graph::GraphError`], as of all functions here.
@@ -128,11 +132,15 @@ pub fn opaque_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
         indices: given.indices,
         clip_from_world: given.light_view,
     };
-    graph
+    let size = [given.shadow.size; 2];
+    let pass = graph
         .draw("depth", surfaces, "light_depth")
         .arg("position", given.positions)
-        .arg("light", given.light_view)
-        .depth([given.shadow.size; 2])
+        .arg("light", given.light_view);
+    match given.shadow.multisampling {
+        1 => pass.single_depth(size),
+        _ => pass.depth(size),
+    }
 }
 
 /// Depth as the camera sees it.
@@ -204,9 +212,7 @@ pub fn moments(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Handle
         encoding::SYMMETRIC => "resolve_symmetric",
         _ => "resolve_plain",
     };
-    resolve(graph, given, kernel)
-        .arg("depth", depth)
-        .image([given.shadow.size; 2])
+    resolve_depth(graph, given, kernel, depth).image([given.shadow.size; 2])
 }
 
 /// The map of four power moments, as one of [`POWER_MOMENTS`], of opaque and translucent casters. The latter are
@@ -220,8 +226,13 @@ pub fn moment_map(graph: &mut Graph, given: &Given) -> Result<Handle> {
         return moments(graph, given, depth);
     };
     let encoding = given.shadow.map.encoding;
-    if encoding == encoding::PLAIN {
-        graph.omit(TRANSLUCENT, CANNOT_BLEND_FLOATS);
+    let cannot = match given.shadow.multisampling {
+        _ if encoding == encoding::PLAIN => Some(CANNOT_BLEND_FLOATS),
+        1 => Some(CANNOT_BLEND_ONE),
+        _ => None,
+    };
+    if let Some(why) = cannot {
+        graph.omit(TRANSLUCENT, why);
         let depth = opaque_depth(graph, given)?;
         return moments(graph, given, depth);
     }
@@ -335,6 +346,23 @@ pub fn resolve<'g>(
     graph.compute("resolve", kernel)
 }
 
+/// Begins the pass that makes a map of nothing but the light's depths, by the kernel `resolve_…` for several samples or
+/// by its counterpart `resolve_single_…` for one, as `depth` has them.
+pub fn resolve_depth<'g>(
+    graph: &'g mut Graph,
+    given: &Given,
+    kernel: impl Into<Cow<'static, str>>,
+    depth: Handle,
+) -> AddCompute<'g> {
+    let shape = graph.value(depth).map(|value| &value.shape);
+    let is_single = matches!(shape, Some(Shape::Texture(shape)) if shape.samples == 1);
+    let kernel = match kernel.into() {
+        several if is_single => several.replacen("resolve_", "resolve_single_", 1).into(),
+        several => several,
+    };
+    resolve(graph, given, kernel).arg("depth", depth)
+}
+
 /// The filtered maps that `kernel` makes of the light's depths: a texture for each of `names`, which are those of the
 /// parameters that it is looked up by.
 ///
@@ -348,7 +376,7 @@ pub fn filtered_maps(
 ) -> Result<Vec<(&'static str, Handle)>> {
     let depth = light_depth(graph, given)?;
     let size = [given.shadow.size, given.shadow.size, 1];
-    let pass = resolve(graph, given, kernel).arg("depth", depth);
+    let pass = resolve_depth(graph, given, kernel, depth);
     let pass = names.iter().fold(pass, |pass, _| pass.texels(size));
     let maps = pass.finish()?.outputs;
     names

@@ -28,7 +28,7 @@ use crate::passes::gaussian;
 use crate::picture::Picture;
 use crate::scene::{Light, LightView, Mesh, Scene, Source};
 use crate::visibility::SAMPLES;
-use crate::visibility::cast::{Caster, Lens, SAMPLES as AT, Segment, in_bands};
+use crate::visibility::cast::{Caster, Lens, Segment, in_bands, places};
 use crate::visibility::fragments::{Fragments, Varying};
 
 /// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is. Or the share of light
@@ -301,9 +301,15 @@ impl Layers {
         })
     }
 
-    /// Depth and opacity of all surfaces in each sample of a map.
-    fn of_samples(&self, lens: &Lens, clip: &[Vec4], size: u32) -> Vec<Vec<[f32; 2]>> {
-        let row_len = (size * SAMPLES) as usize;
+    /// Depth and opacity of all surfaces at each of these places in every texel of a map.
+    fn of_samples(
+        &self,
+        lens: &Lens,
+        clip: &[Vec4],
+        size: u32,
+        places: &[[f64; 2]],
+    ) -> Vec<Vec<[f32; 2]>> {
+        let row_len = size as usize * places.len();
         let mut all = vec![Vec::new(); row_len * size as usize];
         in_bands(
             &mut all,
@@ -311,8 +317,8 @@ impl Layers {
             &mut |_| (),
             |y, row: &mut [Vec<[f32; 2]>]| {
                 for (i, sample) in row.iter_mut().enumerate() {
-                    let texel = [i as u32 / SAMPLES, y as u32];
-                    let segment = lens.segment(texel, AT[i % AT.len()]);
+                    let texel = [(i / places.len()) as u32, y as u32];
+                    let segment = lens.segment(texel, places[i % places.len()]);
                     let surface = |hit| {
                         let opacity = self.caster.at(&segment, hit, &self.opacities);
                         [self.caster.depth(&segment, hit, clip), opacity]
@@ -449,6 +455,8 @@ pub fn by_rays(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arri
 /// Depth samples of the light's map, and a filter over them.
 struct Filter {
     size: i64,
+    /// Samples of a texel.
+    samples: usize,
     depths: Vec<f32>,
     /// Depth and opacity of the translucent surfaces in each sample; empty without any.
     translucent: Vec<Vec<[f32; 2]>>,
@@ -467,18 +475,20 @@ impl Filter {
     ) -> Self {
         let size = scene.shadow.size;
         let from_light = transform(view.clip_from_world);
-        let places = mesh.positions.iter();
-        let clip: Vec<Vec4> = places.map(|p| from_light.apply(*p)).collect();
+        let vertices = mesh.positions.iter();
+        let clip: Vec<Vec4> = vertices.map(|p| from_light.apply(*p)).collect();
         let lens = Lens::new(view.clip_from_world, size, size);
         let half = gaussian(scene.shadow.filter);
         let weights = half[1..].iter().rev().chain(&half).map(|w| f64::from(*w));
         let weights: Vec<f64> = weights.collect();
         let sum: f64 = weights.iter().sum();
+        let places = places(scene.shadow.multisampling);
         Self {
             size: i64::from(size),
+            samples: places.len(),
             translucent: Layers::of(mesh)
-                .map_or_else(Vec::new, |t| t.of_samples(&lens, &clip, size)),
-            depths: caster.depths(&lens, &clip, [size; 2], advance),
+                .map_or_else(Vec::new, |t| t.of_samples(&lens, &clip, size, places)),
+            depths: caster.depths(&lens, &clip, [size; 2], places, advance),
             weights: weights.iter().map(|w| w / sum).collect(),
         }
     }
@@ -499,18 +509,17 @@ impl Filter {
     fn around(&self, x: i64, y: i64, z: f32) -> f64 {
         let radius = self.weights.len() as i64 / 2;
         let within = |i: i64| i.clamp(0, self.size - 1);
-        let samples = SAMPLES as usize;
         let mut sum = 0.0;
         for (dy, wy) in (-radius..).zip(&self.weights) {
             for (dx, wx) in (-radius..).zip(&self.weights) {
                 let texel = within(y + dy) * self.size + within(x + dx);
-                let first = texel as usize * samples;
-                let samples = first..first + samples;
+                let first = texel as usize * self.samples;
+                let samples = first..first + self.samples;
                 let shadows = samples.map(|sample| self.shadow(sample, z)).sum::<f64>();
                 sum += wy * wx * shadows;
             }
         }
-        sum / f64::from(SAMPLES)
+        sum / self.samples as f64
     }
 
     /// The same between the four nearest texels, as a sampler interpolates.
@@ -672,6 +681,7 @@ mod tests {
         depths.extend([0.9; 8]);
         let mut filter = Filter {
             size: 2,
+            samples: SAMPLES as usize,
             depths,
             translucent: Vec::new(),
             weights: vec![1.0],

@@ -14,7 +14,8 @@ use hankel_host::device::slots;
 use hankel_host::device::{Backend, open};
 use hankel_host::parity::compare::Kind;
 
-/// Scenes with every image pass: each technique with each of its maps, mip levels, glass, several lights.
+/// Scenes with every image pass: each technique with each of its maps, of four samples of depth and of one, mip levels,
+/// glass, several lights.
 fn scenes() -> Vec<(String, Scene)> {
     let plain = "procedural = 'box'";
     let mut all = Vec::new();
@@ -51,7 +52,10 @@ fn scenes() -> Vec<(String, Scene)> {
                 map.format.name(),
                 map.depth_range.name()
             );
-            add(plain, shadow, one);
+            add(plain, shadow.clone(), one);
+            if technique.resolves {
+                add(plain, format!("{shadow}\nmultisampling = 1"), one);
+            }
         }
     }
     for technique in ["hamburger", "convolution", "esm", "evsm4"] {

@@ -88,6 +88,7 @@ fn every_field_is_read() {
         [shadow]
         technique = "hausdorff"
         size = 512
+        multisampling = 1
         depth_range = "unit"
         format = "rgba16unorm"
         filter = 9
@@ -143,6 +144,7 @@ fn every_field_is_read() {
         Shadow {
             technique: Technique::named("hausdorff").unwrap(),
             size: 512,
+            multisampling: 1,
             map,
             filter: 9,
             fit: Fit::Camera,
@@ -406,6 +408,14 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         (
             LEAST.replace("eye = [3, 4, 5]", "fov = 0.5\neye = [3, 4, 5]"),
             &["`camera.fov` is 0.5"],
+        ),
+        (
+            format!("{LEAST}[shadow]\nmultisampling = 2\n"),
+            &["`shadow.multisampling` is 2", "4 or 1"],
+        ),
+        (
+            format!("{LEAST}[shadow]\ntechnique = 'soft'\nmultisampling = 1\n"),
+            &["`shadow.multisampling` is 1", "`soft` looks at all samples"],
         ),
         (LEAST.replace("[light]", ""), &["direction"]),
         ("geometry = ".into(), &["scene.toml:1"]),

@@ -91,6 +91,38 @@ fn lower_bounds_are_nowhere_darker_than_all_samples_filtered() {
     }
 }
 
+/// The same of depths with one sample in each texel.
+#[test]
+fn lower_bounds_of_single_samples_are_nowhere_darker() {
+    let mut truths: Vec<Arriving> = Vec::new();
+    for bias in ["", "depth_bias = 0.002"] {
+        let mut all: Vec<(f32, Arriving)> = Vec::new();
+        let techniques = techniques::ALL.iter();
+        for t in techniques.filter(|t| t.is_lower_bound && t.resolves) {
+            for map in t.maps {
+                let settings = format!("{}\n{bias}\nmultisampling = 1", with_map(t.name, map));
+                let (scene, mesh) = scene("box", 256, &settings);
+                let bias = scene.shadow.depth_bias;
+                if !all.iter().any(|(b, _)| *b == bias) {
+                    all.push((bias, filtered(&scene, &mesh, &mut |_| ())));
+                }
+                let truth = all.iter().find(|(b, _)| *b == bias).map(|(_, t)| t);
+                let by = darker(&technique(&scene, &mesh), truth.unwrap());
+                println!("{settings:?}: darker by {by}");
+                assert!(
+                    by <= allowed(t.name, &scene.shadow),
+                    "{settings:?}: darker by {by}"
+                );
+            }
+        }
+        truths.extend(all.into_iter().map(|(_, truth)| truth));
+    }
+    // It is another truth than that of four samples.
+    let (scene, mesh) = scene("box", 256, "depth_bias = 0.002");
+    let four = filtered(&scene, &mesh, &mut |_| ());
+    assert!(truths.iter().all(|truth| *truth.values != *four.values));
+}
+
 /// The kernel does in single precision what the truth does in double precision.
 #[test]
 fn filtering_comparisons_of_all_samples_is_the_truth() {

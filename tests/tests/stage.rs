@@ -103,7 +103,13 @@ fn filters_run_in_webgl_2() {
             Some(why) => assert!(why.contains("no multisampled textures"), "{name}: {why}"),
         }
     }
-    for name in ["blur_fragment", "halve_fragment", "blur_packed_10_fragment"] {
+    for name in [
+        "blur_fragment",
+        "halve_fragment",
+        "blur_packed_10_fragment",
+        "resolve_single_symmetric_fragment",
+        "resolve_single_packed_10_fragment",
+    ] {
         assert!(kernels[name].languages.contains_key(&Essl300), "{name}");
     }
     assert!(kernels["full_screen"].languages.contains_key(&Essl300));

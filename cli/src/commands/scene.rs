@@ -81,14 +81,7 @@ impl Asked<'_> {
 /// its own.
 pub fn with_technique(shadow: Shadow, name: &str) -> Result<Shadow> {
     let technique = technique(name)?;
-    Ok(Shadow {
-        size: shadow.size,
-        filter: shadow.filter,
-        fit: shadow.fit,
-        mips: shadow.mips,
-        anisotropy: shadow.anisotropy,
-        ..Shadow::of(technique, technique.maps[0])
-    })
+    Ok(shadow.by(technique, technique.maps[0]))
 }
 
 /// The files that a scene is read from.

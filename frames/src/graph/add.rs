@@ -500,6 +500,18 @@ impl AddDraw<'_> {
     /// # Errors
     /// [`GraphError`]; the graph is then as it was.
     pub fn depth(self, [width, height]: [u32; 2]) -> Result<Handle> {
+        self.depth_alone(TextureShape::depth(width, height).multisampled(SAMPLES))
+    }
+
+    /// Adds the pass: depth alone, one sample in the middle of each texel.
+    ///
+    /// # Errors
+    /// [`GraphError`]; the graph is then as it was.
+    pub fn single_depth(self, [width, height]: [u32; 2]) -> Result<Handle> {
+        self.depth_alone(TextureShape::depth(width, height))
+    }
+
+    fn depth_alone(self, shape: TextureShape) -> Result<Handle> {
         if let Some(fragment) = &self.fragment {
             let place = fragment.place(&self.label);
             return Err(place.kernel("depth is drawn without a fragment kernel: leave it out"));
@@ -510,7 +522,6 @@ impl AddDraw<'_> {
                 problem: "depth is not blended: leave `blend` and `before` out".into(),
             });
         }
-        let shape = TextureShape::depth(width, height).multisampled(SAMPLES);
         self.finish(shape, |depth| Target::Depth { depth })
     }
 

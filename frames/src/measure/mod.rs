@@ -128,9 +128,7 @@ impl Configuration {
                 size: self.size,
                 filter: self.filter,
                 fit: self.fit,
-                mips: scene.shadow.mips,
-                anisotropy: scene.shadow.anisotropy,
-                ..Shadow::of(self.technique, self.map)
+                ..scene.shadow.by(self.technique, self.map)
             },
             ..scene.clone()
         }

@@ -4,6 +4,8 @@
 use super::Scattering;
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, Volume, light_depth, scatter};
+use crate::scene::Shadow;
+use crate::visibility::SAMPLES;
 
 pub const TECHNIQUE: Scattering = Scattering {
     name: "ray-marching",
@@ -14,7 +16,15 @@ pub const TECHNIQUE: Scattering = Scattering {
 };
 
 fn add(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -> Result<Handle> {
-    let depth = light_depth(graph, given)?;
+    // The kernel looks at the first of several samples, whatever a map is made of.
+    let several = Given {
+        shadow: Shadow {
+            multisampling: SAMPLES,
+            ..given.shadow
+        },
+        ..*given
+    };
+    let depth = light_depth(graph, &several)?;
     let kernel = if given.is_spot {
         "scatter_march_spot"
     } else {

@@ -74,6 +74,7 @@ use serde::Deserialize;
 use crate::graph::ImagePasses;
 use crate::scattering::{self, Scattering};
 use crate::techniques::{self, Map, Technique};
+use crate::visibility::SAMPLES;
 
 pub use error::{Place, Result, SceneError};
 pub use light::{Area, AreaShape, Light, Source, Spot};
@@ -216,6 +217,9 @@ pub struct Shadow {
     pub technique: &'static Technique,
     /// Texels along an edge of the map, 16 to [`Scene::MAX_MAP`].
     pub size: u32,
+    /// Samples of depth in each texel, of which the map is made: [`SAMPLES`], or 1 if the technique resolves them
+    /// ([`Technique::resolves`]).
+    pub multisampling: u32,
     /// How its map is stored, one of the technique's.
     pub map: Map,
     /// Taps of the Gaussian along an axis: odd, 1 (no filter) to [`Scene::MAX_FILTER`].
@@ -253,6 +257,7 @@ impl Shadow {
         Self {
             technique,
             size: 1024,
+            multisampling: SAMPLES,
             map,
             filter: 7,
             fit: Fit::Scene,
@@ -262,6 +267,25 @@ impl Shadow {
             leak_cut: 0.02,
             mips: false,
             anisotropy: 1,
+        }
+    }
+
+    /// These shadows by another technique: what is said of biases and of soft shadows is as that one has it, and so
+    /// are its samples of depth where it needs several.
+    #[must_use]
+    pub const fn by(self, technique: &'static Technique, map: Map) -> Self {
+        Self {
+            size: self.size,
+            multisampling: if technique.resolves {
+                self.multisampling
+            } else {
+                SAMPLES
+            },
+            filter: self.filter,
+            fit: self.fit,
+            mips: self.mips,
+            anisotropy: self.anisotropy,
+            ..Self::of(technique, map)
         }
     }
 }

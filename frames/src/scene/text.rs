@@ -116,6 +116,7 @@ struct MediumText {
 struct ShadowText {
     technique: Option<Spanned<String>>,
     size: Option<Spanned<i64>>,
+    multisampling: Option<Spanned<i64>>,
     depth_range: Option<Spanned<DepthRange>>,
     format: Option<Spanned<String>>,
     filter: Option<Spanned<i64>>,
@@ -425,6 +426,24 @@ impl Reader<'_> {
         if filter.is_multiple_of(2) {
             return self.refuse(filter_span, "shadow.filter", filter, "odd");
         }
+        let multisampling = match s.multisampling {
+            Some(n) => {
+                let allowed = match (technique.resolves, *n.get_ref()) {
+                    (_, 4) | (true, 1) => None,
+                    (true, _) => Some("4 or 1".into()),
+                    (false, 1) => Some(format!(
+                        "4: `{}` looks at all samples itself; one is for techniques that resolve them to a map",
+                        technique.name
+                    )),
+                    (false, _) => Some("4".into()),
+                };
+                if let Some(allowed) = allowed {
+                    return self.refuse(n.span(), "shadow.multisampling", n.get_ref(), allowed);
+                }
+                *n.get_ref() as u32
+            }
+            None => d.multisampling,
+        };
         let samples = match s.samples {
             Some(counts) => {
                 let [search, filter] = counts
@@ -445,6 +464,7 @@ impl Reader<'_> {
         let bias = 0.0..=0.1;
         Ok(Shadow {
             samples,
+            multisampling,
             size: self.integer("shadow.size", s.size, d.size, 16..=Scene::MAX_MAP)?,
             filter,
             fit: s.fit,

@@ -5,7 +5,7 @@ use hankel_dsl::native::describe::TexelFormat;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{DEPTHS, Given, blur, light_depth, resolve, shade_filtered};
+use crate::passes::{DEPTHS, Given, blur, light_depth, resolve_depth, shade_filtered};
 
 /// The authors' own for 32-bit floats, of which the largest is exp(88): what is left is room for sums.
 const EXPONENT: f32 = 80.0;
@@ -20,6 +20,7 @@ pub const TECHNIQUE: Technique = Technique {
         ..DEPTHS[0]
     }],
     is_lower_bound: true,
+    resolves: true,
     is_soft: false,
     add,
 };
@@ -27,8 +28,7 @@ pub const TECHNIQUE: Technique = Technique {
 fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let exponent = graph.constant("exponent", &EXPONENT);
     let depth = light_depth(graph, given)?;
-    let map = resolve(graph, given, "resolve_esm")
-        .arg("depth", depth)
+    let map = resolve_depth(graph, given, "resolve_esm", depth)
         .arg("exponent", exponent)
         .image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;

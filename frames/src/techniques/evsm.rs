@@ -6,7 +6,7 @@ use hankel_shadows::exponential::Exponents;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, blur, light_depth, resolve, shade_filtered};
+use crate::passes::{Given, blur, light_depth, resolve_depth, shade_filtered};
 use crate::scene::DepthRange;
 
 /// By `Map::encoding`: what is usual for 32-bit floats, and the most of which 16 bits hold the square.
@@ -46,6 +46,7 @@ pub const POSITIVE: Technique = Technique {
     depth_bias: 0.0,
     maps: MAPS,
     is_lower_bound: true,
+    resolves: true,
     is_soft: false,
     add: |graph, given| add(graph, given, 1),
 };
@@ -62,8 +63,7 @@ fn add(graph: &mut Graph, given: &Given, warps: u32) -> Result<Handle> {
     let exponents = graph.constant("exponents", &EXPONENTS[map.encoding as usize]);
     let depth = light_depth(graph, given)?;
     let kernel = format!("resolve_evsm_{}", map.format.name());
-    let map = resolve(graph, given, kernel)
-        .arg("depth", depth)
+    let map = resolve_depth(graph, given, kernel, depth)
         .arg("exponents", exponents)
         .image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;

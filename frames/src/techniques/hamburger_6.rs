@@ -9,8 +9,8 @@ use hankel_shadows::shade::encoding;
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{
-    CANNOT_BLEND_FLOATS, Given, TRANSLUCENT, blended_halves, blur, opaque_depth, resolve, shade,
-    shade_filtered, taps_along,
+    CANNOT_BLEND_FLOATS, CANNOT_BLEND_ONE, Given, TRANSLUCENT, blended_halves, blur, opaque_depth,
+    resolve, resolve_depth, shade, shade_filtered, taps_along,
 };
 use crate::scene::DepthRange;
 
@@ -30,6 +30,7 @@ pub const TECHNIQUE: Technique = Technique {
         map(TexelFormat::Rg32Uint, WORDS[1].encoding, WORDS[1].bias),
     ],
     is_lower_bound: true,
+    resolves: true,
     is_soft: false,
     add,
 };
@@ -97,9 +98,10 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         None => ("resolve_symmetric_6", 2, SYMMETRIC_6_16),
     };
     let depth = opaque_depth(graph, given)?;
+    let is_single = given.shadow.multisampling == 1;
     let size = [given.shadow.size, given.shadow.size, 1];
     let pass = match &given.translucent {
-        Some(translucent) if encoding == encoding::SYMMETRIC => {
+        Some(translucent) if encoding == encoding::SYMMETRIC && !is_single => {
             let blend = "translucent_moments_6";
             let [first, second] = blended_halves(graph, given, translucent, depth, blend, &[])?;
             resolve(graph, given, "resolve_translucent_6")
@@ -110,12 +112,13 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         Some(_) => {
             let why = match words {
                 Some(_) => "no device blends words: a map in `rgba16unorm` shows it",
+                None if encoding == encoding::SYMMETRIC => CANNOT_BLEND_ONE,
                 None => CANNOT_BLEND_FLOATS,
             };
             graph.omit(TRANSLUCENT, why);
-            resolve(graph, given, kernel).arg("depth", depth)
+            resolve_depth(graph, given, kernel, depth)
         }
-        None => resolve(graph, given, kernel).arg("depth", depth),
+        None => resolve_depth(graph, given, kernel, depth),
     };
     let maps = (0..textures)
         .fold(pass, |pass, _| pass.texels(size))

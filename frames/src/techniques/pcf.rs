@@ -17,6 +17,7 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: false,
+    resolves: false,
     is_soft: false,
     add,
 };

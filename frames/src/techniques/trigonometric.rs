@@ -6,7 +6,7 @@ use hankel_shadows::trigonometric::encoding;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, blur, light_depth, resolve, shade_filtered};
+use crate::passes::{Given, blur, light_depth, resolve_depth, shade_filtered};
 use crate::scene::DepthRange;
 
 pub const TECHNIQUE: Technique = Technique {
@@ -27,6 +27,7 @@ pub const TECHNIQUE: Technique = Technique {
         ),
     ],
     is_lower_bound: true,
+    resolves: true,
     is_soft: false,
     add,
 };
@@ -49,9 +50,7 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         _ => "resolve_trigonometric_unorm",
     };
     let depth = light_depth(graph, given)?;
-    let map = resolve(graph, given, kernel)
-        .arg("depth", depth)
-        .image([given.shadow.size; 2])?;
+    let map = resolve_depth(graph, given, kernel, depth).image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;
     shade_filtered(
         graph,

@@ -14,6 +14,7 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 1e-3,
     maps: &[SUMMED],
     is_lower_bound: false,
+    resolves: false,
     is_soft: true,
     add,
 };

@@ -30,6 +30,18 @@ pub const SAMPLES: [[f64; 2]; 4] = [
     [0.625, 0.875],
 ];
 
+/// Where the sample of a texel lies that has one.
+const MIDDLE: [[f64; 2]; 1] = [[0.5, 0.5]];
+
+/// Where the samples of a pixel or texel lie that has one, or as many as [`SAMPLES`].
+#[must_use]
+pub const fn places(samples: u32) -> &'static [[f64; 2]] {
+    match samples {
+        1 => &MIDDLE,
+        _ => &SAMPLES,
+    }
+}
+
 /// Places along a segment that are no farther apart than this share of it are one, if the triangles there are
 /// neighbours.
 const SAME: f64 = 1e-9;
@@ -314,22 +326,23 @@ impl Caster {
         hits.map(passes).product()
     }
 
-    /// The depth in every sample of a map: 1 where nothing is. `clip` is where the vertices go in
-    /// clip space, `lens` the same transform; `advance` is told the share that is done.
+    /// The depth at each of these places in every texel of a map: 1 where nothing is. `clip` is where the vertices go
+    /// in clip space, `lens` the same transform; `advance` is told the share that is done.
     #[must_use]
     pub fn depths(
         &self,
         lens: &Lens,
         clip: &[Vec4],
         [width, height]: [u32; 2],
+        places: &[[f64; 2]],
         advance: &mut dyn FnMut(f32),
     ) -> Vec<f32> {
-        let row_len = width as usize * SAMPLES.len();
+        let row_len = width as usize * places.len();
         let mut depths = vec![1.0; row_len * height as usize];
         in_bands(&mut depths, row_len, advance, |y, row: &mut [f32]| {
-            for (x, texel) in row.chunks_mut(SAMPLES.len()).enumerate() {
-                for (depth, at) in texel.iter_mut().zip(SAMPLES) {
-                    let segment = lens.segment([x as u32, y as u32], at);
+            for (x, texel) in row.chunks_mut(places.len()).enumerate() {
+                for (depth, at) in texel.iter_mut().zip(places) {
+                    let segment = lens.segment([x as u32, y as u32], *at);
                     if let Some(hit) = self.first(&segment) {
                         *depth = self.depth(&segment, hit, clip);
                     }
@@ -439,7 +452,13 @@ mod tests {
             assert!(share > done);
             done = share;
         };
-        let depths = Caster::of(&mesh).depths(&Lens::new(view, 8, 8), &clip, [8, 8], &mut advance);
+        let depths = Caster::of(&mesh).depths(
+            &Lens::new(view, 8, 8),
+            &clip,
+            [8, 8],
+            &SAMPLES,
+            &mut advance,
+        );
         assert_eq!(done, 1.0);
         for (i, texel) in depths.chunks(4).enumerate() {
             for (depth, at) in texel.iter().zip(SAMPLES) {

@@ -11,7 +11,7 @@ use hankel_dsl::native::describe::{Kernel, Output, Role, TexelFormat};
 use hankel_host::device::slots::{POSITION, type_bytes};
 use hankel_host::device::{Bind, Blend, BufferId, Device, Program};
 
-use super::cast::{Caster, Lens, SAMPLES};
+use super::cast::{Caster, Lens, SAMPLES, places};
 use super::fragments::{Fragments, Varying};
 use super::{Draw, FullScreen, Onto, Stage};
 use crate::error::{FrameError, Result, during};
@@ -99,7 +99,8 @@ impl Rays {
                 let position = vertices.first().map_or(&[][..], Vec::as_slice);
                 let clip: Vec<Vec4> = bytemuck::pod_collect_to_vec(position);
                 let caster = self.caster(draw)?;
-                let depths = caster.depths(&lens, &clip, [width, height], advance);
+                let places = places(draw.shape.samples);
+                let depths = caster.depths(&lens, &clip, [width, height], places, advance);
                 device
                     .write_texture(texture, bytemuck::cast_slice(&depths))
                     .map_err(during(draw.label))?;

@@ -11,7 +11,7 @@ use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Element, Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{OddHarmonics, fourier_light};
 
-use crate::resolve::mean;
+use crate::resolve::{Depths, resolves};
 use crate::shade::Light;
 
 /// What each term counts for.
@@ -123,70 +123,77 @@ fn shadow_8(
     1.0 - fourier_light(first.sum(series.low, low) + second.sum(series.high, high))
 }
 
-/// Resolves to textures of one format; drivers may round a tie either way.
-macro_rules! resolves {
-    ($format:ident, $step:literal, $why:literal;
-     $(#[$doc:meta])* $four:ident, forms($($form:tt)*),
-     $(#[$doc_8:meta])* $eight:ident, forms($($form_8:tt)*)) => {
-        $(#[$doc])*
-        #[kernel(
-            compute,
-            threads(8, 8),
-            outputs($format, $format),
-            forms($($form)*),
-            inputs = crate::inputs::maps::depths,
-            parity(ulp = 0, absolute = $step, why = $why)
-        )]
-        pub fn $four(
-            #[index] at: UVec2,
-            #[constant(id = 0, default = 4)]
-            #[values(1, 4)]
-            samples: u32,
-            #[texture] depth: Texture2dMultisampled<'_>,
-        ) -> (Vec4, Vec4) {
-            let terms = mean(depth, at, samples, low);
-            (terms.cosines, terms.sines)
-        }
+/// Means of a texel's cosines and sines of four terms.
+#[inline(always)]
+fn mean_4(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let terms = depth.mean(at, samples, low);
+    (terms.cosines, terms.sines)
+}
 
-        $(#[$doc_8])*
-        #[kernel(
-            compute,
-            threads(8, 8),
-            outputs($format, $format, $format, $format),
-            forms($($form_8)*),
-            inputs = crate::inputs::maps::depths,
-            parity(ulp = 0, absolute = $step, why = $why)
-        )]
-        pub fn $eight(
-            #[index] at: UVec2,
-            #[constant(id = 0, default = 4)]
-            #[values(1, 4)]
-            samples: u32,
-            #[texture] depth: Texture2dMultisampled<'_>,
-        ) -> (Vec4, Vec4, Vec4, Vec4) {
-            let first = mean(depth, at, samples, low);
-            let second = mean(depth, at, samples, high);
-            (first.cosines, first.sines, second.cosines, second.sines)
-        }
-    };
+/// The same of eight.
+#[inline(always)]
+fn mean_8(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4, Vec4, Vec4) {
+    let first = depth.mean(at, samples, low);
+    let second = depth.mean(at, samples, high);
+    (first.cosines, first.sines, second.cosines, second.sines)
 }
 
 resolves! {
-    rgba8unorm, 4e-3,
-    "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step";
     /// Means of a texel's cosines and sines of four terms, in 8 bits.
-    resolve_convolution_rgba8unorm, forms(fragment),
-    /// Means of a texel's cosines and sines of eight terms, in 8 bits: of terms 1 to 4, then of terms 5 to 8.
-    resolve_convolution_8_rgba8unorm, forms(fragment)
+    resolve_convolution_rgba8unorm,
+    resolve_single_convolution_rgba8unorm,
+    mean_4() -> (Vec4, Vec4),
+    outputs(rgba8unorm, rgba8unorm),
+    forms(fragment),
+    inputs = crate::inputs::maps::depths,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
+    )
 }
 
 resolves! {
-    rgba16unorm, 1.6e-5,
-    "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step";
+    /// Means of a texel's cosines and sines of eight terms, in 8 bits: of terms 1 to 4, then of terms 5 to 8.
+    resolve_convolution_8_rgba8unorm,
+    resolve_single_convolution_8_rgba8unorm,
+    mean_8() -> (Vec4, Vec4, Vec4, Vec4),
+    outputs(rgba8unorm, rgba8unorm, rgba8unorm, rgba8unorm),
+    forms(fragment),
+    inputs = crate::inputs::maps::depths,
+    parity(
+        ulp = 0,
+        absolute = 4e-3,
+        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
+    )
+}
+
+resolves! {
     /// Means of a texel's cosines and sines of four terms, in 16 bits.
-    resolve_convolution_rgba16unorm, forms(fragment = resolve_convolution_rgba8unorm),
+    resolve_convolution_rgba16unorm [fragment = resolve_convolution_rgba8unorm],
+    resolve_single_convolution_rgba16unorm [fragment = resolve_single_convolution_rgba8unorm],
+    mean_4() -> (Vec4, Vec4),
+    outputs(rgba16unorm, rgba16unorm),
+    inputs = crate::inputs::maps::depths,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+}
+
+resolves! {
     /// Means of a texel's cosines and sines of eight terms, in 16 bits: of terms 1 to 4, then of terms 5 to 8.
-    resolve_convolution_8_rgba16unorm, forms(fragment = resolve_convolution_8_rgba8unorm)
+    resolve_convolution_8_rgba16unorm [fragment = resolve_convolution_8_rgba8unorm],
+    resolve_single_convolution_8_rgba16unorm [fragment = resolve_single_convolution_8_rgba8unorm],
+    mean_8() -> (Vec4, Vec4, Vec4, Vec4),
+    outputs(rgba16unorm, rgba16unorm, rgba16unorm, rgba16unorm),
+    inputs = crate::inputs::maps::depths,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
 }
 
 shading! {

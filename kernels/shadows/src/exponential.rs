@@ -7,7 +7,7 @@ use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel, math};
 use hankel_moments::{markov_1, warped_2};
 
-use crate::resolve::mean;
+use crate::resolve::{Depths, resolves};
 use crate::shade::Light;
 
 /// Exponents of the two warps of exponential variance shadow maps, for depths moved to [-1, 1].
@@ -42,32 +42,37 @@ pub(crate) fn exponential(exponent: f32, z: f32) -> f32 {
     math::exp(Real::clamp(exponent, 0.0, 80.0) * Real::saturate(z))
 }
 
-/// Mean of a texel's `exp(exponent * z)`, depths z in [0, 1]: an exponential shadow map.
-#[kernel(
-    compute,
-    threads(8, 8),
+/// Mean of a texel's `exp(exponent * z)`.
+#[inline(always)]
+fn mean_exponential(depth: impl Depths, at: UVec2, samples: u32, exponent: &f32) -> f32 {
+    depth.mean(at, samples, |z| exponential(*exponent, z))
+}
+
+/// Means of a texel's two warps and of their squares.
+#[inline(always)]
+fn mean_warps(depth: impl Depths, at: UVec2, samples: u32, exponents: &Exponents) -> Vec4 {
+    depth.mean(at, samples, |z| {
+        let (positive, negative) = exponents.warp(z);
+        Vec4::new(positive, positive * positive, negative, negative * negative)
+    })
+}
+
+resolves! {
+    /// Mean of a texel's `exp(exponent * z)`, depths z in [0, 1]: an exponential shadow map.
+    resolve_esm, resolve_single_esm,
+    mean_exponential(
+        #[range(1.0..=80.0)]
+        exponent: &f32
+    ) -> f32,
     texture(r32float),
     forms(fragment),
     pinned,
     inputs = crate::inputs::maps::exponential_depths
-)]
-pub fn resolve_esm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[uniform]
-    #[range(1.0..=80.0)]
-    exponent: &f32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> f32 {
-    mean(depth, at, samples, |z| exponential(*exponent, z))
 }
 
-/// Means of a texel's two warps and of their squares: an exponential variance shadow map.
-#[kernel(
-    compute,
-    threads(8, 8),
+resolves! {
+    /// Means of a texel's two warps and of their squares: an exponential variance shadow map.
+    resolve_evsm, resolve_single_evsm, mean_warps(exponents: &Exponents) -> Vec4,
     texture(rgba16float, rgba32float),
     forms(fragment),
     pinned,
@@ -78,19 +83,6 @@ pub fn resolve_esm(
         non_finite,
         why = "rounding to 16 bits, up or down: one step; with exponents above 5.54 they overflow"
     )
-)]
-pub fn resolve_evsm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[uniform] exponents: &Exponents,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    mean(depth, at, samples, |z| {
-        let (positive, negative) = exponents.warp(z);
-        Vec4::new(positive, positive * positive, negative, negative * negative)
-    })
 }
 
 shading! {

@@ -3,7 +3,7 @@
 //!
 //! | pass | kernel |
 //! | --- | --- |
-//! | depth from the light, 4x multisampled | [`light_depth`](depth::light_depth) |
+//! | depth from the light | [`light_depth`](depth::light_depth) |
 //! | for image passes that are drawn: a triangle over all pixels | [`full_screen`](depth::full_screen) |
 //! | resolve to four moments, quantised | [`resolve_unit`](resolve::resolve_unit), [`resolve_symmetric`](resolve::resolve_symmetric), [`resolve_plain`](resolve::resolve_plain) |
 //! | to six | [`resolve_symmetric_6`](six::resolve_symmetric_6), [`resolve_plain_6`](six::resolve_plain_6) |
@@ -27,6 +27,8 @@
 //! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march), [`scatter_march_spot`](scattering::scatter_march_spot) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
+//!
+//! Resolves of depths with one sample in each texel are called `resolve_single_…`.
 //!
 //! Passes that give a texel for each index have a fragment form, too, if their `#[kernel]` says `forms(fragment)`:
 //! `NAME_fragment`, one for all formats.
@@ -67,26 +69,43 @@ hankel_dsl::kernels![
     depth::light_depth,
     depth::full_screen,
     resolve::resolve_unit,
+    resolve::resolve_single_unit,
     resolve::resolve_symmetric,
+    resolve::resolve_single_symmetric,
     resolve::resolve_plain,
+    resolve::resolve_single_plain,
     six::resolve_symmetric_6,
+    six::resolve_single_symmetric_6,
     six::resolve_plain_6,
+    six::resolve_single_plain_6,
     trigonometric::resolve_trigonometric_unorm,
+    trigonometric::resolve_single_trigonometric_unorm,
     trigonometric::resolve_trigonometric_plain,
+    trigonometric::resolve_single_trigonometric_plain,
     moment_maps::resolve_plain_8,
+    moment_maps::resolve_single_plain_8,
     moment_maps::resolve_plain_10,
+    moment_maps::resolve_single_plain_10,
     convolution::resolve_convolution_rgba8unorm,
+    convolution::resolve_single_convolution_rgba8unorm,
     convolution::resolve_convolution_rgba16unorm,
+    convolution::resolve_single_convolution_rgba16unorm,
     convolution::resolve_convolution_8_rgba8unorm,
+    convolution::resolve_single_convolution_8_rgba8unorm,
     convolution::resolve_convolution_8_rgba16unorm,
+    convolution::resolve_single_convolution_8_rgba16unorm,
     exponential::resolve_esm,
+    exponential::resolve_single_esm,
     exponential::resolve_evsm,
+    exponential::resolve_single_evsm,
     blur::blur,
     blur::blur_rgba8unorm,
     blur::blur_rgba16float,
     blur::blur_r32float,
     packed::resolve_packed_10,
+    packed::resolve_single_packed_10,
     packed::resolve_packed_16,
+    packed::resolve_single_packed_16,
     packed::blur_packed_10,
     packed::blur_packed_16,
     mips::halve,

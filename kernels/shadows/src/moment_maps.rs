@@ -9,7 +9,7 @@ use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Sampler, Texture2d, Texture2dMultisampled, kernel};
 use hankel_moments::{MAX_MOMENTS, bias_target, bound, mix_bias};
 
-use crate::resolve::mean;
+use crate::resolve::{Depths, resolves};
 use crate::shade::Light;
 
 /// A texel of each texture.
@@ -56,41 +56,33 @@ fn powers(z: f32) -> Texels {
     }
 }
 
-/// Means of a texel's eight moments, depths moved to [-1, 1], as they are.
-#[kernel(
-    compute,
-    threads(8, 8),
-    outputs(rgba32float, rgba32float),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths
-)]
-pub fn resolve_plain_8(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4) {
-    let texels = mean(depth, at, samples, powers);
+/// Means of a texel's eight moments.
+#[inline(always)]
+fn mean_8(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let texels = depth.mean(at, samples, powers);
     (texels.odd, texels.even)
 }
 
-/// Means of a texel's ten moments, depths moved to [-1, 1], as they are.
-#[kernel(
-    compute,
-    threads(8, 8),
+/// Means of a texel's ten moments.
+#[inline(always)]
+fn mean_10(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4, Vec4) {
+    let texels = depth.mean(at, samples, powers);
+    (texels.odd, texels.even, texels.last)
+}
+
+resolves! {
+    /// Means of a texel's eight moments, depths moved to [-1, 1], as they are.
+    resolve_plain_8, resolve_single_plain_8, mean_8() -> (Vec4, Vec4),
+    outputs(rgba32float, rgba32float),
+    forms(fragment),
+    inputs = crate::inputs::maps::depths
+}
+
+resolves! {
+    /// Means of a texel's ten moments, depths moved to [-1, 1], as they are.
+    resolve_plain_10, resolve_single_plain_10, mean_10() -> (Vec4, Vec4, Vec4),
     outputs(rgba32float, rgba32float, rgba32float),
     inputs = crate::inputs::maps::depths
-)]
-pub fn resolve_plain_10(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4, Vec4) {
-    let texels = mean(depth, at, samples, powers);
-    (texels.odd, texels.even, texels.last)
 }
 
 /// The least shadow that moments 0 to 2N allow for a receiver's depth from 0 to 1. The bias mixes in

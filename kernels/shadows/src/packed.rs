@@ -12,6 +12,7 @@ use hankel_moments::{
 
 use crate::blur::Taps;
 use crate::grid::within;
+use crate::resolve::{Depths, resolves};
 use crate::shade::{Light, shade_with};
 use crate::six::quantized;
 
@@ -53,46 +54,38 @@ fn words_16(first: Vec4, second: Vec4) -> (u32, u32, u32) {
     )
 }
 
-/// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis: two words of three
-/// channels with 10 bits.
-#[kernel(
-    compute,
-    threads(8, 8),
-    texture(rg32uint),
-    forms(fragment),
-    pinned,
-    inputs = crate::inputs::maps::depths
-)]
-pub fn resolve_packed_10(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> UVec2 {
+/// Means of a texel's six moments in words of three channels with 10 bits.
+#[inline(always)]
+fn mean_10(depth: impl Depths, at: UVec2, samples: u32) -> UVec2 {
     let texels = quantized(depth, at, samples);
     words_10(texels.first, texels.second)
 }
 
-/// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis: three words of two
-/// channels with 16 bits.
-#[kernel(
-    compute,
-    threads(8, 8),
+/// The same in words of two channels with 16 bits.
+#[inline(always)]
+fn mean_16(depth: impl Depths, at: UVec2, samples: u32) -> (u32, u32, u32) {
+    let texels = quantized(depth, at, samples);
+    words_16(texels.first, texels.second)
+}
+
+resolves! {
+    /// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis: two words of three
+    /// channels with 10 bits.
+    resolve_packed_10, resolve_single_packed_10, mean_10() -> UVec2,
+    texture(rg32uint),
+    forms(fragment),
+    pinned,
+    inputs = crate::inputs::maps::depths
+}
+
+resolves! {
+    /// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis: three words of two
+    /// channels with 16 bits.
+    resolve_packed_16, resolve_single_packed_16, mean_16() -> (u32, u32, u32),
     outputs(r32uint, r32uint, r32uint),
     forms(fragment),
     pinned,
     inputs = crate::inputs::maps::depths
-)]
-pub fn resolve_packed_16(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (u32, u32, u32) {
-    let texels = quantized(depth, at, samples);
-    words_16(texels.first, texels.second)
 }
 
 /// One pass of a symmetric separable filter over two words of three channels with 10 bits: see

@@ -11,7 +11,7 @@ use hankel_moments::{
 };
 
 use crate::bounds::Shadow;
-use crate::resolve::mean;
+use crate::resolve::{Depths, resolves};
 use crate::shade::{Light, encoding};
 
 /// How six moments are turned into a shadow.
@@ -132,10 +132,40 @@ fn symmetric(z: f32) -> Moments6<f32> {
     Moments6::of_depth(2.0 * z - 1.0)
 }
 
-/// Means of a texel's six moments, depths moved to [-1, 1], in the basis optimised for 16 bits.
-#[kernel(
-    compute,
-    threads(8, 8),
+/// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis.
+#[inline(always)]
+pub(crate) fn quantized(depth: impl Depths, at: UVec2, samples: u32) -> Texels {
+    // Half by half: glslang takes minutes for pinned sums of a structure in a loop (it looks for what
+    // has to be `precise` through each member again).
+    let sum = |half: usize| depth.mean(at, samples, |z| halves(z)[half]);
+    Texels {
+        first: sum(0),
+        second: sum(1),
+    }
+}
+
+#[inline(always)]
+fn mean_symmetric(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let texels = quantized(depth, at, samples);
+    (texels.first, texels.second)
+}
+
+/// Means of a texel's six moments, depths moved to [-1, 1], as they are.
+#[inline(always)]
+fn mean_plain(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let texels = depth.mean(at, samples, |z| {
+        let m = symmetric(z);
+        Texels {
+            first: Vec4::new(m.b1, m.b3, m.b5, 0.0),
+            second: Vec4::new(m.b2, m.b4, m.b6, 0.0),
+        }
+    });
+    (texels.first, texels.second)
+}
+
+resolves! {
+    /// Means of a texel's six moments, depths moved to [-1, 1], in the basis optimised for 16 bits.
+    resolve_symmetric_6, resolve_single_symmetric_6, mean_symmetric() -> (Vec4, Vec4),
     outputs(rgba16unorm, rgba16unorm),
     forms(fragment),
     inputs = crate::inputs::maps::depths,
@@ -144,53 +174,14 @@ fn symmetric(z: f32) -> Moments6<f32> {
         absolute = 1.6e-5,
         why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
     )
-)]
-pub fn resolve_symmetric_6(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4) {
-    let texels = quantized(depth, at, samples);
-    (texels.first, texels.second)
 }
 
-/// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis.
-#[inline(always)]
-pub(crate) fn quantized(depth: Texture2dMultisampled<'_>, at: UVec2, samples: u32) -> Texels {
-    // Half by half: glslang takes minutes for pinned sums of a structure in a loop (it looks for what
-    // has to be `precise` through each member again).
-    let sum = |half: usize| mean(depth, at, samples, |z| halves(z)[half]);
-    Texels {
-        first: sum(0),
-        second: sum(1),
-    }
-}
-
-/// Means of a texel's six moments, depths moved to [-1, 1], as they are, for 32-bit maps.
-#[kernel(
-    compute,
-    threads(8, 8),
+resolves! {
+    /// Means of a texel's six moments, depths moved to [-1, 1], as they are, for 32-bit maps.
+    resolve_plain_6, resolve_single_plain_6, mean_plain() -> (Vec4, Vec4),
     outputs(rgba32float, rgba32float),
     forms(fragment),
     inputs = crate::inputs::maps::depths
-)]
-pub fn resolve_plain_6(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> (Vec4, Vec4) {
-    let texels = mean(depth, at, samples, |z| {
-        let m = symmetric(z);
-        Texels {
-            first: Vec4::new(m.b1, m.b3, m.b5, 0.0),
-            second: Vec4::new(m.b2, m.b4, m.b6, 0.0),
-        }
-    });
-    (texels.first, texels.second)
 }
 
 shading! {

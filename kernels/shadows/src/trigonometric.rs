@@ -7,7 +7,7 @@ use hankel_moments::{
 };
 
 use crate::bounds::Shadow;
-use crate::resolve::mean;
+use crate::resolve::{Depths, resolves};
 use crate::shade::Light;
 
 /// How a map holds trigonometric moments: values of the specialisation constant `encoding`.
@@ -123,10 +123,21 @@ fn moments(z: f32) -> Vec4 {
     Vec4::new(m.c1, m.s1, m.c2, m.s2)
 }
 
-/// Mean of a texel's two complex trigonometric moments, depths in [0, 1], as they are, for a 32-bit map.
-#[kernel(
-    compute,
-    threads(8, 8),
+/// Mean of a texel's moments, as they are.
+#[inline(always)]
+fn mean_plain(depth: impl Depths, at: UVec2, samples: u32) -> Vec4 {
+    depth.mean(at, samples, moments)
+}
+
+/// Mean of a texel's moments, moved to [0, 1].
+#[inline(always)]
+fn mean_unorm(depth: impl Depths, at: UVec2, samples: u32) -> Vec4 {
+    depth.mean(at, samples, |z| moments(z) * 0.5 + Vec4::splat(0.5))
+}
+
+resolves! {
+    /// Mean of a texel's two complex trigonometric moments, depths in [0, 1], as they are, for a 32-bit map.
+    resolve_trigonometric_plain, resolve_single_trigonometric_plain, mean_plain() -> Vec4,
     texture(rgba32float),
     forms(fragment),
     inputs = crate::inputs::maps::depths,
@@ -135,21 +146,11 @@ fn moments(z: f32) -> Vec4 {
         absolute = 1e-6,
         why = "drivers may contract products and sums: sine and cosine of half the angle are within 2.4e-7 either way, and doubling the angle twice makes four times that"
     )
-)]
-pub fn resolve_trigonometric_plain(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    mean(depth, at, samples, moments)
 }
 
-/// Mean of a texel's two complex trigonometric moments, depths in [0, 1], moved to [0, 1] for 16 bits.
-#[kernel(
-    compute,
-    threads(8, 8),
+resolves! {
+    /// Mean of a texel's two complex trigonometric moments, depths in [0, 1], moved to [0, 1] for 16 bits.
+    resolve_trigonometric_unorm, resolve_single_trigonometric_unorm, mean_unorm() -> Vec4,
     texture(rgba16unorm),
     forms(fragment),
     inputs = crate::inputs::maps::depths,
@@ -158,15 +159,6 @@ pub fn resolve_trigonometric_plain(
         absolute = 1.6e-5,
         why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
     )
-)]
-pub fn resolve_trigonometric_unorm(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    mean(depth, at, samples, |z| moments(z) * 0.5 + Vec4::splat(0.5))
 }
 
 shading! {

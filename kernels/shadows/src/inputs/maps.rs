@@ -667,16 +667,21 @@ pub fn weighted_depths(request: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// Depths of several samples.
+/// Depths of several samples; of one, for a kernel that does not ask how many there are.
 #[must_use]
-pub fn depths(_: &Request) -> Vec<Given> {
+pub fn depths(request: &Request) -> Vec<Given> {
+    let count = match request.constant("samples") {
+        Some(_) => SAMPLES,
+        None => 1,
+    };
     let texels = samples();
-    let texels = texels.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0));
+    let texels = texels.iter().step_by(SAMPLES / count);
+    let texels = texels.map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0));
     let given = Given::new("a map of depths");
-    [given.texture("depth", SIZE, SAMPLES as u32, TexelFormat::R32Float, texels)].into()
+    [given.texture("depth", SIZE, count as u32, TexelFormat::R32Float, texels)].into()
 }
 
-/// Depths of several samples, and an exponent.
+/// [`depths`], and an exponent.
 #[must_use]
 pub fn exponential_depths(request: &Request) -> Vec<Given> {
     [10.0_f32, 80.0]
@@ -688,7 +693,7 @@ pub fn exponential_depths(request: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// Depths of several samples, and exponents that 16-bit floats have room for.
+/// [`depths`], and exponents that 16-bit floats have room for.
 #[must_use]
 pub fn warped_depths(request: &Request) -> Vec<Given> {
     let [_, (_, narrow, _)] = EXPONENTS;
