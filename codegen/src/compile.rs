@@ -243,7 +243,7 @@ pub fn compile(
         let settled = inputs.newest(folder).is_none_or(|newest| newest < start);
         if settled || before.as_ref() == Some(&inputs) {
             let read = inputs.files.keys().chain(inputs.folders.keys());
-            last.record(read.map(|name| folder.join(name)), start)?;
+            last.record(read.map(|name| folder.join(name)), &messages, &own, start)?;
             return Ok(Compiled {
                 modules,
                 inputs,

@@ -345,14 +345,13 @@ struct ArtifactTarget {
 /// Environment variables that an outer `cargo run` or build script sets for its own package, and
 /// which mean something else to an inner cargo.
 fn is_outer_cargo(name: &str) -> bool {
-    const EXACT: [&str; 12] = [
+    const EXACT: [&str; 11] = [
         "CARGO",
         "CARGO_CRATE_NAME",
         "CARGO_ENCODED_RUSTFLAGS",
         "CARGO_MAKEFLAGS",
         "CARGO_PRIMARY_PACKAGE",
         "CARGO_TARGET_TMPDIR",
-        "CARGO_TARGET_DIR",
         "DEBUG",
         "NUM_JOBS",
         "OPT_LEVEL",
@@ -506,8 +505,9 @@ impl Package {
         let messages = messages.join().unwrap_or_default();
         let mut diagnostics = String::new();
         let mut library = None;
-        for line in messages.split(|&b| b == b'\n').filter(|l| !l.is_empty()) {
-            match serde_json::from_slice(line) {
+        let messages = String::from_utf8_lossy(&messages);
+        for line in messages.lines().filter(|l| !l.is_empty()) {
+            match serde_json::from_str(line) {
                 Ok(Message::Compiler { message }) if message.level == "error" => {
                     diagnostics.push_str(&message.rendered.unwrap_or_default());
                 }
@@ -532,7 +532,8 @@ impl Package {
         match library {
             Some(library) if status.success() => {
                 let sources = read_for(&library).into_iter();
-                last.record(sources.filter(|path| !path.starts_with(&target_dir)), began)?;
+                let sources = sources.filter(|path| !path.starts_with(&target_dir));
+                last.record(sources, &messages, &[], began)?;
                 Ok(library)
             }
             _ => Err(CrateError::Build {
@@ -596,6 +597,8 @@ mod tests {
         }
         for name in [
             "CARGO_HOME",
+            // It is the caller's: cargo sets none.
+            "CARGO_TARGET_DIR",
             "CARGO_NET_OFFLINE",
             "PATH",
             "RUSTFLAGS",

@@ -1,7 +1,7 @@
 //! Changes that cargo overlooks. It goes by dates: a file with other contents than before, and a date before
 //! the last build (`cp -p`, `rsync -t`, an unpacked archive, a clock that was set back), is not compiled again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -43,6 +43,8 @@ pub struct LastBuild {
 #[derive(Debug, Serialize, Deserialize)]
 struct Made {
     began: SystemTime,
+    /// Names of the packages whose files these are.
+    packages: BTreeSet<String>,
     /// By path; folders stand for all that is in them.
     contents: BTreeMap<String, u64>,
 }
@@ -69,7 +71,8 @@ impl LastBuild {
         })
     }
 
-    /// Has cargo compile everything again if it would overlook a change.
+    /// Has cargo compile the packages again that the build was of if it would overlook a change. Those of registries
+    /// and the compiler's own stay.
     ///
     /// # Errors
     /// cargo's record of what it has compiled cannot be removed.
@@ -79,19 +82,22 @@ impl LastBuild {
         };
         // What another version wrote says nothing.
         match serde_json::from_slice::<Made>(&text) {
-            Ok(made) if made.overlooked() => self.forget(),
+            Ok(made) if made.overlooked() => self.forget(&made.packages),
             _ => Ok(()),
         }
     }
 
     /// Keeps what a build that began at `began` has read: files, and folders with all that is in them. A path
-    /// that is not UTF-8 is left out, as cargo leaves it out.
+    /// that is not UTF-8 is left out, as cargo leaves it out. `messages` is what cargo said, as JSON; packages within `own` are the
+    /// compiler's.
     ///
     /// # Errors
     /// The record cannot be written.
     pub fn record(
         &self,
         read: impl IntoIterator<Item = PathBuf>,
+        messages: &str,
+        own: &[PathBuf],
         began: SystemTime,
     ) -> Result<(), RecordError> {
         let contents = read.into_iter().filter_map(|path| {
@@ -100,6 +106,7 @@ impl LastBuild {
         });
         let made = Made {
             began,
+            packages: local_packages(messages, own),
             contents: contents.collect(),
         };
         let write = || -> io::Result<()> {
@@ -111,8 +118,8 @@ impl LastBuild {
         write().map_err(fail("write", &self.file))
     }
 
-    /// Removes cargo's fingerprints: those of all profiles, for this machine and for other targets.
-    fn forget(&self) -> Result<(), RecordError> {
+    /// Removes cargo's fingerprints of these packages: those of all profiles, for this machine and for other targets.
+    fn forget(&self, packages: &BTreeSet<String>) -> Result<(), RecordError> {
         let within = |folder: &Path| -> Result<Vec<PathBuf>, RecordError> {
             match fs::read_dir(folder) {
                 Ok(found) => Ok(found.filter_map(|it| Some(it.ok()?.path())).collect()),
@@ -124,16 +131,53 @@ impl LastBuild {
         for profile in within(&self.target_dir)? {
             let nested = within(&profile)?;
             for folder in nested.into_iter().chain([profile]) {
-                let fingerprints = folder.join(".fingerprint");
-                match fs::remove_dir_all(&fingerprints) {
-                    Err(error) if !is_absent(&error) => {
-                        return Err(fail("remove", &fingerprints)(error));
+                for unit in within(&folder.join(".fingerprint"))? {
+                    let name = unit.file_name().and_then(OsStr::to_str);
+                    if !name.is_some_and(|name| is_of(name, packages)) {
+                        continue;
                     }
-                    _ => {}
+                    match fs::remove_dir_all(&unit) {
+                        Err(error) if !is_absent(&error) => {
+                            return Err(fail("remove", &unit)(error));
+                        }
+                        _ => {}
+                    }
                 }
             }
         }
         Ok(())
+    }
+}
+
+/// Whether a folder of a fingerprint, `PACKAGE-HASH`, is that of one of the packages.
+fn is_of(unit: &str, packages: &BTreeSet<String>) -> bool {
+    unit.rsplit_once('-')
+        .is_some_and(|(package, _)| packages.contains(package))
+}
+
+/// Names of the packages in folders, neither of registries nor within `own`, that cargo says it has compiled, now or
+/// before.
+fn local_packages(messages: &str, own: &[PathBuf]) -> BTreeSet<String> {
+    #[derive(Deserialize)]
+    struct Artifact {
+        package_id: String,
+        manifest_path: PathBuf,
+    }
+    let messages = messages.lines().filter(|line| line.starts_with('{'));
+    messages
+        .filter_map(|line| serde_json::from_str::<Artifact>(line).ok())
+        .filter(|it| it.package_id.starts_with("path+"))
+        .filter(|it| !own.iter().any(|own| it.manifest_path.starts_with(own)))
+        .filter_map(|it| name_of(&it.package_id).map(str::to_owned))
+        .collect()
+}
+
+/// The name in cargo's identifier of a package: `path+file:///FOLDER/NAME#VERSION`, or `…#NAME@VERSION`.
+fn name_of(id: &str) -> Option<&str> {
+    let (source, fragment) = id.rsplit_once('#')?;
+    match fragment.split_once('@') {
+        Some((name, _)) => Some(name),
+        None => source.trim_end_matches('/').rsplit('/').next(),
     }
 }
 
@@ -251,19 +295,38 @@ mod tests {
         put("src/lib.rs", "// 1", before);
         put("data/deep/table", "1", before);
         let target = path("target");
-        let fingerprints =
-            ["release", "describe", "spirv/release"].map(|it| target.join(it).join(".fingerprint"));
+        let fingerprints = |unit: &str| {
+            let profiles = ["release", "describe", "spirv/release"];
+            profiles.map(|it| target.join(it).join(".fingerprint").join(unit))
+        };
+        // Two packages in folders; one of a registry whose name begins like one of them, and one of the compiler.
+        let local = ["mine-0123456789abcdef", "on-the-way-0123456789abcdef"].map(fingerprints);
+        let local = local.as_flattened();
+        let others = ["mine-not-0123456789abcdef", "core-0123456789abcdef"].map(fingerprints);
+        let others = others.as_flattened();
+        let own = [PathBuf::from("/rust/library")];
+        let messages = [
+            ("path+file:///a/mine#0.1.0", "/a/mine"),
+            ("path+file:///a/b#on-the-way@1.0.0", "/a/b"),
+            ("registry+https://a/b#mine-not@1.0.0", "/registry/mine-not"),
+            ("path+file:///rust/library/core#0.0.0", "/rust/library/core"),
+        ];
+        let messages = messages.map(|(id, folder)| {
+            format!("{{\"package_id\":\"{id}\",\"manifest_path\":\"{folder}/Cargo.toml\"}}\n")
+        });
+        let messages = format!("not JSON\n{}{{\"success\":true}}\n", messages.concat());
         let last = LastBuild::of(&target, [OsStr::new("Cargo.toml")]).unwrap();
         let forgets = |name: &str, text: &str, date: SystemTime| {
-            for it in &fingerprints {
+            for it in local.iter().chain(others) {
                 fs::create_dir_all(it).unwrap();
             }
             let read = ["src/lib.rs", "data", "build.rs"].map(path);
-            last.record(read, began).unwrap();
+            last.record(read, &messages, &own, began).unwrap();
             put(name, text, date);
             last.forget_if_overlooked().unwrap();
-            let left = fingerprints.iter().filter(|it| it.exists()).count();
-            assert!(left == 0 || left == fingerprints.len(), "{left}");
+            assert!(others.iter().all(|it| it.exists()));
+            let left = local.iter().filter(|it| it.exists()).count();
+            assert!(left == 0 || left == local.len(), "{left}");
             left == 0
         };
         // Cargo sees what has a later date itself.
