@@ -5,6 +5,8 @@ mod desk;
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::Path;
+use std::process::Command;
 
 use desk::Desk;
 use hankel_codegen::spirv::words;
@@ -34,6 +36,9 @@ height = 64
 /// a kernel asks for it, WGSL cannot, and where a bound is steep the last bit shows: in this scene with
 /// `soft` 0.3 % of the pixels differ, and 0.7 % between the native picture and that of Vulkan.
 const ROUNDED: f64 = 0.005;
+
+/// The same for another rasteriser, which may cover other samples at the edges of triangles.
+const EDGES: f64 = 0.01;
 
 fn json(desk: &Desk, file: &str) -> Value {
     serde_json::from_str(&desk.read(file)).expect("it is JSON")
@@ -245,6 +250,56 @@ fn frames_of_single_samples_are_all_in_webgl_2() {
         2,
         &["shadow.multisampling", "`pcf` looks at all samples itself"],
     );
+}
+
+/// A browser plays such frames with WebGL 2, in the texts of that language.
+#[test]
+fn frames_of_single_samples_are_played_in_webgl_2() {
+    let desk = Desk::new();
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let chromium = std::env::var_os("HANKEL_CHROMIUM").unwrap_or_else(|| "chromium".into());
+    for (technique, format, more) in [
+        // Chromium has no textures of 16-bit channels on SwiftShader.
+        ("hamburger", "rgba32float", ""),
+        ("hamburger", "rgba32float", "mips = true\nanisotropy = 4\n"),
+        ("hamburger-6", "rg32uint", ""),
+        ("hamburger-6", "r32uint", ""),
+        ("evsm4", "rgba16float", ""),
+        ("convolution", "rgba8unorm", ""),
+        ("esm", "r32float", ""),
+    ] {
+        let shadow = format!(
+            "[shadow]\ntechnique = \"{technique}\"\nformat = \"{format}\"\nmultisampling = 1\n{more}"
+        );
+        desk.write("scene.toml", SCENE.replace("[shadow]", &shadow));
+        let options = "--target essl300 --image-passes fragment";
+        desk.hankel(&format!("build --scene scene.toml --out frame {options}"))
+            .code(0);
+        let expected = rendered(&desk, "scene.toml", "--image-passes fragment");
+        let page = here.join("../examples/player/webgl");
+        let played = Command::new("node")
+            .arg(here.join("../examples/chromium.mjs"))
+            .args([chromium.as_os_str(), desk.path("").as_os_str()])
+            .arg(format!("page={}", page.display()))
+            .arg(format!("frame={}", desk.path("frame").display()))
+            .output()
+            .expect("node starts");
+        let said = String::from_utf8_lossy(&played.stderr);
+        assert!(played.status.success(), "{technique} {format}: {said}");
+        let light = fs::read(desk.path("picture.bin")).expect("the page has posted it");
+        let light: Vec<f32> = light
+            .chunks_exact(4)
+            .map(|it| f32::from_le_bytes([it[0], it[1], it[2], it[3]]))
+            .collect();
+        let picture = Picture::of_linear(expected.width, expected.height, &light);
+        let (share, largest) = compare(&picture.expect("all of its pixels"), &expected);
+        println!("{technique} {format} {more:?}: {share} of the pixels, the most by {largest}");
+        // A rasteriser of its own decides which samples at the edges of triangles are covered.
+        assert!(
+            share <= EDGES,
+            "{technique} {format} {more:?}: {share} of the pixels, the most by {largest}"
+        );
+    }
 }
 
 /// What is blended, kept sample by sample, or scattered on the way to the camera, is played too.

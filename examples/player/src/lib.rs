@@ -508,6 +508,20 @@ impl Player {
 }
 
 impl Picture {
+    /// Of linear light: four floats for each pixel, rows from the top. `None` if they are not so many.
+    #[must_use]
+    pub fn of_linear(width: u32, height: u32, light: &[f32]) -> Option<Self> {
+        if light.len() != 4 * width as usize * height as usize {
+            return None;
+        }
+        let pixels = light.chunks_exact(4).flat_map(|it| &it[..3]);
+        Some(Self {
+            width,
+            height,
+            pixels: pixels.map(|it| words::srgb(*it)).collect(),
+        })
+    }
+
     /// Writes a PNG file.
     ///
     /// # Errors

@@ -1,7 +1,8 @@
-//! Moment shadows in three.js: the page in `page`, shown to a headless Chromium by `draw.mjs`, with WebGPU and
-//! with WebGL 2. What is here starts that, and reads what it gives.
+//! Moment shadows in three.js: the page in `page`, shown to a headless Chromium by `../chromium.mjs`, with
+//! WebGPU and with WebGL 2. What is here starts that, and reads what it gives.
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::Command;
 
@@ -23,10 +24,21 @@ pub struct Drawn {
 /// Node.js or Chromium cannot be started, or the page fails; the error says what it said.
 pub fn draw(chromium: &Path, three: &Path, libraries: &Path) -> Result<[Drawn; 2], Box<dyn Error>> {
     let out = tempfile::tempdir()?;
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("draw.mjs");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let script = here.join("../chromium.mjs");
+    let served = |name: &str, folder: &Path| {
+        let mut argument = OsString::from(format!("{name}="));
+        argument.push(folder);
+        argument
+    };
     let done = Command::new("node")
         .arg(&script)
-        .args([chromium, three, libraries, out.path()])
+        .args([chromium, out.path()])
+        .args([
+            served("page", &here.join("page")),
+            served("three", three),
+            served("libraries", libraries),
+        ])
         .output()
         .map_err(|error| format!("node: {error}"))?;
     if !done.status.success() {

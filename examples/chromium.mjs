@@ -1,27 +1,27 @@
-// Shows the page to a headless Chromium, and writes what it posts:
+// Shows a page to a headless Chromium, and writes what it posts to `/post/NAME` as `OUT/NAME.bin`, until it posts to
+// `/post/done`, or why it cannot to `/post/failed`:
 //
-//     node draw.mjs CHROMIUM FOLDER_OF_THREE LIBRARIES OUT
+//     node chromium.mjs CHROMIUM OUT page=FOLDER NAME=FOLDER...
 //
-// The page is served on this machine alone.
+// The page is `/page/index.html`. The folders are served by their names, on this machine alone.
 
 import { spawn } from "node:child_process";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join, normalize } from "node:path";
-import { fileURLToPath } from "node:url";
 
 /** Milliseconds that all may take. */
 const LIMIT = 120_000;
 
 const TYPES = { ".html": "text/html", ".js": "text/javascript" };
 
-const [chromium, three, libraries, out] = process.argv.slice(2);
-if (!out) {
-    console.error("usage: node draw.mjs CHROMIUM FOLDER_OF_THREE LIBRARIES OUT");
+const [chromium, out, ...served] = process.argv.slice(2);
+const folders = Object.fromEntries(served.map((it) => [it.slice(0, it.indexOf("=")), it.slice(it.indexOf("=") + 1)]));
+if (!folders.page) {
+    console.error("usage: node chromium.mjs CHROMIUM OUT page=FOLDER NAME=FOLDER...");
     process.exit(2);
 }
-const folders = { page: fileURLToPath(new URL("page", import.meta.url)), three, libraries };
 
 const server = createServer();
 const finished = new Promise((resolve, reject) => {
@@ -54,7 +54,7 @@ const finished = new Promise((resolve, reject) => {
 });
 await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
 
-const profile = await mkdtemp(join(tmpdir(), "hankel-three-"));
+const profile = await mkdtemp(join(tmpdir(), "hankel-page-"));
 const child = spawn(chromium, [
     "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--enable-unsafe-webgpu",
