@@ -574,7 +574,7 @@ pub struct Render {
     #[arg(long, value_name = "NAME", conflicts_with = "compare")]
     pub technique: Option<String>,
     /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
-    /// --filter and --fit are what is chosen from.
+    /// --filter, --fit and --multisampling are what is chosen from.
     #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
     #[command(flatten)]
@@ -607,7 +607,7 @@ pub struct OfScene {
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub technique: Option<String>,
     /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
-    /// --filter and --fit are what is chosen from.
+    /// --filter, --fit and --multisampling are what is chosen from.
     #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
     /// With --technique auto: where the frame will run [default: native].
@@ -658,13 +658,20 @@ pub struct Maps {
     /// [default: both].
     #[arg(long, value_enum, value_name = "WHAT", value_delimiter = ',')]
     pub fit: Vec<Fitted>,
+    /// Samples of depth in a texel of the map, 4 or 1; both with a comma between [default: both].
+    /// Techniques that look at the samples themselves always have 4.
+    #[arg(long, value_name = "SAMPLES", value_delimiter = ',', value_parser = samples)]
+    pub multisampling: Vec<u32>,
 }
 
 #[cfg(feature = "frames")]
 impl Maps {
     /// Whether nothing was said of them.
     pub const fn is_empty(&self) -> bool {
-        self.size.is_empty() && self.filter.is_empty() && self.fit.is_empty()
+        self.size.is_empty()
+            && self.filter.is_empty()
+            && self.fit.is_empty()
+            && self.multisampling.is_empty()
     }
 }
 
@@ -835,6 +842,16 @@ pub fn taps(text: &str) -> Result<u32, String> {
             "give an odd number from 1 to {}",
             Scene::MAX_FILTER
         )),
+    }
+}
+
+/// Samples of depth in a texel.
+#[cfg(feature = "frames")]
+pub fn samples(text: &str) -> Result<u32, String> {
+    match text {
+        "1" => Ok(1),
+        "4" => Ok(4),
+        _ => Err("give 4 or 1".into()),
     }
 }
 

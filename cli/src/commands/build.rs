@@ -35,7 +35,7 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
         Some(scene) => return super::frame::build(args, scene, quiet),
         None if !args.frame.maps.is_empty() => {
             return Err(Failure::input(
-                "--size, --filter and --fit are for the maps of a scene",
+                "--size, --filter, --fit and --multisampling are for the maps of a scene",
                 "Give the scene with --scene, and --technique auto --error 0.05.",
             ));
         }

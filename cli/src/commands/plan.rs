@@ -142,5 +142,9 @@ pub fn of_maps(args: &Maps) -> Choices {
         };
         choices.fits.retain(chosen);
     }
+    if !args.multisampling.is_empty() {
+        let chosen = |samples: &u32| args.multisampling.contains(samples);
+        choices.multisampling.retain(chosen);
+    }
     choices
 }

@@ -43,7 +43,7 @@ impl Asked<'_> {
         }
         if is_planned != self.error.is_some() || (!self.maps.is_empty() && !is_planned) {
             return Err(Failure::input(
-                "--technique auto needs --error, and --error, --size, --filter and --fit need --technique auto",
+                "--technique auto needs --error, and --error, --size, --filter, --fit and --multisampling need --technique auto",
                 "Write --technique auto --error 0.05, or a technique's name: then the scene file says the rest.",
             ));
         }

@@ -125,8 +125,8 @@ Examples:
   hankel bench frames --output 160x90,320x180,640x360 --backend vulkan --out report
   hankel bench frames --output 320x180 --error 0.1,0.05 --out report
 
-Every technique in every format, with every map size, filter and fit, on every scene in every size of the
-picture. OUT gets frames.html, frames.json, a CSV file for each table, pictures, and measured.jsonl, to which
+Every technique in every format, with every map size, filter and fit, with four samples of depth in a texel and
+with one, on every scene in every size of the picture. OUT gets frames.html, frames.json, a CSV file for each table, pictures, and measured.jsonl, to which
 each finished measurement is added at once: the same command in the same folder goes on where it was ended.
 
 Exit code 1: with --error, a plan's error is beyond it, or its time beyond 1.15 of the least.")]

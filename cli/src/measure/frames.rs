@@ -8,7 +8,7 @@ use hankel_frames::measure::{
     Ask, Choices, Configuration, Measurement, Pictures, Session, Status, Subject, median, sample,
 };
 use hankel_frames::plan::{Wanted, plan};
-use hankel_frames::scene::Scene;
+use hankel_frames::scene::{Fit, Scene};
 use hankel_frames::{FrameError, Picture};
 use hankel_host::device::Device;
 use hankel_numerics::report::{
@@ -106,6 +106,7 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
         report.tables.push(scattered(&all));
     }
     report.tables.push(gain_of_fit(&all));
+    report.tables.push(gain_of_one_sample(&all));
     report.tables.push(doubling(&all));
     report.tables.push(growths(&all));
     report.tables.push(configurations(&all));
@@ -383,12 +384,42 @@ fn mean(ratios: &[f64]) -> f64 {
 }
 
 fn gain_of_fit(all: &[Vec<Measurement>]) -> Table {
-    use hankel_frames::scene::Fit;
-    let mut table = Table::new(
+    let fit = Fit::Camera;
+    gain(
         "fit",
         "What fitting the map to the camera's view gives: all else alike, the geometric means over all \
          configurations of the error with a fitted map, divided by that of a map of the whole scene, and \
          of the times",
+        all,
+        |c| (c.fit != fit).then_some(Configuration { fit, ..*c }),
+    )
+}
+
+fn gain_of_one_sample(all: &[Vec<Measurement>]) -> Table {
+    let multisampling = 1;
+    let with = |c: &Configuration| Configuration {
+        multisampling,
+        ..*c
+    };
+    gain(
+        "one-sample",
+        "What one sample of depth in a texel gives: all else alike, the geometric means over all configurations \
+         of the error with one sample, divided by that with four, and of the times",
+        all,
+        |c| (c.multisampling != multisampling).then(|| with(c)),
+    )
+}
+
+/// What another choice gives, all else alike.
+fn gain(
+    name: &'static str,
+    what: &'static str,
+    all: &[Vec<Measurement>],
+    other: impl Fn(&Configuration) -> Option<Configuration>,
+) -> Table {
+    let mut table = Table::new(
+        name,
+        what,
         [
             Column::text("scene"),
             Column::text("picture"),
@@ -397,14 +428,11 @@ fn gain_of_fit(all: &[Vec<Measurement>]) -> Table {
         ],
     );
     for of_subject in all {
-        let pairs = pairs(of_subject, |c| {
-            let fit = Fit::Camera;
-            (c.fit != fit).then_some(Configuration { fit, ..*c })
-        });
+        let pairs = pairs(of_subject, &other);
         let ratios = |of: fn(&Measurement) -> f64| -> Vec<f64> {
             pairs
                 .iter()
-                .map(|(whole, fitted)| of(fitted) / of(whole))
+                .map(|(one, other)| of(other) / of(one))
                 .collect()
         };
         if let Some((m, _)) = pairs.first() {

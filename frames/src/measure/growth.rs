@@ -184,6 +184,7 @@ mod tests {
     use crate::scene::Fit;
     use crate::techniques;
     use crate::truth::Errors;
+    use crate::visibility::SAMPLES;
 
     /// Times by known laws.
     #[test]
@@ -193,6 +194,7 @@ mod tests {
             sizes: vec![128, 256, 512],
             filters: vec![1, 3, 5, 9],
             fits: vec![Fit::Scene],
+            multisampling: vec![SAMPLES],
             scatterings: Vec::new(),
             steps: Vec::new(),
         };

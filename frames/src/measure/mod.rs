@@ -21,6 +21,7 @@ use crate::scene::{Fit, Light, Medium, Mesh, Scene, Shadow};
 use crate::techniques::{self, Map, Technique};
 #[cfg(doc)]
 use crate::truth;
+use crate::visibility::SAMPLES;
 
 pub use pictures::Pictures;
 pub use session::{Ask, Measurement, Session, Status, Subject};
@@ -39,6 +40,8 @@ pub struct Configuration {
     pub filter: u32,
     /// What the map holds.
     pub fit: Fit,
+    /// Samples of depth in a texel: see [`Shadow::multisampling`].
+    pub multisampling: u32,
     /// How a medium's light is made; without one, the scene has no medium.
     pub scattering: Option<Scattered>,
 }
@@ -76,7 +79,11 @@ impl Configuration {
         if self.technique.maps.iter().filter(of_format).count() > 1 {
             name = format!("{name} {range}");
         }
-        name
+        // Four are the rule.
+        match self.multisampling {
+            1 => name + ", one sample",
+            _ => name,
+        }
     }
 
     /// The technique and its map, and how a medium's light is made, without sizes.
@@ -128,6 +135,7 @@ impl Configuration {
                 size: self.size,
                 filter: self.filter,
                 fit: self.fit,
+                multisampling: self.multisampling,
                 ..scene.shadow.by(self.technique, self.map)
             },
             ..scene.clone()
@@ -164,6 +172,9 @@ pub struct Choices {
     pub filters: Vec<u32>,
     /// What the map holds.
     pub fits: Vec<Fit>,
+    /// Samples of depth in a texel, 4 or 1, of techniques that [resolve](Technique::resolves) them. Others look at all
+    /// four themselves, whatever is said here.
+    pub multisampling: Vec<u32>,
     /// Techniques of scattering, for scenes with a medium.
     pub scatterings: Vec<&'static Scattering>,
     /// Steps along each ray, of those that march along rays.
@@ -171,14 +182,15 @@ pub struct Choices {
 }
 
 impl Default for Choices {
-    /// All techniques, from 256² to 2048² texels, up to 9 x 9 taps, maps of the whole scene and fitted
-    /// ones; of scattering all techniques, with 8, 32 and 128 steps.
+    /// All techniques, from 256² to 2048² texels of four samples and of one, up to 9 x 9 taps, maps of the whole scene
+    /// and fitted ones; of scattering all techniques, with 8, 32 and 128 steps.
     fn default() -> Self {
         Self {
             techniques: techniques::ALL.to_vec(),
             sizes: vec![256, 512, 1024, 2048],
             filters: vec![1, 3, 5, 9],
             fits: vec![Fit::Scene, Fit::Camera],
+            multisampling: vec![SAMPLES, 1],
             scatterings: scattering::ALL.to_vec(),
             steps: vec![8, 32, 128],
         }
@@ -223,12 +235,19 @@ impl Choices {
         let mut all = Vec::new();
         let narrowest: Vec<u32> = self.filters.iter().copied().min().into_iter().collect();
         for &technique in &self.techniques {
-            let filters = if technique.is_soft {
-                &narrowest
-            } else {
-                &self.filters
+            let filters = match technique.is_soft {
+                true => &narrowest,
+                false => &self.filters,
             };
-            for &map in technique.maps {
+            let multisampling = match technique.resolves {
+                true => &self.multisampling[..],
+                false => &[SAMPLES],
+            };
+            let ways = technique.maps.iter().flat_map(|&map| {
+                let with = move |&multisampling| (map, multisampling);
+                multisampling.iter().map(with)
+            });
+            for (map, multisampling) in ways {
                 for &size in &self.sizes {
                     for &filter in filters {
                         for &fit in &self.fits {
@@ -238,6 +257,7 @@ impl Choices {
                                 size,
                                 filter,
                                 fit,
+                                multisampling,
                                 scattering: None,
                             });
                         }
@@ -306,7 +326,9 @@ mod tests {
         let names: BTreeSet<String> = all.iter().map(ToString::to_string).collect();
         assert_eq!(names.len(), all.len());
         assert!(names.contains("hamburger rgba16unorm symmetric, 512², 3 taps, fitted"));
+        assert!(names.contains("hamburger rgba16unorm symmetric, one sample, 2048², no filter"));
         assert!(names.contains("pcf, 2048², no filter"));
+        assert!(!names.iter().any(|name| name.contains("pcf, one sample")));
         assert!(names.contains("pcf, 2048², no filter; prefiltered"));
         assert!(names.contains("esm, 256², 9 taps, fitted; ray-marching, 8 steps"));
     }

@@ -72,6 +72,7 @@ impl Pictures {
         let of = Configuration {
             technique: any.technique,
             map: any.map,
+            multisampling: any.multisampling,
             ..*configuration
         };
         let name = format!("scattered: {of}");

@@ -118,8 +118,8 @@ fn one(
         let inputs = f.inputs.describe();
         quote! {
             describe::Field {
-                name: #field_text.into(),
-                summary: #summary.into(),
+                name: describe::text(#field_text),
+                summary: describe::text(#summary),
                 ty: <#ty as layout::Element>::ty(),
                 offset: core::mem::offset_of!(#this, #field) as u32,
                 size: size_of::<#ty>() as u32,
@@ -214,7 +214,7 @@ fn one(
             fn ty() -> describe::Type {
                 describe::Type::Struct {
                     layout: describe::Layout {
-                        name: #text.into(),
+                        name: describe::text(#text),
                         size: size_of::<#this>() as u32,
                         align: <#this as layout::Element>::ALIGN as u32,
                         fields: [#(#descriptions),*].into(),

@@ -218,17 +218,17 @@ impl Kernel {
         let compensated = match &self.compensated {
             Some(name) => {
                 let name = name.to_string();
-                quote!(Some(#name.into()))
+                quote!(Some(describe::text(#name)))
             }
             None => quote!(None),
         };
         let image_pass = self.describe_image_pass(variant);
         quote! {
             describe::Kernel {
-                name: #entry.into(),
-                function: #function.into(),
-                summary: #summary.into(),
-                file: file!().into(),
+                name: describe::text(#entry),
+                function: describe::text(#function),
+                summary: describe::text(#summary),
+                file: describe::text(file!()),
                 line: line!(),
                 stage: #stage,
                 precision: #precision,
@@ -238,7 +238,7 @@ impl Kernel {
                     ulp: #ulp,
                     absolute: #absolute,
                     non_finite: #non_finite,
-                    why: #why.into(),
+                    why: describe::text(#why),
                 },
                 rounding: describe::Rounding::#rounding,
                 subgroups: describe::Subgroups::of(#subgroups, #sized),
@@ -336,7 +336,7 @@ impl Kernel {
                 };
                 let inputs = p.inputs.describe();
                 quote!(describe::Param {
-                    name: #name.into(),
+                    name: describe::text(#name),
                     role: describe::Role::#role,
                     inputs: #inputs,
                 })

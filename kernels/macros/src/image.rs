@@ -69,7 +69,7 @@ impl Kernel {
             Some(FragmentForm::Own) => entry_of(&self.name),
             Some(FragmentForm::Of(name)) => entry_of(name),
         };
-        quote!(Some(describe::ImagePass::Compute { fragment: #fragment.into() }))
+        quote!(Some(describe::ImagePass::Compute { fragment: describe::text(#fragment) }))
     }
 
     /// The outputs of the fragment form.

@@ -449,11 +449,11 @@ impl Inputs {
                     Domain::Distinct => quote!(Distinct),
                     Domain::CountOf(param) => {
                         let param = param.to_string();
-                        quote!(CountOf { param: #param.into() })
+                        quote!(CountOf { param: describe::text(#param) })
                     }
                     Domain::IndexOf(param) => {
                         let param = param.to_string();
-                        quote!(IndexOf { param: #param.into() })
+                        quote!(IndexOf { param: describe::text(#param) })
                     }
                 };
                 quote!(Some(describe::Domain::#made))
@@ -468,7 +468,7 @@ impl Inputs {
         };
         let unit = match &self.unit {
             None => quote!(None),
-            Some(unit) => quote!(Some(#unit.into())),
+            Some(unit) => quote!(Some(describe::text(#unit))),
         };
         let length = match &self.length {
             None => quote!(None),
@@ -477,7 +477,7 @@ impl Inputs {
             }
             Some((Length::Of { param, times, plus }, _)) => {
                 let param = param.to_string();
-                quote!(Some(describe::Length::Of { param: #param.into(), times: #times, plus: #plus }))
+                quote!(Some(describe::Length::Of { param: describe::text(#param), times: #times, plus: #plus }))
             }
         };
         let size = match &self.size {

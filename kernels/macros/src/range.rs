@@ -134,7 +134,7 @@ impl Kernel {
             Range::Outputs => quote!(describe::Range::Outputs),
             Range::Elements(name) => {
                 let name = name.to_string();
-                quote!(describe::Range::Elements { param: #name.into() })
+                quote!(describe::Range::Elements { param: describe::text(#name) })
             }
             Range::Fixed(numbers) => {
                 let mut size = numbers.clone();
@@ -147,7 +147,7 @@ impl Kernel {
                     (false, Some(ty)) => quote!(core::mem::offset_of!(#ty, #fields) as u32),
                     _ => quote!(0),
                 };
-                quote!(describe::Range::Uniform { param: #name.into(), offset: #offset })
+                quote!(describe::Range::Uniform { param: describe::text(#name), offset: #offset })
             }
         }
     }

@@ -392,6 +392,44 @@ pub fn trigonometric_4_lower<R: Real>(m: TrigonometricMoments<R>, query: HalfAng
     R::select(d.lt(zero), straddling, two)
 }
 
+/// What the weight of a point on the arc is made of: 1/w = K(s, s) + K(s, start) / d * K(s, end).
+struct OnArc<R> {
+    start: Sheared<R>,
+    end: Sheared<R>,
+    d: R,
+    /// K(s, start) / d and K(s, end) of the center of the directions, which is at minus the mean.
+    center_start: R,
+    center_end: R,
+}
+
+impl<R: Real> OnArc<R> {
+    /// 1/w at a direction, and the first two derivatives of its logarithm. The second derivative of a direction
+    /// points to the center.
+    #[inline(always)]
+    fn at(&self, kernel: &Kernel<R>, direction: HalfAngle<R>) -> (R, R, R) {
+        let zero: R = lit!(0.0);
+        let two: R = lit!(2.0);
+        let (x, y) = direction.direction();
+        let here = kernel.at(x, y);
+        let tangent = kernel.shear(-y, x);
+        let own = kernel.value(here, here);
+        let to_start = kernel.value(here, self.start) / self.d;
+        let to_end = kernel.value(here, self.end);
+        let s = to_start.max(zero);
+        let e = to_end.max(zero);
+        let ds = kernel.product(tangent, self.start) / self.d;
+        let de = kernel.product(tangent, self.end);
+        let value = own + s * e;
+        let slope = (kernel.product(tangent, here) * two + (s * de + e * ds)) / value;
+        let outward = kernel.shear(x, y);
+        let own_bend = (tangent.u * tangent.u - outward.u * here.u) * kernel.p
+            + (tangent.v * tangent.v - outward.v * here.v) * kernel.q;
+        let bend = (own_bend + ds * de) * two
+            + (s * (self.center_end - to_end) + e * (self.center_start - to_start));
+        (value, slope, bend / value - slope * slope)
+    }
+}
+
 /// The least weight of the one point on the arc, where K(s, q) is -`d`.
 #[inline(always)]
 fn weight_on_arc<R: Real>(
@@ -403,31 +441,13 @@ fn weight_on_arc<R: Real>(
 ) -> R {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let two: R = lit!(2.0);
-    // 1/w at a direction, and the first two derivatives of its logarithm. The second derivative of
-    // a direction points to the center, which is at minus the mean.
     let mean = kernel.shear(kernel.x, kernel.y);
-    let center_start = kernel.rest(mean, start) / d;
-    let center_end = kernel.rest(mean, end);
-    let at = |direction: HalfAngle<R>| {
-        let (x, y) = direction.direction();
-        let here = kernel.at(x, y);
-        let tangent = kernel.shear(-y, x);
-        let own = kernel.value(here, here);
-        let to_start = kernel.value(here, start) / d;
-        let to_end = kernel.value(here, end);
-        let s = to_start.max(zero);
-        let e = to_end.max(zero);
-        let ds = kernel.product(tangent, start) / d;
-        let de = kernel.product(tangent, end);
-        let value = own + s * e;
-        let slope = (kernel.product(tangent, here) * two + (s * de + e * ds)) / value;
-        let outward = kernel.shear(x, y);
-        let own_bend = (tangent.u * tangent.u - outward.u * here.u) * kernel.p
-            + (tangent.v * tangent.v - outward.v * here.v) * kernel.q;
-        let bend = (own_bend + ds * de) * two
-            + (s * (center_end - to_end) + e * (center_start - to_start));
-        (value, slope, bend / value - slope * slope)
+    let arc = OnArc {
+        start,
+        end,
+        d,
+        center_start: kernel.rest(mean, start) / d,
+        center_end: kernel.rest(mean, end),
     };
     // Rounding must not push the ends out of the arc, to the other end of the circle.
     let first = HalfAngle {
@@ -438,8 +458,8 @@ fn weight_on_arc<R: Real>(
     let high = kernel.zero(start, one);
     let low = HalfAngle::select(low.is_up_to(query), low, first);
     let high = HalfAngle::select(high.is_up_to(query), high, query);
-    let (value_low, slope_low, _) = at(low);
-    let (value_high, slope_high, _) = at(high);
+    let (value_low, slope_low, _) = arc.at(kernel, low);
+    let (value_high, slope_high, _) = arc.at(kernel, high);
     let mut greatest = value_low.max(value_high);
     let falls = slope_low.le(zero);
     let rises = slope_high.ge(zero) & !falls;
@@ -448,7 +468,7 @@ fn weight_on_arc<R: Real>(
     let mut here = low.middle(high);
     // Nearly all are at rounding errors after two steps.
     unroll!(_i in 0..5, {
-        let (value, slope, bend) = at(here);
+        let (value, slope, bend) = arc.at(kernel, here);
         greatest = greatest.max(value);
         let is_rising = slope.gt(zero);
         low = HalfAngle::select(is_rising, here, low);

@@ -115,7 +115,6 @@ pub fn hausdorff_4msm<R: Real>(
     threads(64),
     precision(f32, f64),
     pinned,
-    scalar,
     inputs = crate::inputs::unit_receivers_4,
     parity(
         absolute = 2e-45,

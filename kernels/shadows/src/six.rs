@@ -50,16 +50,16 @@ pub struct Receiver6<R> {
 }
 
 #[inline(always)]
-fn shadow<R: Real>(
-    settings: &Settings6<R>,
-    receiver: Receiver6<R>,
-    bounds: impl FnOnce(Moments6<R>, R) -> Bounds<R>,
-) -> Shadow<R> {
+fn biased<R: Real>(settings: &Settings6<R>, receiver: Receiver6<R>) -> (Moments6<R>, R) {
     let m = receiver.moments.clamped().lerp(
         settings.bias_target.clamped(),
         settings.moment_bias.saturate(),
     );
-    let bounds = bounds(m, receiver.depth - settings.depth_bias);
+    (m, receiver.depth - settings.depth_bias)
+}
+
+#[inline(always)]
+fn shadow<R: Real>(settings: &Settings6<R>, bounds: Bounds<R>) -> Shadow<R> {
     Shadow {
         shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
     }
@@ -78,7 +78,8 @@ pub fn hamburger_6msm<R: Real>(
     #[uniform] settings: &Settings6<R>,
     #[element] receiver: Receiver6<R>,
 ) -> Shadow<R> {
-    shadow(settings, receiver, hamburger_6)
+    let (m, z) = biased(settings, receiver);
+    shadow(settings, hamburger_6(m, z))
 }
 
 /// `hamburger_6msm` with what is ill-conditioned in about twice the digits.
@@ -97,7 +98,8 @@ pub fn hamburger_6msm_compensated<R: Real>(
     #[uniform] settings: &Settings6<R>,
     #[element] receiver: Receiver6<R>,
 ) -> Shadow<R> {
-    shadow(settings, receiver, hamburger_6_compensated)
+    let (m, z) = biased(settings, receiver);
+    shadow(settings, hamburger_6_compensated(m, z))
 }
 
 /// A texel of each texture.

@@ -61,13 +61,16 @@ pub struct UnitDepth<R> {
 }
 
 #[inline(always)]
-fn shadow<R: Real>(
+fn biased<R: Real>(
     settings: &TrigonometricSettings<R>,
     receiver: TrigonometricReceiver<R>,
-    bounds: impl FnOnce(TrigonometricMoments<R>, R) -> Bounds<R>,
-) -> Shadow<R> {
+) -> (TrigonometricMoments<R>, R) {
     let m = receiver.moments.biased(settings.moment_bias);
-    let bounds = bounds(m, receiver.depth - settings.depth_bias);
+    (m, receiver.depth - settings.depth_bias)
+}
+
+#[inline(always)]
+fn shadow<R: Real>(settings: &TrigonometricSettings<R>, bounds: Bounds<R>) -> Shadow<R> {
     Shadow {
         shadow: cut_leak(bounds.blend(settings.overestimation), settings.light_leak),
     }
@@ -86,9 +89,8 @@ pub fn trigonometric_4msm<R: Real>(
     #[uniform] settings: &TrigonometricSettings<R>,
     #[element] receiver: TrigonometricReceiver<R>,
 ) -> Shadow<R> {
-    shadow(settings, receiver, |m, z| {
-        trigonometric_4(m, HalfAngle::of_depth(z))
-    })
+    let (m, z) = biased(settings, receiver);
+    shadow(settings, trigonometric_4(m, HalfAngle::of_depth(z)))
 }
 
 /// `trigonometric_4msm` with what is ill-conditioned in about twice the digits.
@@ -97,7 +99,6 @@ pub fn trigonometric_4msm<R: Real>(
     threads(64),
     precision(f32, f64),
     pinned,
-    scalar,
     inputs = crate::inputs::trigonometric_receivers,
     parity(
         absolute = 2e-45,
@@ -108,7 +109,8 @@ pub fn trigonometric_4msm_compensated<R: Real>(
     #[uniform] settings: &TrigonometricSettings<R>,
     #[element] receiver: TrigonometricReceiver<R>,
 ) -> Shadow<R> {
-    shadow(settings, receiver, trigonometric_4_compensated)
+    let (m, z) = biased(settings, receiver);
+    shadow(settings, trigonometric_4_compensated(m, z))
 }
 
 /// The trigonometric moments of one depth: what a map for them stores.

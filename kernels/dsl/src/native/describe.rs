@@ -50,6 +50,14 @@ pub struct Kernel {
     pub image_pass: Option<ImagePass>,
 }
 
+/// A text of a description. A call, not inlined: the built-in kernels have thousands of them.
+#[doc(hidden)]
+#[inline(never)]
+#[must_use]
+pub fn text(text: &'static str) -> String {
+    text.into()
+}
+
 /// A form of an image pass that comes from one function in two: a compute kernel that writes texels of
 /// storage textures, and a fragment kernel that returns them as colours.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

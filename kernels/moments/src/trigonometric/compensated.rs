@@ -376,6 +376,50 @@ impl<R: Real> Polynomial<R> {
     }
 }
 
+/// What the weight of a point on an arc is made of, by powers of the tangent of half its angle from the middle.
+struct OnArc<R> {
+    /// The direction relative to the mean, in the kernel's axes, over 1 + t².
+    u: Polynomial<R>,
+    v: Polynomial<R>,
+    /// K with the start, over K of start and end, and with the end.
+    s: Polynomial<R>,
+    e: Polynomial<R>,
+    /// The kernel's factors of u² and v².
+    p: R,
+    q: R,
+}
+
+impl<R: Real> OnArc<R> {
+    /// 1/w, and the first two derivatives of its logarithm.
+    #[inline(always)]
+    fn at(&self, t: R) -> (R, R, R) {
+        let zero: R = lit!(0.0);
+        let one: R = lit!(1.0);
+        let two: R = lit!(2.0);
+        let w = t * t + one;
+        let (u0, u1) = self.u.at(t);
+        let (v0, v1) = self.v.at(t);
+        let (s0, s1) = self.s.at(t);
+        let (e0, e1) = self.e.at(t);
+        let (s0, e0) = (s0.max(zero), e0.max(zero));
+        let own = u0 * u0 * self.p + w * w + v0 * v0 * self.q;
+        let value = own + s0 * e0;
+        let own_slope = u0 * u1 * self.p + t * w * two + v0 * v1 * self.q;
+        let slope = (own_slope * two + (s0 * e1 + s1 * e0)) / value;
+        let own_bend = (u1 * u1 + u0 * self.u.bend * two) * self.p
+            + (t * t * lit!(4.0) + w * two)
+            + (v1 * v1 + v0 * self.v.bend * two) * self.q;
+        let bend = own_bend * two + (s0 * self.e.bend + self.s.bend * e0 + s1 * e1) * two;
+        // By half the angle, of which the derivative is 1 + t²; and all is over (1 + t²)².
+        let bend = (bend / value - slope * slope) * w + t * slope * two;
+        (
+            value / (w * w),
+            slope * w - t * lit!(4.0),
+            bend * w - w * lit!(4.0),
+        )
+    }
+}
+
 /// Both arcs between depth 0 and a query point.
 struct Arcs<R: Real> {
     kernel: Kernel<R>,
@@ -431,43 +475,24 @@ impl<R: Real> Arcs<R> {
         let value = kernel.shear(x.minus(mean_x), y.minus(mean_y));
         let slope = kernel.shear(y.scaled(-two * side), x.scaled(two * side));
         let bend = kernel.shear(x.plus(mean_x), y.plus(mean_y));
-        let u = Polynomial {
-            value: value.u.rounded(),
-            slope: slope.u.rounded(),
-            bend: -bend.u.rounded(),
+        let arc = OnArc {
+            u: Polynomial {
+                value: value.u.rounded(),
+                slope: slope.u.rounded(),
+                bend: -bend.u.rounded(),
+            },
+            v: Polynomial {
+                value: value.v.rounded(),
+                slope: slope.v.rounded(),
+                bend: -bend.v.rounded(),
+            },
+            s,
+            e,
+            p: kernel.p.rounded(),
+            q: kernel.q.rounded(),
         };
-        let v = Polynomial {
-            value: value.v.rounded(),
-            slope: slope.v.rounded(),
-            bend: -bend.v.rounded(),
-        };
-        let (p, q) = (kernel.p.rounded(), kernel.q.rounded());
-        // 1/w, and the first two derivatives of its logarithm.
-        let at = |t: R| {
-            let w = t * t + one;
-            let (u0, u1) = u.at(t);
-            let (v0, v1) = v.at(t);
-            let (s0, s1) = s.at(t);
-            let (e0, e1) = e.at(t);
-            let (s0, e0) = (s0.max(zero), e0.max(zero));
-            let own = u0 * u0 * p + w * w + v0 * v0 * q;
-            let value = own + s0 * e0;
-            let own_slope = u0 * u1 * p + t * w * two + v0 * v1 * q;
-            let slope = (own_slope * two + (s0 * e1 + s1 * e0)) / value;
-            let own_bend = (u1 * u1 + u0 * u.bend * two) * p
-                + (t * t * lit!(4.0) + w * two)
-                + (v1 * v1 + v0 * v.bend * two) * q;
-            let bend = own_bend * two + (s0 * e.bend + s.bend * e0 + s1 * e1) * two;
-            // By half the angle, of which the derivative is 1 + t²; and all is over (1 + t²)².
-            let bend = (bend / value - slope * slope) * w + t * slope * two;
-            (
-                value / (w * w),
-                slope * w - t * lit!(4.0),
-                bend * w - w * lit!(4.0),
-            )
-        };
-        let (value_low, slope_low, _) = at(low);
-        let (value_high, slope_high, _) = at(high);
+        let (value_low, slope_low, _) = arc.at(low);
+        let (value_high, slope_high, _) = arc.at(high);
         let mut greatest = value_low.max(value_high).max(one);
         let falls = slope_low.le(zero);
         let rises = slope_high.ge(zero) & !falls;
@@ -482,7 +507,7 @@ impl<R: Real> Arcs<R> {
         };
         let mut i = 0;
         while i < steps {
-            let (value, slope, bend) = at(t);
+            let (value, slope, bend) = arc.at(t);
             greatest = greatest.max(value);
             let is_rising = slope.gt(zero);
             low = R::select(is_rising, t, low);
