@@ -794,6 +794,20 @@ fn a_scene_is_planned() {
     let line = format!("plan scene.toml --error 0.3 --memory 0.001 {few} --format json");
     let out = desk.hankel(&line).code(1).out();
     assert!(out.contains("beyond the memory budget"), "{out}");
+    // Four samples of depth and one are tried, and one if that is said.
+    let vsm = "--technique vsm --size 64 --filter 1 --fit camera --format json";
+    let considered = |more: &str| {
+        let line = format!("plan scene.toml --error 0.3 {vsm} {more}");
+        let plan: serde_json::Value =
+            serde_json::from_str(&desk.hankel(&line).code(0).out()).expect("it is JSON");
+        let choice = plan["choice"].as_str().expect("a plan has a choice");
+        (choice.to_owned(), plan["considered"].as_u64())
+    };
+    let (choice, of_one) = considered("--multisampling 1");
+    assert!(choice.contains(", one sample, 64²"), "{choice}");
+    assert_eq!(considered("").1, of_one.map(|count| 2 * count));
+    desk.hankel("plan scene.toml --error 0.3 --multisampling 2")
+        .fails(2, &["give 4 or 1"]);
     desk.hankel("plan scene.toml --error 0")
         .fails(2, &["above 0"]);
     desk.hankel("plan scene.toml --error 0.1 --technique magic")
