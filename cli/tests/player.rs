@@ -37,9 +37,6 @@ height = 64
 /// `soft` 0.3 % of the pixels differ, and 0.7 % between the native picture and that of Vulkan.
 const ROUNDED: f64 = 0.005;
 
-/// The same for another rasteriser, which may cover other samples at the edges of triangles.
-const EDGES: f64 = 0.01;
-
 fn json(desk: &Desk, file: &str) -> Value {
     serde_json::from_str(&desk.read(file)).expect("it is JSON")
 }
@@ -294,9 +291,8 @@ fn frames_of_single_samples_are_played_in_webgl_2() {
         let picture = Picture::of_linear(expected.width, expected.height, &light);
         let (share, largest) = compare(&picture.expect("all of its pixels"), &expected);
         println!("{technique} {format} {more:?}: {share} of the pixels, the most by {largest}");
-        // A rasteriser of its own decides which samples at the edges of triangles are covered.
         assert!(
-            share <= EDGES,
+            share <= ROUNDED,
             "{technique} {format} {more:?}: {share} of the pixels, the most by {largest}"
         );
     }

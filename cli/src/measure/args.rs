@@ -126,8 +126,9 @@ Examples:
   hankel bench frames --output 320x180 --error 0.1,0.05 --out report
 
 Every technique in every format, with every map size, filter and fit, with four samples of depth in a texel and
-with one, on every scene in every size of the picture. OUT gets frames.html, frames.json, a CSV file for each table, pictures, and measured.jsonl, to which
-each finished measurement is added at once: the same command in the same folder goes on where it was ended.
+with one, on every scene in every size of the picture. OUT gets frames.html, frames.json, a CSV file for each
+table, pictures, and measured.jsonl, to which each finished measurement is added at once: the same command in the
+same folder goes on where it was ended.
 
 Exit code 1: with --error, a plan's error is beyond it, or its time beyond 1.15 of the least.")]
 pub struct BenchFrames {

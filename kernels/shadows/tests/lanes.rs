@@ -31,6 +31,7 @@ fn everything_is_inlined_into_the_code_of_an_instruction_set() {
         .collect();
     assert!(
         outside.is_empty(),
-        "mark these as #[inline(always)], a closure by writing it as such a function: {outside:#?}"
+        "these are not inlined: mark them #[inline(always)], and write closures as functions that are marked so: \
+         {outside:#?}"
     );
 }
