@@ -42,6 +42,7 @@ fn found(sample: &Sample, path: Path, seed: u64) -> Result<Found, String> {
     let mut scalar = NativeDevice::with_mode(Mode::REFERENCE);
     let mut lanes = NativeDevice::new();
     let mut gpu = vulkan();
+    let floats = gpu.floats().map_err(|e| e.to_string())?;
     let numbers = Numbers::of(kernel);
     let rules = Rules::of(kernel, kernel.tolerance.clone());
     let mut found = Found::default();
@@ -51,7 +52,7 @@ fn found(sample: &Sample, path: Path, seed: u64) -> Result<Found, String> {
         let written = if path == Path::Lanes {
             execute::dispatch(&mut lanes, &program, &case).map_err(|e| e.to_string())?
         } else {
-            execute::on_vulkan(&mut gpu, &program, &case).map_err(|e| e.to_string())?
+            execute::on_vulkan(&mut gpu, &program, &case, &floats).map_err(|e| e.to_string())?
         };
         numbers.compare(&case, &rules, None, &reference, &written, &mut found);
     }

@@ -39,7 +39,8 @@ pub mod webgpu;
 /// In words: there is no such runner, or no device.
 pub fn serve(which: &str) -> Result<(), String> {
     match which {
-        "vulkan" => vulkan::serve(),
+        "vulkan" => vulkan::serve(false),
+        "vulkan-as-it-is" => vulkan::serve(true),
         "gl" => gl::serve(),
         _ => Err(format!("`{which}` is no runner; there are vulkan and gl")),
     }

@@ -4,7 +4,10 @@
 use std::fs;
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
-use hankel_host::device::{DeviceError, Format, Program, Shader, TextureShape, VulkanDevice};
+use hankel_host::device::vulkan::Floats;
+use hankel_host::device::{
+    Device, DeviceError, Format, Program, Shader, TextureShape, VulkanDevice,
+};
 use hankel_host::inputs::{Case, Class, Input};
 use hankel_host::parity::execute::{self, ExecuteError};
 use serde::{Deserialize, Serialize};
@@ -37,14 +40,24 @@ pub enum Way {
     Wgsl,
 }
 
-/// Opens the device, and does the jobs of standard input until it ends.
+/// Opens the device, and does the jobs of standard input until it ends. With `as_it_is` a device computes as it does
+/// by itself, for columns whose reference does so too; otherwise as IEEE 754 says, as far as it can.
 ///
 /// # Errors
 /// In words: why there is no device. What goes wrong with a job is its reply.
-pub fn serve() -> Result<(), String> {
+pub fn serve(as_it_is: bool) -> Result<(), String> {
     let mut device = VulkanDevice::new().map_err(|e| e.to_string())?;
-    let name = hankel_host::device::Device::name(&device).to_owned();
-    serve::serve(&name, |job: &VulkanJob| (job.job.id, run(&mut device, job)))
+    let mut name = device.name().to_owned();
+    let mut floats = Floats::IEEE_754;
+    if !as_it_is {
+        floats = device.floats().map_err(|e| e.to_string())?;
+        if !floats.are_ieee_754() {
+            name = format!("{name}, {floats}");
+        }
+    }
+    serve::serve(&name, |job: &VulkanJob| {
+        (job.job.id, run(&mut device, &floats, job))
+    })
 }
 
 impl From<ExecuteError> for Problem {
@@ -59,7 +72,7 @@ impl From<ExecuteError> for Problem {
     }
 }
 
-fn run(device: &mut VulkanDevice, it: &VulkanJob) -> Result<(), Problem> {
+fn run(device: &mut VulkanDevice, floats: &Floats, it: &VulkanJob) -> Result<(), Problem> {
     let job = &it.job;
     let read = |path: &std::path::Path| {
         fs::read(path).map_err(|e| format!("cannot read {}: {e}", path.display()))
@@ -90,7 +103,7 @@ fn run(device: &mut VulkanDevice, it: &VulkanJob) -> Result<(), Problem> {
     };
     let mut results = Vec::new();
     for case in cases(job, &inputs)? {
-        let written = execute::on_vulkan(device, &program, &case)?;
+        let written = execute::on_vulkan(device, &program, &case, floats)?;
         results.extend(written.into_iter().flatten());
     }
     fs::write(&job.results, results)

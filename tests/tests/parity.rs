@@ -9,9 +9,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use hankel_codegen::Language;
-use hankel_dsl::native::Call;
-use hankel_dsl::native::describe::Rounding;
+use hankel_dsl::native::describe::{Rounding, Tolerance};
+use hankel_dsl::native::{Call, Mode};
 use hankel_host::crates::KernelEntry;
+use hankel_host::device::vulkan::Floats;
+use hankel_host::device::{NativeDevice, Shader, VulkanDevice};
+use hankel_host::inputs;
+use hankel_host::parity::execute;
+use hankel_host::parity::numbers::{Found, Numbers, Rules};
 use hankel_matrix::column::Column;
 use hankel_matrix::known::Known;
 use hankel_matrix::report::{Outcome, Report};
@@ -81,6 +86,64 @@ fn everything_that_a_kernel_can_do_agrees_everywhere() {
     let report = run_all(&subjects(&Crate::conformance()));
     println!("{report}");
     assert!(report.passed, "{report}");
+}
+
+/// Kernels with quotients and roots, as maps, vertices, fragments and image passes.
+const REWRITTEN: [&str; 8] = [
+    "hamburger_4msm",
+    "moment_bound_n3",
+    "moment_bound_compensated_n2",
+    "canonical_n4",
+    "surface",
+    "tint",
+    "blur_r32float",
+    "resolve_single_symmetric_6",
+];
+
+#[test]
+fn what_is_rewritten_for_devices_of_other_arithmetic_gives_the_same_bits() {
+    let mut device = VulkanDevice::new().unwrap_or_else(|e| panic!("{e}"));
+    let own = device.floats().unwrap_or_else(|e| panic!("{e}"));
+    // As a GPU's are that was measured.
+    let floats = Floats {
+        quotient: 2,
+        root: 1,
+        flushes: true,
+        ..own
+    };
+    assert!(floats.has_f64, "{own}");
+    for subject in subjects(&Crate::shadows()) {
+        if !REWRITTEN.contains(&subject.name.as_str()) {
+            continue;
+        }
+        let (name, kernel) = (&subject.name, &subject.entry.kernel);
+        let code = subject.codes[&Language::Spirv].as_ref().unwrap();
+        let (words, _) = code.bytes.as_chunks();
+        let words: Vec<u32> = words.iter().map(|w| u32::from_le_bytes(*w)).collect();
+        let rewritten = floats.as_ieee_754(&words).unwrap().unwrap();
+        assert!(rewritten.len() > words.len(), "{name}");
+        let program = subject
+            .entry
+            .program(Some(Shader::SpirvPassthrough(&words)), &[]);
+        let numbers = Numbers::of(kernel);
+        let rules = Rules::of(
+            kernel,
+            Tolerance {
+                ulp: 0,
+                absolute: 0.0,
+                ..kernel.tolerance.clone()
+            },
+        );
+        let mut found = Found::default();
+        for case in inputs::of_entry(&subject.entry, SEED).unwrap() {
+            let mut native = NativeDevice::with_mode(Mode::REFERENCE);
+            let reference = execute::dispatch(&mut native, &program, &case).unwrap();
+            let written = execute::on_vulkan(&mut device, &program, &case, &floats).unwrap();
+            numbers.compare(&case, &rules, None, &reference, &written, &mut found);
+        }
+        assert!(found.values > 1000, "{name}: {found:?}");
+        assert_eq!(found.beyond, 0, "{name}: {found:?}");
+    }
 }
 
 /// Whether a fault that is put into the WGSL of a subject is found, and in no other column.

@@ -7,6 +7,7 @@ use hankel_dsl::native::describe::{
 
 use super::capture;
 use crate::device::slots::{self, Slot, Use};
+use crate::device::vulkan::Floats;
 use crate::device::{
     Arithmetic, Bind, Blend, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw,
     Pass, Program, Shader, TextureId, TextureShape, Topology,
@@ -130,8 +131,12 @@ fn upload<'a>(
 }
 
 /// Runs a case on Vulkan, whatever its stage: vertices and fragments are drawn as points, each in
-/// a pixel of its own. What naga wrote of a kernel that is not free in its rounding is pinned
-/// behind naga ([`super::translate`]).
+/// a pixel of its own.
+///
+/// What naga wrote of a kernel that is not free in its rounding is pinned behind naga
+/// ([`super::translate`]). A device that by its `floats` does not compute as IEEE 754 says is made to, as far as it
+/// can ([`Floats::as_ieee_754`]), whatever the kernel says of rounding: what differs is then what the translation
+/// did, not what the device does by itself.
 ///
 /// # Errors
 /// The device's, and [`ExecuteError::Stage`] for an interface that targets cannot hold.
@@ -139,9 +144,13 @@ pub fn on_vulkan(
     device: &mut dyn Device,
     program: &Program<'_>,
     case: &Case,
+    floats: &Floats,
 ) -> Result<Written, ExecuteError> {
     let kernel = program.kernel;
-    let arithmetic = Arithmetic::of([kernel]);
+    let arithmetic = match floats.are_ieee_754() {
+        true => Arithmetic::of([kernel]),
+        false => Arithmetic::Pinned,
+    };
     // A vertex stage is rewritten as SPIR-V to be read back.
     let as_it_is = arithmetic == Arithmetic::Free && kernel.stage != Stage::Vertex;
     let translated = match program.shader {
@@ -162,11 +171,17 @@ pub fn on_vulkan(
         _ => None,
     };
     let translated = translated.transpose().map_err(|e| bad(kernel, e))?;
+    let shader = translated
+        .as_deref()
+        .map(Shader::SpirvPassthrough)
+        .or(program.shader);
+    let strict = match shader {
+        Some(Shader::SpirvPassthrough(code)) => floats.as_ieee_754(code),
+        _ => None,
+    };
+    let strict = strict.transpose().map_err(|e| bad(kernel, e))?;
     let given = Program {
-        shader: translated
-            .as_deref()
-            .map(Shader::SpirvPassthrough)
-            .or(program.shader),
+        shader: strict.as_deref().map(Shader::SpirvPassthrough).or(shader),
         ..*program
     };
     let program = &given;

@@ -197,6 +197,8 @@ impl<'a> Engine<'a> {
                 webgpu::command(self.column, &request.tools, &self.folder, request.limit)
                     .map_err(Failure::refused)?
             }
+            // What it is compared with flushes, too.
+            Column::SpirvSwiftshader => own("vulkan-as-it-is"),
             _ => own("vulkan"),
         };
         // Mesa's layer for choosing among several GPUs complains on a machine without a desktop.

@@ -1,6 +1,7 @@
 //! Any Vulkan adapter through wgpu: a GPU, or lavapipe on a machine without one.
 
 mod clock;
+mod floats;
 mod indirect;
 mod pipelines;
 mod resources;
@@ -17,6 +18,7 @@ use super::extent::{self, Extent};
 use super::slots::{self, Given, Slot};
 use super::{Backend, Bind, BufferId, Device, Pass, Program, TextureId, TextureShape};
 use clock::Clock;
+pub use floats::Floats;
 use indirect::Indirect;
 use pipelines::Pipelines;
 use resources::{Memory, Texture};
@@ -56,6 +58,8 @@ pub struct VulkanDevice {
     /// While times are taken.
     clock: Option<Clock>,
     by_timestamps: bool,
+    /// Measured when it is first asked for.
+    floats: Option<Floats>,
 }
 
 /// How many workgroups run along x, y, z.
@@ -163,6 +167,7 @@ impl VulkanDevice {
             indirect: None,
             clock: None,
             by_timestamps: false,
+            floats: None,
         })
     }
 

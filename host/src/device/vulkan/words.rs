@@ -1,14 +1,26 @@
 //! SPIR-V as words: what must be known of a module before a driver gets it unseen, and the small
 //! changes that need no compiler.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
+/// `OpExtension`.
+const EXTENSION: u16 = 10;
+/// `OpExtInstImport`.
+const EXT_INST_IMPORT: u16 = 11;
+/// `OpExtInst`.
+const EXT_INST: u16 = 12;
 /// `OpEntryPoint`.
 const ENTRY_POINT: u16 = 15;
+/// `OpExecutionMode`.
+const EXECUTION_MODE: u16 = 16;
 /// `OpCapability`.
 const CAPABILITY: u16 = 17;
 /// `OpTypeVoid`, the first of the types.
 const TYPE_VOID: u16 = 19;
+/// `OpTypeFloat`.
+const TYPE_FLOAT: u16 = 22;
+/// `OpTypeVector`.
+const TYPE_VECTOR: u16 = 23;
 /// `OpVariable`, the last of the declarations.
 const VARIABLE: u16 = 59;
 /// Float arithmetic: negation, sum, difference, product, quotient, remainders, and what multiplies
@@ -16,6 +28,18 @@ const VARIABLE: u16 = 59;
 const ARITHMETIC: [u16; 14] = [
     127, 129, 131, 133, 136, 140, 141, 142, 143, 144, 145, 146, 147, 148,
 ];
+/// `OpFConvert`.
+const CONVERT: u16 = 115;
+/// `OpFDiv`.
+const DIVIDE: u16 = 136;
+/// `Sqrt` of `GLSL.std.450`.
+const SQRT: u32 = 31;
+/// Capability and execution mode `DenormPreserve`.
+pub const DENORM_PRESERVE: (u32, u32) = (4464, 4459);
+/// Capability and execution mode `SignedZeroInfNanPreserve`.
+pub const SIGNED_ZERO_INF_NAN_PRESERVE: (u32, u32) = (4466, 4461);
+/// Capability `Float64`.
+const FLOAT_64: u32 = 10;
 /// `OpSpecConstant`.
 const SPEC_CONSTANT: u16 = 50;
 /// `OpFunction`.
@@ -81,6 +105,14 @@ fn string(words: &[u32]) -> String {
         .take_while(|&b| b != 0)
         .collect();
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// A string as operands.
+fn literal(text: &str) -> Vec<u32> {
+    let mut bytes = text.as_bytes().to_vec();
+    bytes.resize(bytes.len() / 4 * 4 + 4, 0);
+    let (words, _) = bytes.as_chunks();
+    words.iter().map(|word| u32::from_le_bytes(*word)).collect()
 }
 
 /// Whether a module has push constants.
@@ -202,6 +234,145 @@ pub fn forbid_reordering(words: &[u32]) -> Result<Vec<u32>, String> {
     Ok(changed)
 }
 
+/// The module with these execution modes for 32-bit floats in all its entry points, capability and mode each.
+pub fn with_modes(words: &[u32], modes: &[(u32, u32)]) -> Result<Vec<u32>, String> {
+    let all = instructions(words)?;
+    let entries: Vec<u32> = all
+        .iter()
+        .filter_map(|i| match (i.opcode, i.operands) {
+            (ENTRY_POINT, [_, id, ..]) => Some(*id),
+            _ => None,
+        })
+        .collect();
+    if modes.is_empty() || entries.is_empty() {
+        return Ok(words.to_vec());
+    }
+    let mut changed = words[..HEADER].to_vec();
+    for (capability, _) in modes {
+        changed.extend([2 << 16 | u32::from(CAPABILITY), *capability]);
+    }
+    let mut extension = Some(literal("SPV_KHR_float_controls"));
+    let mut asked = false;
+    for (n, i) in all.iter().enumerate() {
+        // Extensions come after capabilities, and execution modes after entry points.
+        if i.opcode != CAPABILITY
+            && let Some(name) = extension.take()
+        {
+            changed.push((name.len() as u32 + 1) << 16 | u32::from(EXTENSION));
+            changed.extend(name);
+        }
+        changed.extend_from_slice(&words[i.at..=i.at + i.operands.len()]);
+        let is_last = all.get(n + 1).is_none_or(|next| next.opcode != ENTRY_POINT);
+        if i.opcode == ENTRY_POINT && is_last && !asked {
+            asked = true;
+            for entry in &entries {
+                for (_, mode) in modes {
+                    changed.extend([4 << 16 | u32::from(EXECUTION_MODE), *entry, *mode, 32]);
+                }
+            }
+        }
+    }
+    Ok(changed)
+}
+
+/// The module with its quotients and square roots of 32-bit floats computed in 64 bits and rounded, so that they are
+/// those of IEEE 754 on every device that has 64-bit floats: twice rounded, from 53 bits to 24, they are as if
+/// rounded once. Vulkan lets a device's own be off by 2.5 units in the last place.
+pub fn round_quotients(words: &[u32]) -> Result<Vec<u32>, String> {
+    let all = instructions(words)?;
+    let is_sqrt = {
+        let library = all.iter().find_map(|i| match (i.opcode, i.operands) {
+            (EXT_INST_IMPORT, [id, name @ ..]) if string(name) == "GLSL.std.450" => Some(*id),
+            _ => None,
+        });
+        move |set: u32, number: u32| library == Some(set) && number == SQRT
+    };
+    // Types of 32-bit and of 64-bit floats, by how many there are.
+    let mut floats = HashMap::new();
+    let mut wide = [None; 5];
+    for i in &all {
+        match (i.opcode, i.operands) {
+            (TYPE_FLOAT, [id, 32, ..]) => _ = floats.insert(*id, 1),
+            (TYPE_FLOAT, [id, 64, ..]) => wide[1] = Some(*id),
+            (TYPE_VECTOR, [id, of, size @ 2..=4]) if floats.contains_key(of) => {
+                floats.insert(*id, *size as usize);
+            }
+            (TYPE_VECTOR, [id, of, size @ 2..=4]) if wide[1] == Some(*of) => {
+                wide[*size as usize] = Some(*id);
+            }
+            _ => {}
+        }
+    }
+    let mut bound = words[3];
+    let mut fresh = || {
+        bound += 1;
+        bound - 1
+    };
+    let mut types: Vec<u32> = Vec::new();
+    let mut body: Vec<u32> = Vec::new();
+    let mut first_function = None;
+    for i in &all {
+        let own = &words[i.at..=i.at + i.operands.len()];
+        if i.opcode == FUNCTION && first_function.is_none() {
+            first_function = Some(body.len());
+        }
+        let (ty, result, operands) = match (i.opcode, i.operands) {
+            (DIVIDE, [ty, result, operands @ ..]) => (ty, *result, operands),
+            (EXT_INST, [ty, result, set, number, operands @ ..]) if is_sqrt(*set, *number) => {
+                (ty, *result, operands)
+            }
+            _ => {
+                body.extend_from_slice(own);
+                continue;
+            }
+        };
+        let Some(&size) = floats.get(ty) else {
+            body.extend_from_slice(own);
+            continue;
+        };
+        for n in [1, size] {
+            if wide[n].is_none() {
+                let id = fresh();
+                wide[n] = Some(id);
+                match wide[1] {
+                    Some(float) if n > 1 => {
+                        types.extend([4 << 16 | u32::from(TYPE_VECTOR), id, float, n as u32]);
+                    }
+                    _ => types.extend([3 << 16 | u32::from(TYPE_FLOAT), id, 64]),
+                }
+            }
+        }
+        let of = wide[size].unwrap_or_default();
+        let converted: Vec<u32> = operands
+            .iter()
+            .map(|operand| {
+                let id = fresh();
+                body.extend([4 << 16 | u32::from(CONVERT), of, id, *operand]);
+                id
+            })
+            .collect();
+        let exact = fresh();
+        let first = own.len() - operands.len();
+        let at = body.len();
+        body.extend_from_slice(&own[..first]);
+        body.extend(converted);
+        (body[at + 1], body[at + 2]) = (of, exact);
+        body.extend([4 << 16 | u32::from(CONVERT), *ty, result, exact]);
+    }
+    let Some(at) = first_function else {
+        return Err("it has no functions".into());
+    };
+    body.splice(at..at, types);
+    let mut changed = words[..HEADER].to_vec();
+    changed[3] = bound;
+    let has_wide = |i: &Instruction<'_>| (i.opcode, i.operands) == (CAPABILITY, &[FLOAT_64]);
+    if bound > words[3] && !all.iter().any(has_wide) {
+        changed.extend([2 << 16 | u32::from(CAPABILITY), FLOAT_64]);
+    }
+    changed.extend(body);
+    Ok(changed)
+}
+
 /// The module with the variables at `bindings` declared as never read, which naga needs to know of
 /// a storage texture that is only written.
 pub fn write_only(words: &[u32], bindings: &[u32]) -> Result<Vec<u32>, String> {
@@ -299,6 +470,42 @@ mod tests {
         assert!(once.windows(3).any(|x| x == added));
         assert_eq!(summary(&once), summary(&w));
         assert_eq!(forbid_reordering(&once).unwrap(), once);
+    }
+
+    #[test]
+    fn quotients_and_roots_are_computed_in_64_bits() {
+        let text = "
+@group(0) @binding(0) var<storage, read_write> x: array<vec3<f32>>;
+@compute @workgroup_size(1)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let v = x[id.x];
+    x[id.x] = sqrt(v / v.zyx) + vec3<f32>(v.x / v.y, f32(id.x / 3u), floor(v.z));
+}";
+        let module = naga::front::wgsl::parse_str(text).unwrap();
+        let mut validator = naga::valid::Validator::new(
+            naga::valid::ValidationFlags::all(),
+            naga::valid::Capabilities::all(),
+        );
+        let info = validator.validate(&module).unwrap();
+        let options = naga::back::spv::Options::default();
+        let written = naga::back::spv::write_vec(&module, &info, &options, None).unwrap();
+        let rounded = round_quotients(&written).unwrap();
+        let count = |words: &[u32], opcode: u16| {
+            let all = instructions(words).unwrap();
+            all.iter().filter(|i| i.opcode == opcode).count()
+        };
+        // Two quotients and a root, of five operands.
+        assert_eq!(count(&rounded, CONVERT), count(&written, CONVERT) + 5 + 3);
+        assert_eq!(count(&rounded, DIVIDE), 2);
+        assert!(summary(&rounded).unwrap().capabilities.contains(&FLOAT_64));
+        let read = |words: &[u32]| {
+            let options = naga::front::spv::Options::default();
+            let front = naga::front::spv::Frontend::new(words.iter().copied(), &options);
+            front.parse().unwrap()
+        };
+        validator.validate(&read(&rounded)).unwrap();
+        // 64-bit quotients stay as they are.
+        assert_eq!(round_quotients(&rounded).unwrap(), rounded);
     }
 
     #[test]
