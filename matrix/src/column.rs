@@ -137,6 +137,13 @@ impl Column {
         )
     }
 
+    /// Whether its device may flush subnormal numbers: [what does](Self::flushes), and Vulkan devices, which say so
+    /// when they are opened.
+    #[must_use]
+    pub fn may_flush(self) -> bool {
+        self.flushes() || self.tools().contains(&Tool::Vulkan)
+    }
+
     /// What it takes.
     #[must_use]
     pub const fn tools(self) -> &'static [Tool] {

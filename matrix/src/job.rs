@@ -4,7 +4,8 @@
 //! be written in any language: a job is one line of JSON, the inputs are a file of bytes, and so
 //! are the results.
 //!
-//! - A runner starts by printing one line `{"ready": "name and versions of the device"}`.
+//! - A runner starts by printing one line `{"ready": "name and versions of the device"}`, with `"flushes": true` if
+//!   the device flushes subnormal numbers.
 //! - It reads a [`Job`] from each line of its standard input, and answers each with one line,
 //!   a [`Reply`].
 //! - [`Job::inputs`] holds the bytes that the arguments point into; of a texture they are packed,

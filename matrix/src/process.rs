@@ -97,6 +97,8 @@ pub struct Runner {
     log: Log,
     /// What it runs on, in its words.
     pub ready: String,
+    /// Whether that flushes subnormal numbers.
+    pub flushes: bool,
 }
 
 impl Runner {
@@ -135,11 +137,13 @@ impl Runner {
             lines,
             log,
             ready: String::new(),
+            flushes: false,
         };
-        let ready = runner.answer(limit, &|value| {
-            Some(value.get("ready")?.as_str()?.to_owned())
+        (runner.ready, runner.flushes) = runner.answer(limit, &|value| {
+            let ready = value.get("ready")?.as_str()?.to_owned();
+            let flushes = value.get("flushes").and_then(Value::as_bool);
+            Some((ready, flushes.unwrap_or(false)))
         })?;
-        runner.ready = ready;
         Ok(runner)
     }
 
@@ -275,7 +279,7 @@ mod tests {
             r#"{READY} read a; echo noise; echo '{{"id":1}}'; read b; echo '{{"id":2,"error":"no"}}'; read c"#
         );
         let mut runner = Runner::start(&mut shell(&script), LONG).unwrap();
-        assert_eq!(runner.ready, "here");
+        assert_eq!((runner.ready.as_str(), runner.flushes), ("here", false));
         runner.ask(&"job", 1, LONG).unwrap();
         assert_eq!(runner.ask(&"job", 2, LONG), Err(Failure::refused("no")));
         assert!(runner.lives());

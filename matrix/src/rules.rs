@@ -7,11 +7,11 @@ use hankel_host::parity::numbers::Rules;
 
 use crate::column::Column;
 
-/// What `kernel` may differ by in `column`. Columns that flush subnormal numbers have a reference
-/// that does, if `flushed_reference`; otherwise their absurd inputs, of which many are subnormal,
+/// What `kernel` may differ by in `column`, whose device flushes subnormal numbers or not. What flushes has a reference
+/// that does, if `flushed_reference`; otherwise its absurd inputs, of which many are subnormal,
 /// need only give finite results.
 #[must_use]
-pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
+pub fn of(kernel: &Kernel, column: Column, flushes: bool, flushed_reference: bool) -> Rules {
     if matches!(column, Column::Native | Column::NativeSimd) {
         let exact = Tolerance {
             ulp: 0,
@@ -22,7 +22,7 @@ pub fn of(kernel: &Kernel, column: Column, flushed_reference: bool) -> Rules {
         return Rules::of(kernel, exact);
     }
     let mut rules = Rules::of(kernel, kernel.tolerance.clone());
-    if column.flushes() {
+    if flushes {
         rules.flushes = true;
         rules.hostile &= flushed_reference;
     }

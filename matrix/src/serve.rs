@@ -23,16 +23,17 @@ impl From<String> for Problem {
     }
 }
 
-/// Says what the runner runs on, then does the jobs of standard input until it ends. `run` gives a
+/// Says what the runner runs on, and whether that flushes subnormal numbers, then does the jobs of standard input until it ends. `run` gives a
 /// job's number with how it went.
 ///
 /// # Errors
 /// In words: a line that is no job, an output that nobody reads.
 pub(crate) fn serve<J: DeserializeOwned>(
     device: &str,
+    flushes: bool,
     mut run: impl FnMut(&J) -> (u64, Result<(), Problem>),
 ) -> Result<(), String> {
-    say(&json!({ "ready": device }))?;
+    say(&json!({ "ready": device, "flushes": flushes }))?;
     for line in io::stdin().lock().lines() {
         let line = line.map_err(|e| format!("standard input: {e}"))?;
         let job = serde_json::from_str(&line).map_err(|e| format!("this is no job: {e}"))?;

@@ -40,8 +40,8 @@ pub enum Way {
     Wgsl,
 }
 
-/// Opens the device, and does the jobs of standard input until it ends. With `as_it_is` a device computes as it does
-/// by itself, for columns whose reference does so too; otherwise as IEEE 754 says, as far as it can.
+/// Opens the device, and does the jobs of standard input until it ends. With `as_it_is` the device
+/// computes as it does by itself; otherwise as IEEE 754 says, as far as it can.
 ///
 /// # Errors
 /// In words: why there is no device. What goes wrong with a job is its reply.
@@ -55,7 +55,8 @@ pub fn serve(as_it_is: bool) -> Result<(), String> {
             name = format!("{name}, {floats}");
         }
     }
-    serve::serve(&name, |job: &VulkanJob| {
+    let flushes = floats.flushes && !floats.keeps_subnormals;
+    serve::serve(&name, flushes, |job: &VulkanJob| {
         (job.job.id, run(&mut device, &floats, job))
     })
 }

@@ -61,5 +61,7 @@ impl Gl {
 pub fn serve() -> Result<(), String> {
     let mut gl = Gl::open()?;
     let name = gl.name();
-    crate::serve::serve(&name, |job: &Job| (job.id, gl.run(job).map_err(Into::into)))
+    crate::serve::serve(&name, false, |job: &Job| {
+        (job.id, gl.run(job).map_err(Into::into))
+    })
 }

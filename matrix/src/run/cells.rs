@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use hankel_codegen::files::sha256;
+use hankel_dsl::native::describe::Precision;
 use hankel_host::parity::execute::Written;
 use hankel_host::parity::numbers::{Found, Numbers};
 
@@ -75,7 +76,7 @@ impl<'a> Shared<'a> {
                 &it.simd
             };
             let results = results.clone().map_err(Failure::refused);
-            let mut cell = judge(it, column, None, results, Duration::ZERO);
+            let mut cell = judge(it, column, false, None, results, Duration::ZERO);
             if column == Column::Native {
                 finite(it, &mut cell);
             }
@@ -124,7 +125,7 @@ impl<'a> Shared<'a> {
             &code.entry_point,
             &code.places,
             &it.hash,
-            rules::of(it.kernel(), column, it.flushed.is_some()),
+            rules::of(it.kernel(), column, column.flushes(), it.flushed.is_some()),
             versions,
         ))
     }
@@ -149,7 +150,14 @@ impl<'a> Shared<'a> {
             let cell = self.permits.hold(|| {
                 let began = Instant::now();
                 let results = engine.run(unit);
-                judge(unit.it, column, Some(unit.code), results, began.elapsed())
+                judge(
+                    unit.it,
+                    column,
+                    engine.flushes,
+                    Some(unit.code),
+                    results,
+                    began.elapsed(),
+                )
             });
             // A refusal may be this machine's (no space, a lost device), and costs little to repeat.
             let ran = matches!(
@@ -205,12 +213,15 @@ fn finite(it: &Ready<'_>, cell: &mut Cell) {
 fn judge(
     it: &Ready<'_>,
     column: Column,
+    flushes: bool,
     code: Option<&Code>,
     results: Result<Vec<Written>, Failure>,
     took: Duration,
 ) -> Cell {
     let kernel = it.kernel();
-    let rules = rules::of(kernel, column, it.flushed.is_some());
+    // 64-bit floats are flushed by none.
+    let flushes = flushes && kernel.precision != Some(Precision::F64);
+    let rules = rules::of(kernel, column, flushes, it.flushed.is_some());
     let mut cell = Cell {
         outcome: Outcome::Passed,
         rules: Some(rules.clone()),
@@ -233,7 +244,7 @@ fn judge(
         found
     };
     let references: Result<Vec<&Vec<Written>>, &String> = it
-        .references_for(column)
+        .references_for(column, flushes)
         .iter()
         .map(Result::as_ref)
         .collect();

@@ -33,6 +33,8 @@ pub(super) struct Engine<'a> {
     dxc: Option<Dxc>,
     /// What runs them, in its own words, once it has been started.
     pub(super) device: Option<String>,
+    /// Whether that flushes subnormal numbers.
+    pub(super) flushes: bool,
 }
 
 impl<'a> Engine<'a> {
@@ -46,6 +48,7 @@ impl<'a> Engine<'a> {
             broken: None,
             dxc: None,
             device: None,
+            flushes: column.flushes(),
         }
     }
 
@@ -166,6 +169,7 @@ impl<'a> Engine<'a> {
         match Runner::start(&mut command, limit) {
             Ok(runner) => {
                 self.device = Some(runner.ready.clone());
+                self.flushes |= runner.flushes;
                 Ok(runner)
             }
             Err(failure) => {

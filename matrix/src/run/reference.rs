@@ -44,9 +44,14 @@ impl Ready<'_> {
         &self.subject.entry.kernel
     }
 
-    /// What a column is compared with: it agrees if it agrees with one of them.
-    pub(super) fn references_for(&self, column: Column) -> &[Result<Vec<Written>, String>] {
-        let flushes = column.flushes() && self.flushed.is_some();
+    /// What a column, whose device `flushes` subnormal numbers or not, is compared with: it agrees if it agrees with
+    /// one of them.
+    pub(super) fn references_for(
+        &self,
+        column: Column,
+        flushes: bool,
+    ) -> &[Result<Vec<Written>, String>] {
+        let flushes = flushes && self.flushed.is_some();
         let by_size = &self.by_size[usize::from(flushes)];
         match &self.flushed {
             // Natively the size is known.
@@ -109,7 +114,7 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
     let flushed = request
         .columns
         .iter()
-        .any(|c| c.flushes())
+        .any(|c| c.may_flush())
         .then(|| flushed_run(|| natively(Mode::REFERENCE)))
         .flatten();
     let sizes = SUBGROUP_SIZES.map(|size| Mode::REFERENCE.in_subgroups_of(size));
