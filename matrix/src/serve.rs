@@ -23,8 +23,8 @@ impl From<String> for Problem {
     }
 }
 
-/// Says what the runner runs on, and whether that flushes subnormal numbers, then does the jobs of standard input until it ends. `run` gives a
-/// job's number with how it went.
+/// Says what the runner runs on, and whether that flushes subnormal numbers, then does the jobs of standard input until
+/// it ends. `run` gives a job's number with how it went.
 ///
 /// # Errors
 /// In words: a line that is no job, an output that nobody reads.

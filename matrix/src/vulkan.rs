@@ -4,9 +4,8 @@
 use std::fs;
 
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
-use hankel_host::device::vulkan::Floats;
 use hankel_host::device::{
-    Device, DeviceError, Format, Program, Shader, TextureShape, VulkanDevice,
+    Device, DeviceError, Floats, Format, Program, Shader, TextureShape, VulkanDevice,
 };
 use hankel_host::inputs::{Case, Class, Input};
 use hankel_host::parity::execute::{self, ExecuteError};

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 pub use error::{DeviceError, Result};
 pub use native::NativeDevice;
 pub use route::Arithmetic;
-pub use vulkan::VulkanDevice;
+pub use vulkan::{Floats, VulkanDevice};
 
 /// A buffer of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

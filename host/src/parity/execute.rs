@@ -7,10 +7,9 @@ use hankel_dsl::native::describe::{
 
 use super::capture;
 use crate::device::slots::{self, Slot, Use};
-use crate::device::vulkan::Floats;
 use crate::device::{
     Arithmetic, Bind, Blend, BufferId, Colour, Cull, Depth, DepthTest, Device, DeviceError, Draw,
-    Pass, Program, Shader, TextureId, TextureShape, Topology,
+    Floats, Pass, Program, Shader, TextureId, TextureShape, Topology,
 };
 use crate::inputs::{Case, Input};
 

@@ -219,7 +219,7 @@ fn judge(
     took: Duration,
 ) -> Cell {
     let kernel = it.kernel();
-    // 64-bit floats are flushed by none.
+    // What flushes does so with 32-bit floats.
     let flushes = flushes && kernel.precision != Some(Precision::F64);
     let rules = rules::of(kernel, column, flushes, it.flushed.is_some());
     let mut cell = Cell {

@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use hankel_dsl::native::describe::Tolerance;
 use hankel_host::crates::KernelEntry;
-use hankel_host::device::vulkan::Floats;
-use hankel_host::device::{Device, Shader, VulkanDevice};
+use hankel_host::device::{Device, Floats, Shader, VulkanDevice};
 use hankel_host::inputs;
 use hankel_host::parity::execute;
 use hankel_host::parity::numbers::{Found, Numbers, Rules};
@@ -67,6 +66,7 @@ fn between(
     for case in &cases {
         let mut run = |words| {
             let program = entry.program(Some(Shader::SpirvPassthrough(words)), &[]);
+            // Both as the device computes by itself.
             execute::on_vulkan(device, &program, case, &Floats::IEEE_754).map_err(|error| {
                 Failure::input(
                     format!("kernel `{}` does not run: {error}", kernel.name),

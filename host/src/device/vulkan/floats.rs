@@ -3,9 +3,10 @@
 
 use std::fmt;
 
+use ash::vk;
+
 use super::super::error::Result;
-use super::VulkanDevice;
-use super::words;
+use super::{VulkanDevice, own, words};
 
 const SHADER: &str = "
 @group(0) @binding(0) var<storage, read> pairs: array<vec2<f32>>;
@@ -76,12 +77,14 @@ impl Floats {
         if self.keeps_specials {
             modes.push(words::SIGNED_ZERO_INF_NAN_PRESERVE);
         }
-        let pinned =
-            words::forbid_reordering(code).and_then(|code| words::with_modes(&code, &modes));
-        Some(match self.has_f64 && (self.quotient, self.root) != (0, 0) {
-            true => pinned.and_then(|code| words::round_quotients(&code)),
-            false => pinned,
-        })
+        let mut rewritten = words::forbid_reordering(code);
+        if !modes.is_empty() {
+            rewritten = rewritten.and_then(|code| words::with_modes(&code, &modes));
+        }
+        if self.has_f64 && (self.quotient, self.root) != (0, 0) {
+            rewritten = rewritten.and_then(|code| words::round_quotients(&code));
+        }
+        Some(rewritten)
     }
 }
 
@@ -98,7 +101,7 @@ impl fmt::Display for Floats {
                 "own quotients off by up to {quotient} ulp, square roots by {root}"
             )?;
             if !self.has_f64 {
-                left.push("its quotients and roots");
+                left.push("quotients and roots");
             }
         }
         if self.flushes {
@@ -110,17 +113,16 @@ impl fmt::Display for Floats {
         if self.are_ieee_754() {
             return Ok(());
         }
-        f.write_str("; here computed as IEEE 754 says")?;
+        f.write_str("; parity computes as IEEE 754 says")?;
         match left.as_slice() {
             [] => Ok(()),
-            left => write!(f, " but for {}", left.join(" and ")),
+            left => write!(f, ", except for {}", left.join(" and ")),
         }
     }
 }
 
-/// Numbers from 1 to 2 are first, whose product with the least normal number is one; halves of them follow, whose
-/// product is subnormal; then numbers of all mantissas and of exponents whose quotients are far from the ends of the
-/// range.
+/// Positive numbers of any mantissa, with exponents whose quotients are far from the ends of the range. The first
+/// numbers of the first pairs are from 1/2 to 2: times the least normal number, half of them are subnormal.
 fn pairs() -> Vec<[f32; 2]> {
     let mut rng = fastrand::Rng::with_seed(1);
     let mut number = |exponents| f32::from_bits((rng.u32(exponents) << 23) | rng.u32(..1 << 23));
@@ -164,31 +166,24 @@ impl VulkanDevice {
 
     /// What shaders can ask for.
     fn float_controls(&self) -> Floats {
-        let mut controls = ash::vk::PhysicalDeviceFloatControlsProperties::default();
-        let mut properties = ash::vk::PhysicalDeviceProperties2::default().push_next(&mut controls);
+        let mut controls = vk::PhysicalDeviceFloatControlsProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut controls);
         // SAFETY: the adapter is only asked for its handles, which are not destroyed.
-        if let Some(adapter) = unsafe { self.adapter.as_hal::<wgpu::hal::api::Vulkan>() } {
+        let adapter = unsafe { self.adapter.as_hal::<wgpu::hal::api::Vulkan>() };
+        // The structure is part of Vulkan 1.2.
+        let adapter = adapter.filter(|it| {
+            let limits = it.physical_device_capabilities().properties();
+            limits.api_version >= vk::API_VERSION_1_2
+        });
+        if let Some(adapter) = adapter {
             let instance = adapter.shared_instance().raw_instance();
-            if adapter
-                .physical_device_capabilities()
-                .properties()
-                .api_version
-                < ash::vk::API_VERSION_1_2
-            {
-                return Floats::IEEE_754;
-            }
-            // SAFETY: the physical device is of this instance; the structure is part of Vulkan 1.2, which the device
-            // has, and outlives the call.
-            unsafe {
-                instance.get_physical_device_properties2(
-                    adapter.raw_physical_device(),
-                    &mut properties,
-                );
-            }
+            let device = adapter.raw_physical_device();
+            // SAFETY: the physical device is of this instance and has Vulkan 1.2; the structures outlive the call.
+            unsafe { instance.get_physical_device_properties2(device, &mut properties) };
         }
         Floats {
-            keeps_subnormals: controls.shader_denorm_preserve_float32 == ash::vk::TRUE,
-            keeps_specials: controls.shader_signed_zero_inf_nan_preserve_float32 == ash::vk::TRUE,
+            keeps_subnormals: controls.shader_denorm_preserve_float32 == vk::TRUE,
+            keeps_specials: controls.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE,
             ..Floats::IEEE_754
         }
     }
@@ -199,18 +194,6 @@ impl VulkanDevice {
         let given: &[u8] = bytemuck::cast_slice(pairs);
         let size = (pairs.len() * RESULT) as u64;
         let results = self.guarded(&during, |device| {
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("floats"),
-                source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-            });
-            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some("floats"),
-                layout: None,
-                module: &module,
-                entry_point: None,
-                compilation_options: Default::default(),
-                cache: None,
-            });
             let buffer = |label, size, usage| {
                 device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some(label),
@@ -222,28 +205,10 @@ impl VulkanDevice {
             let pairs = buffer("pairs", given.len() as u64, wgpu::BufferUsages::COPY_DST);
             let results = buffer("results", size, wgpu::BufferUsages::COPY_SRC);
             self.queue.write_buffer(&pairs, 0, given);
-            let mut binding = 0;
-            let entries = [&pairs, &results].map(|buffer| {
-                let entry = wgpu::BindGroupEntry {
-                    binding,
-                    resource: buffer.as_entire_binding(),
-                };
-                binding += 1;
-                entry
-            });
-            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("floats"),
-                layout: &pipeline.get_bind_group_layout(0),
-                entries: &entries,
-            });
-            let mut encoder = device.create_command_encoder(&Default::default());
-            {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                pass.set_pipeline(&pipeline);
-                pass.set_bind_group(0, &group, &[]);
-                pass.dispatch_workgroups((PAIRS / WORKGROUP) as u32, 1, 1);
-            }
-            self.queue.submit([encoder.finish()]);
+            let resources = [&pairs, &results].map(|buffer| buffer.as_entire_binding());
+            let pipeline = own::pipeline(device, "floats", SHADER.into());
+            let groups = [(PAIRS / WORKGROUP) as u32, 1, 1];
+            self.run_own(device, "floats", &pipeline, resources, groups);
             results
         })?;
         self.download(&results, size, "measured floats")

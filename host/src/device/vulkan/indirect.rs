@@ -4,7 +4,9 @@
 use hankel_dsl::native::describe::Kernel;
 
 use super::super::error::Result;
-use super::{BufferId, VulkanDevice};
+use super::{BufferId, VulkanDevice, own};
+
+const LABEL: &str = "workgroups of a range";
 
 const SHADER: &str = "
 struct Asked {
@@ -42,10 +44,6 @@ pub struct Indirect {
 
 impl Indirect {
     fn new(device: &wgpu::Device) -> Self {
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("workgroups of a range"),
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-        });
         let buffer = |label, size, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -55,14 +53,7 @@ impl Indirect {
             })
         };
         Self {
-            pipeline: device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some("workgroups of a range"),
-                layout: None,
-                module: &module,
-                entry_point: None,
-                compilation_options: Default::default(),
-                cache: None,
-            }),
+            pipeline: own::pipeline(device, LABEL, SHADER.into()),
             asked: buffer(
                 "asked",
                 32,
@@ -102,28 +93,8 @@ impl VulkanDevice {
                 self.queue
                     .write_buffer(&indirect.asked, 0, bytemuck::cast_slice(&asked));
                 let buffers = [&memory.buffer, &indirect.asked, &indirect.groups];
-                let mut binding = 0;
-                let entries = buffers.map(|buffer| {
-                    let entry = wgpu::BindGroupEntry {
-                        binding,
-                        resource: buffer.as_entire_binding(),
-                    };
-                    binding += 1;
-                    entry
-                });
-                let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some("workgroups of a range"),
-                    layout: &indirect.pipeline.get_bind_group_layout(0),
-                    entries: &entries,
-                });
-                let mut encoder = device.create_command_encoder(&Default::default());
-                {
-                    let mut pass = encoder.begin_compute_pass(&Default::default());
-                    pass.set_pipeline(&indirect.pipeline);
-                    pass.set_bind_group(0, &group, &[]);
-                    pass.dispatch_workgroups(1, 1, 1);
-                }
-                self.queue.submit([encoder.finish()]);
+                let resources = buffers.map(|buffer| buffer.as_entire_binding());
+                self.run_own(device, LABEL, &indirect.pipeline, resources, [1; 3]);
             })
         });
         let groups = indirect.groups.clone();

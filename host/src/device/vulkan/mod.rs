@@ -3,6 +3,7 @@
 mod clock;
 mod floats;
 mod indirect;
+mod own;
 mod pipelines;
 mod resources;
 pub mod words;

@@ -6,7 +6,7 @@ use hankel_dsl::native::{Address, Compare, Filter, Sampler};
 
 use super::super::error::{DeviceError, Result};
 use super::super::{Format, TextureId, TextureShape};
-use super::VulkanDevice;
+use super::{VulkanDevice, own};
 
 /// Rows of a texture start at multiples of this in a buffer that it is copied to.
 const ROW: usize = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize;
@@ -664,41 +664,14 @@ impl VulkanDevice {
             samples = shape.samples,
         );
         self.guarded(&|| format!("reading {what}"), |device| {
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("samples"),
-                source: wgpu::ShaderSource::Wgsl(text.into()),
-            });
-            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some("samples"),
-                layout: None,
-                module: &module,
-                entry_point: Some("take"),
-                compilation_options: Default::default(),
-                cache: None,
-            });
-            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("samples"),
-                layout: &pipeline.get_bind_group_layout(0),
-                entries: &[
-                    wgpu::BindGroupEntry {
-                        binding: 0,
-                        resource: wgpu::BindingResource::TextureView(&view),
-                    },
-                    wgpu::BindGroupEntry {
-                        binding: 1,
-                        resource: memory.buffer.as_entire_binding(),
-                    },
-                ],
-            });
-            let mut encoder = device.create_command_encoder(&Default::default());
-            {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                pass.set_pipeline(&pipeline);
-                pass.set_bind_group(0, &group, &[]);
-                let [x, y, _] = shape.size;
-                pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), 1);
-            }
-            self.queue.submit([encoder.finish()]);
+            let pipeline = own::pipeline(device, "samples", text);
+            let resources = [
+                wgpu::BindingResource::TextureView(&view),
+                memory.buffer.as_entire_binding(),
+            ];
+            let [x, y, _] = shape.size;
+            let groups = [x.div_ceil(8), y.div_ceil(8), 1];
+            self.run_own(device, "samples", &pipeline, resources, groups);
         })?;
         let values = self.download(&memory.buffer, memory.physical(), &what)?;
         Ok(from_vec4(shape.format, &values[..memory.bytes]))

@@ -237,41 +237,31 @@ pub fn forbid_reordering(words: &[u32]) -> Result<Vec<u32>, String> {
 /// The module with these execution modes for 32-bit floats in all its entry points, capability and mode each.
 pub fn with_modes(words: &[u32], modes: &[(u32, u32)]) -> Result<Vec<u32>, String> {
     let all = instructions(words)?;
-    let entries: Vec<u32> = all
-        .iter()
-        .filter_map(|i| match (i.opcode, i.operands) {
-            (ENTRY_POINT, [_, id, ..]) => Some(*id),
-            _ => None,
-        })
-        .collect();
-    if modes.is_empty() || entries.is_empty() {
-        return Ok(words.to_vec());
-    }
-    let mut changed = words[..HEADER].to_vec();
+    let behind_last = |opcode: u16| {
+        let last = all.iter().rfind(|i| i.opcode == opcode);
+        last.map(|i| i.at + 1 + i.operands.len())
+    };
+    // Extensions come after capabilities, and execution modes after entry points.
+    let Some((capabilities, entries)) = behind_last(CAPABILITY).zip(behind_last(ENTRY_POINT))
+    else {
+        return Err("it has no entry points".into());
+    };
+    let mut changed = words[..capabilities].to_vec();
     for (capability, _) in modes {
         changed.extend([2 << 16 | u32::from(CAPABILITY), *capability]);
     }
-    let mut extension = Some(literal("SPV_KHR_float_controls"));
-    let mut asked = false;
-    for (n, i) in all.iter().enumerate() {
-        // Extensions come after capabilities, and execution modes after entry points.
-        if i.opcode != CAPABILITY
-            && let Some(name) = extension.take()
-        {
-            changed.push((name.len() as u32 + 1) << 16 | u32::from(EXTENSION));
-            changed.extend(name);
-        }
-        changed.extend_from_slice(&words[i.at..=i.at + i.operands.len()]);
-        let is_last = all.get(n + 1).is_none_or(|next| next.opcode != ENTRY_POINT);
-        if i.opcode == ENTRY_POINT && is_last && !asked {
-            asked = true;
-            for entry in &entries {
-                for (_, mode) in modes {
-                    changed.extend([4 << 16 | u32::from(EXECUTION_MODE), *entry, *mode, 32]);
-                }
+    let extension = literal("SPV_KHR_float_controls");
+    changed.push((extension.len() as u32 + 1) << 16 | u32::from(EXTENSION));
+    changed.extend(extension);
+    changed.extend_from_slice(&words[capabilities..entries]);
+    for i in &all {
+        if let (ENTRY_POINT, [_, id, ..]) = (i.opcode, i.operands) {
+            for (_, mode) in modes {
+                changed.extend([4 << 16 | u32::from(EXECUTION_MODE), *id, *mode, 32]);
             }
         }
     }
+    changed.extend_from_slice(&words[entries..]);
     Ok(changed)
 }
 
@@ -470,6 +460,31 @@ mod tests {
         assert!(once.windows(3).any(|x| x == added));
         assert_eq!(summary(&once), summary(&w));
         assert_eq!(forbid_reordering(&once).unwrap(), once);
+    }
+
+    #[test]
+    fn modes_stand_where_spirv_has_them() {
+        let modes = [DENORM_PRESERVE, SIGNED_ZERO_INF_NAN_PRESERVE];
+        let changed = with_modes(&module(), &modes).unwrap();
+        let found: Vec<(u16, &[u32])> = instructions(&changed)
+            .unwrap()
+            .iter()
+            .map(|i| (i.opcode, i.operands))
+            .collect();
+        let extension = literal("SPV_KHR_float_controls");
+        assert_eq!(string(&extension), "SPV_KHR_float_controls");
+        let expected: [(u16, &[u32]); 7] = [
+            (CAPABILITY, &[FLOAT_64]),
+            (CAPABILITY, &[4464]),
+            (CAPABILITY, &[4466]),
+            (EXTENSION, &extension),
+            (ENTRY_POINT, &[5, 1, u32::from_le_bytes(*b"abcd"), 0]),
+            (EXECUTION_MODE, &[1, 4459, 32]),
+            (EXECUTION_MODE, &[1, 4461, 32]),
+        ];
+        assert_eq!(found[..7], expected);
+        let rest = instructions(&module()).unwrap().len() - 2;
+        assert_eq!(found.len(), expected.len() + rest);
     }
 
     #[test]
