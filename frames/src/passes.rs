@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use hankel_dsl::glam::IVec2;
+use hankel_dsl::glam::{IVec2, UVec2};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::Blend;
@@ -473,8 +473,10 @@ pub fn summed_area(
     graph.omit("blur", "the filter's width differs from pixel to pixel");
     graph.omit("mips", "the table has regions of all sizes");
     let size = given.shadow.size;
+    let texels = graph.constant("size", &UVec2::splat(size));
     let mut table = graph
         .compute("resolve", resolve)
+        .arg("size", texels)
         .arg("area", given.area)
         .arg("depth", depth)
         .elements(size as usize * size as usize)?;

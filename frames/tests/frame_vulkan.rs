@@ -7,9 +7,10 @@ use std::path::Path;
 
 use common::shaders;
 use hankel_frames::scene::Scene;
-use hankel_frames::{Comparison, Quiet, compare, techniques};
+use hankel_frames::{Comparison, Quiet, compare, render, techniques};
+use hankel_host::device::Backend;
 
-fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
+fn scene(geometry: &str, light: &str, shadow: &str) -> Scene {
     let eye = match geometry {
         "box" => "[1.9, 1.6, 3.1]",
         "glass" => "[3.4, 2.6, 4.6]",
@@ -37,7 +38,11 @@ fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
         height = 135
         "#
     );
-    let scene = Scene::parse(&text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"));
+    Scene::parse(&text, Path::new("test.toml")).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn both(geometry: &str, light: &str, shadow: &str) -> Comparison {
+    let scene = scene(geometry, light, shadow);
     compare(&scene, &shaders(), 16, &mut Quiet).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -79,6 +84,22 @@ fn every_technique_agrees_on_a_box() {
                 ),
             );
         }
+    }
+}
+
+/// A table of so many texels is more than a kernel of 64 invocations in one dimension can run over: 65 535 workgroups
+/// along an axis are what every device has.
+#[test]
+fn tables_of_soft_shadows_are_made_of_large_maps() {
+    for technique in ["soft", "soft-6", "vssm"] {
+        let [small, large] = [1024, 2048].map(|size| {
+            let shadow = format!("technique = '{technique}'\nsize = {size}");
+            let scene = scene("box", "radius = 0.1", &shadow);
+            let drawn = render(&scene, Backend::Vulkan, &shaders(), &mut Quiet);
+            drawn.unwrap_or_else(|e| panic!("{e}")).picture
+        });
+        let difference = small.difference(&large, 1).unwrap();
+        assert!(difference.over_8 < 0.03, "{technique}: {difference}");
     }
 }
 

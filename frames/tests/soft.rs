@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hankel_dsl::glam::UVec2;
 use hankel_frames::passes::{light_depth, summed_area};
 use hankel_frames::scene::{Mesh, Scene};
 use hankel_frames::truth::{by_rays, by_technique};
@@ -30,8 +31,10 @@ fn tables(resolve: &'static str, sum: &'static str, size: u32) -> [Vec<u32>; 2] 
     let (mut graph, given, _) = graph_of(&scene, &mesh, Show::Light).unwrap();
     let given = given[0];
     let depth = light_depth(&mut graph, &given).unwrap();
+    let texels = graph.constant("texels", &UVec2::splat(size));
     let resolved = graph
         .compute("resolve", resolve)
+        .arg("size", texels)
         .arg("area", given.area)
         .arg("depth", depth)
         .elements(size as usize * size as usize)

@@ -716,7 +716,14 @@ impl Kernel {
 
     /// The function as it was, and beside it a module of the same name with all that is made.
     pub fn expand(&self) -> TokenStream {
-        let (item, vis, name) = (&self.item, &self.item.vis, &self.name);
+        let (mut item, vis, name) = (self.item.clone(), &self.item.vis, &self.name);
+        // What says the range is used, also where the body does not name it.
+        if let Stage::Compute(compute) = &self.stage
+            && let Range::Uniform { param, .. } | Range::Elements(param) = &compute.range
+        {
+            let uses = syn::parse_quote!(let _ = &#param;);
+            item.block.stmts.insert(0, uses);
+        }
         let shader = self.expand_shader();
         let host = self.expand_host();
         // The host runs the twin in its place.

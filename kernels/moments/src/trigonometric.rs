@@ -441,6 +441,8 @@ fn weight_on_arc<R: Real>(
 ) -> R {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
+    // 1/w is K(s, s) + K(s, start) / d * K(s, end). Its greatest value is searched by its logarithm's first two
+    // derivatives; the second derivative of a direction points to the center, which is at minus the mean.
     let mean = kernel.shear(kernel.x, kernel.y);
     let arc = OnArc {
         start,

@@ -239,18 +239,25 @@ pub(crate) fn texel(i: u32, size: UVec2) -> UVec2 {
     UVec2::new(x.unwrap_or(0), within(y.unwrap_or(0) as i32, size.y))
 }
 
+/// The nearest texel of a texture.
+#[inline(always)]
+fn inside(at: UVec2, size: UVec2) -> UVec2 {
+    UVec2::new(within(at.x as i32, size.x), within(at.y as i32, size.y))
+}
+
 /// Mean of a texel's four moments, depths moved to [-1, 1], in the optimised basis, as integers: what
 /// [`prefix_sums`] makes a summed-area table of. Rows from the top, one after the other.
-#[kernel(compute, threads(64), pinned, inputs = crate::inputs::soft::resolved)]
+#[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved)]
 pub fn resolve_summed(
-    #[index] i: u32,
+    #[index] at: UVec2,
     #[constant(id = 0, default = 4)]
     #[values(1, 4)]
     samples: u32,
+    #[uniform] size: &UVec2,
     #[uniform] area: &Area,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> UVec4 {
-    let q = mean_symmetric(depth, texel(i, depth.size()), samples);
+    let q = mean_symmetric(depth, inside(at, depth.size()), samples);
     let q = Quantized4 {
         r: q.x,
         g: q.y,
@@ -261,16 +268,17 @@ pub fn resolve_summed(
 }
 
 /// The same of six moments.
-#[kernel(compute, threads(64), pinned, inputs = crate::inputs::soft::resolved)]
+#[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved)]
 pub fn resolve_summed_6(
-    #[index] i: u32,
+    #[index] at: UVec2,
     #[constant(id = 0, default = 4)]
     #[values(1, 4)]
     samples: u32,
+    #[uniform] size: &UVec2,
     #[uniform] area: &Area,
     #[texture] depth: Texture2dMultisampled<'_>,
 ) -> Fixed6 {
-    let texels = quantized(depth, texel(i, depth.size()), samples);
+    let texels = quantized(depth, inside(at, depth.size()), samples);
     let q = Quantized6 {
         r0: texels.first.x,
         g0: texels.first.y,

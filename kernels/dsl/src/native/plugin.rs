@@ -96,6 +96,7 @@ struct RawSampler {
     offset: [i16; 3],
     level: i16,
     channels: [i8; 4],
+    twist: i8,
 }
 
 impl RawSampler {
@@ -110,6 +111,7 @@ impl RawSampler {
             offset: sampler.deviation.offset,
             level: sampler.deviation.level,
             channels: sampler.deviation.channels,
+            twist: sampler.deviation.twist,
         }
     }
 
@@ -131,6 +133,7 @@ impl RawSampler {
                 offset: self.offset,
                 level: self.level,
                 channels: self.channels,
+                twist: self.twist,
             },
         })
     }

@@ -117,7 +117,11 @@ pub fn table_6(request: &Request) -> Vec<Given> {
 pub fn resolved(request: &Request) -> Vec<Given> {
     let all = areas().into_iter().flat_map(|area| {
         let given = maps::depths(request).into_iter();
-        given.map(move |given| given.uniform("area", &area))
+        given.map(move |given| {
+            given
+                .uniform("size", &UVec2::from_array(SIZE))
+                .uniform("area", &area)
+        })
     });
     all.collect()
 }
