@@ -6,7 +6,7 @@ use hankel_dsl::format::{R32Uint, Rgba8Sint};
 use hankel_dsl::glam::{IVec4, UVec2, Vec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::{
-    Address, Arg, Call, CallError, Entry, Filter, Mode, TextureMut, TextureRef,
+    self, Address, Arg, Call, CallError, Deviation, Entry, Filter, Mode, TextureMut, TextureRef,
 };
 use hankel_dsl::{Sampler, StorageMut, StorageTexture2d, Texture2d, kernel};
 
@@ -50,7 +50,21 @@ fn short(#[element] x: i32, #[texture] shorts: StorageTexture2d<'_, Rgba8Sint>) 
     shorts.store(UVec2::ZERO, IVec4::new(0, 0, 0, x));
 }
 
-hankel_dsl::kernels![mark, around, integers, short];
+/// The texels around a point, filtered.
+#[kernel(
+    compute,
+    threads(1),
+    parity(ulp = 0, absolute = 1e-2, why = "a sampler rounds its weights")
+)]
+fn filtered(
+    #[element] at: Vec2,
+    #[texture] source: Texture2d<'_>,
+    #[sampler] sampler: Sampler,
+) -> Vec4 {
+    source.sample_level(sampler, at, 0.0)
+}
+
+hankel_dsl::kernels![mark, around, filtered, integers, short];
 
 fn run(name: &str, args: Vec<Arg<'_>>) -> Result<(), CallError> {
     let all: Vec<Entry> = entries();
@@ -151,33 +165,76 @@ fn what_a_format_does_not_hold_is_reported() {
     );
 }
 
+/// What a kernel reads at a place of a texture of 32-bit floats.
+fn read(
+    name: &str,
+    at: Vec2,
+    size: [u32; 2],
+    texels: &[f32],
+    sampler: native::Sampler,
+) -> [f32; 4] {
+    let mut out = [Vec4::ZERO];
+    let texture = TextureRef {
+        size: [size[0], size[1], 1],
+        levels: 1,
+        layers: 1,
+        samples: 1,
+        format: TexelFormat::R32Float,
+        bytes: bytemuck::cast_slice(texels),
+    };
+    run(
+        name,
+        vec![
+            Arg::Bytes(bytemuck::cast_slice(&[at])),
+            Arg::Texture(texture),
+            Arg::Sampler(sampler),
+            Arg::BytesMut(bytemuck::cast_slice_mut(&mut out)),
+        ],
+    )
+    .unwrap();
+    out[0].to_array()
+}
+
 #[test]
 fn four_texels_are_gathered_counterclockwise_from_the_lower_left() {
     let texels: Vec<f32> = (0..12).map(|i| i as f32).collect();
     let gathered = |address: Address, at: Vec2| {
-        let mut out = [Vec4::ZERO];
-        let texture = TextureRef {
-            size: [4, 3, 1],
-            levels: 1,
-            layers: 1,
-            samples: 1,
-            format: TexelFormat::R32Float,
-            bytes: bytemuck::cast_slice(&texels),
-        };
-        let sampler = hankel_dsl::native::Sampler::new(Filter::Linear, address);
-        run(
-            "around",
-            vec![
-                Arg::Bytes(bytemuck::cast_slice(&[at])),
-                Arg::Texture(texture),
-                Arg::Sampler(sampler),
-                Arg::BytesMut(bytemuck::cast_slice_mut(&mut out)),
-            ],
-        )
-        .unwrap();
-        out[0].to_array()
+        let sampler = native::Sampler::new(Filter::Linear, address);
+        read("around", at, [4, 3], &texels, sampler)
     };
     let middle = Vec2::new(2.0 / 4.0, 1.0 / 3.0);
     assert_eq!(gathered(Address::ClampToEdge, middle), [5.0, 6.0, 2.0, 1.0]);
     assert_eq!(gathered(Address::Repeat, Vec2::ZERO), [3.0, 0.0, 8.0, 11.0]);
+}
+
+#[test]
+fn a_deviation_changes_weights_and_channels_as_it_says() {
+    let filtered = |texels: [f32; 4], deviation: Deviation| {
+        let sampler = native::Sampler {
+            deviation,
+            ..native::Sampler::new(Filter::Linear, Address::ClampToEdge)
+        };
+        read("filtered", Vec2::splat(0.5), [2, 2], &texels, sampler)[0]
+    };
+    let (columns, corner) = ([0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]);
+    let (moved, twisted, summed) = (
+        Deviation {
+            offset: [256, 0, 0],
+            ..Deviation::NONE
+        },
+        Deviation {
+            twist: 2,
+            ..Deviation::NONE
+        },
+        Deviation {
+            channels: [4, 0, 0, 0],
+            ..Deviation::NONE
+        },
+    );
+    assert_eq!(filtered(columns, Deviation::NONE), 0.5);
+    assert_eq!(filtered(columns, moved), 0.75);
+    // Weights along an axis stay; the product of both is off.
+    assert_eq!(filtered(columns, twisted), 0.5);
+    assert_eq!(filtered(corner, twisted), 0.25 + 1.0 / 512.0);
+    assert_eq!(filtered(corner, summed), 0.25 + 1.0 / 4_194_304.0);
 }
