@@ -11,10 +11,6 @@
 //! The fraction of a level of detail has 8 bits in Direct3D 11 as well, so that the level is moved by
 //! 1/256 up and down, where a texture has levels.
 //!
-//! A bilinear filter has four weights, products of those along the axes. NVIDIA's GPUs round these products to 8 bits,
-//! such that the weights along either axis stay (`host/tests/filter.rs` measures it): the product is moved by 1/512 up
-//! and down.
-//!
 //! The filter's own sums round, too. Each channel is moved by 4 units of 2^-24 of the largest texel
 //! up and down; what the channels change is added up.
 //!
@@ -33,8 +29,6 @@ const PLACES: [i16; 5] = [-4, -2, 0, 2, 4];
 const PLACES_3D: [i16; 3] = [-4, 0, 4];
 /// Rounding of a level of detail, in 1/1024: 1/256.
 const LEVEL: i16 = 4;
-/// Rounding of a product of two weights, in 1/1024: 1/512, half a step of 8 bits.
-const TWIST: i8 = 2;
 /// Rounding of the filter's sums, in 2^-24 of the largest texel: three sums, and products of two.
 const SUMS: i8 = 4;
 
@@ -129,12 +123,6 @@ impl Intervals {
                     sums.push(with(deviation)?);
                 }
             }
-            for twist in [-TWIST, TWIST] {
-                sums.push(with(Deviation {
-                    twist,
-                    ..Deviation::NONE
-                })?);
-            }
             if case.args.iter().any(has_levels) {
                 for level in [-LEVEL, LEVEL] {
                     sums.push(with(Deviation {
@@ -225,7 +213,7 @@ fn around(i: usize, centre: f64, grid: Grid, places: &[Vec<f64>], sums: &[Vec<f6
         .neighbours()
         .map(|(a, b)| apart(places[a][i], places[b][i]))
         .fold(0.0, f64::max);
-    // Down and up of each channel, of the product of weights, and of the level.
+    // Down and up of each channel, and of the level.
     let rounding: f64 = sums
         .chunks(2)
         .map(|pair| {

@@ -270,7 +270,6 @@ mod tests {
                     deviation: Deviation {
                         offset: [-4, 3, 0],
                         level: 2,
-                        twist: -1,
                         channels: [1, -2, 3, -4],
                     },
                     ..Sampler::new(Filter::Linear, Address::MirrorRepeat)

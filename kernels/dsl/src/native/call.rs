@@ -134,9 +134,6 @@ pub struct Deviation {
     pub offset: [i16; 3],
     /// How far the level of detail is moved, in 1/1024 of a level: rounding of its fraction.
     pub level: i16,
-    /// How far the product of the weights along both axes is moved, in 1/1024, while the sums of weights along either
-    /// stay: rounding of the weights of four texels.
-    pub twist: i8,
     /// What is added to each channel, in 2^-24 of the largest magnitude that is read: rounding of
     /// the filter's sums.
     pub channels: [i8; 4],
@@ -147,7 +144,6 @@ impl Deviation {
     pub const NONE: Self = Self {
         offset: [0; 3],
         level: 0,
-        twist: 0,
         channels: [0; 4],
     };
 }

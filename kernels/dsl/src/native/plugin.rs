@@ -96,7 +96,6 @@ struct RawSampler {
     offset: [i16; 3],
     level: i16,
     channels: [i8; 4],
-    twist: i8,
 }
 
 impl RawSampler {
@@ -111,7 +110,6 @@ impl RawSampler {
             offset: sampler.deviation.offset,
             level: sampler.deviation.level,
             channels: sampler.deviation.channels,
-            twist: sampler.deviation.twist,
         }
     }
 
@@ -133,7 +131,6 @@ impl RawSampler {
                 offset: self.offset,
                 level: self.level,
                 channels: self.channels,
-                twist: self.twist,
             },
         })
     }

@@ -257,11 +257,7 @@ fn filter(
         let [a, b, c, d] = taps.square(dz, of);
         let near = a * (1.0 - weight[0]) + b * weight[0];
         let far = c * (1.0 - weight[0]) + d * weight[0];
-        let value = near * (1.0 - weight[1]) + far * weight[1];
-        match sampler.deviation.twist {
-            0 => value,
-            n => value + (a - b - c + d) * (f32::from(n) / 1024.0),
-        }
+        near * (1.0 - weight[1]) + far * weight[1]
     };
     let front = slice(0);
     let value = if weight[2] == 0.0 {
