@@ -693,8 +693,8 @@ Examples:
   hankel plan scenes/fence.toml --error 0.05 --backend vulkan --time 20 --memory 30
   hankel plan scenes/fence.toml --error 0.1 --technique hamburger,vsm --format json
 
-The error is the root mean square of the light that arrives (1 minus the shadow) against rays; in a scene with
-a medium, of the light that comes through it with what it scatters. The plan is
+The error is the root mean square of the light that arrives (1 minus the shadow; 0 where a surface is turned from
+the light) against rays; in a scene with a medium, of the light that comes through it with what it scatters. The plan is
 found by probes on the backend: times of small maps, and pictures against rays through some of their pixels.
 
 Exit code 1: nothing is within the budgets.")]

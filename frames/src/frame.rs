@@ -41,8 +41,8 @@ pub(crate) fn camera_view(scene: &Scene, camera: &Camera, mesh: &Mesh) -> Camera
 pub enum Show {
     /// The scene, lit.
     Picture,
-    /// The share of light that arrives, 1 minus the shadow, in 32-bit floats: white surfaces that
-    /// face the light everywhere, seen through translucent ones. The same passes by the same kernels make it.
+    /// The share of light that arrives, in 32-bit floats: 1 minus the shadow where a surface is turned to the light,
+    /// 0 where it is turned away; seen through translucent surfaces. The same passes by the same kernels make it.
     Light,
     /// The share of light that the medium scatters towards the camera, but for its phase function and what it
     /// absorbs, in 32-bit floats: black surfaces. The same passes by the same kernels make it.
@@ -112,7 +112,7 @@ fn with_lights(
     let is_translucent = !mesh.translucent().is_empty();
     let opacities = is_translucent.then(|| graph.buffer("opacities", &mesh.all_opacities()));
     let camera = graph.parameter("camera", &transform(camera.clip_from_world));
-    // Those of the light alone are lit as if they faced it.
+    // Those of the light alone are lit as if they faced it, or not at all.
     let planes = match show {
         Show::Light => graph.buffer("planes", &mesh.normals),
         Show::Picture | Show::Scattered => graph.buffer("normals", &mesh.normals),

@@ -120,16 +120,18 @@ pub fn area(light: &Light, view: &LightView) -> Area {
     }
 }
 
-/// Unit normals that face a light, for pictures of what arrives of it. Those of a spot light are not of unit
-/// length: interpolated, they face it everywhere.
+/// Normals for pictures of what arrives of a light: the way to the light, times its product with the normal of the
+/// surface. Interpolated, they face the light where the surface does, and are turned from it elsewhere.
 pub fn facing(light: &Light, mesh: &Mesh) -> Vec<Vec3> {
-    match light.source {
-        Source::Directional { direction } => vec![-direction; mesh.positions.len()],
-        Source::Spot(spot) => {
-            let places = mesh.positions.iter();
-            places.map(|place| spot.position - *place).collect()
-        }
-    }
+    let vertices = mesh.positions.iter().zip(&mesh.normals);
+    let facing = |(place, normal): (&Vec3, &Vec3)| {
+        let toward = match light.source {
+            Source::Directional { direction } => -direction,
+            Source::Spot(spot) => spot.position - *place,
+        };
+        toward * normal.dot(toward)
+    };
+    vertices.map(facing).collect()
 }
 
 /// Translucent triangles, the farthest from the light first.

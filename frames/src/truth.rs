@@ -3,7 +3,8 @@
 //! - [`by_rays`] knows no map: 256 rays through each pixel, and one from each place that they meet
 //!   towards the light; each towards another point of it if the light has an area. Of the light, translucent
 //!   surfaces let pass the product of 1 minus each one's opacity. Of a spot light it is what its cone leaves of it,
-//!   whatever the distance; of several lights their mean, those left out that reach nothing.
+//!   whatever the distance; of several lights their mean, those left out that reach nothing. A surface that is
+//!   turned from the light by its interpolated normal, with which it is shaded, gets none.
 //! - [`filtered`] is what a filtered shadow map is meant to be: the same weights as the technique's
 //!   filter and lookup, over all depth samples, in double precision. A technique that gives a lower
 //!   bound is nowhere darker.
@@ -23,12 +24,12 @@ use serde::{Deserialize, Serialize};
 use crate::error::{FrameError, Result};
 use crate::executor::{Clock, NoShaders, Progress, Quiet, Shaders};
 use crate::frame::{Frame, Show, camera_view, transform};
-use crate::lights::{Lit, light_view, reaching, uniform};
+use crate::lights::{Lit, facing, light_view, reaching, uniform};
 use crate::passes::gaussian;
 use crate::picture::Picture;
 use crate::scene::{Light, LightView, Mesh, Scene, Source};
 use crate::visibility::SAMPLES;
-use crate::visibility::cast::{Caster, Lens, Segment, in_bands, places};
+use crate::visibility::cast::{Caster, Hit, Lens, Segment, in_bands, places};
 use crate::visibility::fragments::{Fragments, Varying};
 
 /// The light that arrives at what each pixel sees, from 0 (shadow) to 1; 1 where nothing is. Or the share of light
@@ -265,24 +266,56 @@ struct Lamp {
     /// From its middle to that of its edge, along x and y of the shadow map: of a directional light as seen from one
     /// unit before it; nothing for a point.
     axes: [DVec3; 2],
+    /// Of each vertex, see [`facing`].
+    facing: Vec<Vec3>,
+}
+
+/// 1 if a normal of [`facing`] and the way to the light go the same way, 0 if they go opposite ways, and what
+/// shading makes of it between those.
+fn turned(facing: DVec3, toward: DVec3) -> f64 {
+    let product = facing.normalize_or_zero().dot(toward.normalize_or_zero());
+    product.max(0.0)
 }
 
 impl Lamp {
-    /// The way from a place to the light, all of it to a spot light; and what the cone of that, from its middle,
-    /// leaves of its light.
-    /// Ray `i` of a pixel goes to another point of an area.
-    fn toward(&self, place: DVec3, pixel: [u32; 2], i: u32) -> (DVec3, f64) {
-        let (toward, within) = match self.light.source {
-            Source::Spot(spot) => (spot.position.as_dvec3() - place, spot.within(place)),
-            Source::Directional { direction } => {
-                (-direction.as_dvec3().normalize_or(DVec3::Y), 1.0)
-            }
+    fn of(scene: &Scene, light: &Light, mesh: &Mesh) -> Self {
+        let clip = light_view(scene, light, mesh).clip_from_world;
+        let radius = f64::from(light.area.radius);
+        // Across the light's way: rows of a perspective view have a part along it.
+        let along = light.direction().as_dvec3();
+        let axis = |i| {
+            let row = clip.row(i).truncate().as_dvec3();
+            row.reject_from_normalized(along).normalize_or_zero()
         };
+        Self {
+            light: *light,
+            axes: [0, 1].map(|i| axis(i) * radius),
+            facing: facing(light, mesh),
+        }
+    }
+
+    /// The way from a place to the light's middle, all of it to a spot light.
+    fn middle(&self, place: DVec3) -> DVec3 {
+        match self.light.source {
+            Source::Spot(spot) => spot.position.as_dvec3() - place,
+            Source::Directional { direction } => -direction.as_dvec3().normalize_or(DVec3::Y),
+        }
+    }
+
+    /// What the cone of a spot light leaves of its light at a place.
+    fn within(&self, place: DVec3) -> f64 {
+        self.light.spot().map_or(1.0, |spot| spot.within(place))
+    }
+
+    /// The way from a place to the light, all of it to a spot light. Ray `i` of a pixel goes to another point of an
+    /// area.
+    fn toward(&self, place: DVec3, pixel: [u32; 2], i: u32) -> DVec3 {
+        let middle = self.middle(place);
         if self.light.area.radius == 0.0 {
-            return (toward, within);
+            return middle;
         }
         let [x, y] = self.light.area.point(light_sample(pixel, i));
-        (toward + self.axes[0] * x + self.axes[1] * y, within)
+        middle + self.axes[0] * x + self.axes[1] * y
     }
 }
 
@@ -337,21 +370,7 @@ impl Pixels {
     pub fn of(scene: &Scene, mesh: &Mesh) -> Self {
         let view = camera_view(scene, &scene.camera, mesh);
         let (numbers, _) = reaching(scene, mesh);
-        let lamp = |number: usize| {
-            let light = scene.lights[number];
-            let clip = light_view(scene, &light, mesh).clip_from_world;
-            let radius = f64::from(light.area.radius);
-            // Across the light's way: rows of a perspective view have a part along it.
-            let along = light.direction().as_dvec3();
-            let axis = |i| {
-                let row = clip.row(i).truncate().as_dvec3();
-                row.reject_from_normalized(along).normalize_or_zero()
-            };
-            Lamp {
-                light,
-                axes: [0, 1].map(|i| axis(i) * radius),
-            }
-        };
+        let lamp = |number: usize| Lamp::of(scene, &scene.lights[number], mesh);
         Self {
             caster: Caster::of(mesh),
             translucent: Layers::of(mesh),
@@ -371,34 +390,54 @@ impl Pixels {
             let at = [i % GRID, i / GRID].map(|k| (f64::from(k) + 0.5) / f64::from(GRID));
             let segment = self.lens.segment(pixel, at);
             let hit = self.caster.first(&segment);
-            hit.map_or(1.0, |hit| self.reaching(&segment, hit.t, pixel, i))
+            hit.map_or(1.0, |hit| self.arriving(&segment, hit, pixel, i))
         };
         let sum: f64 = (0..GRID * GRID).map(arriving).sum();
         (sum / f64::from(GRID * GRID)) as f32
+    }
+
+    /// The share of the light that arrives at what a segment meets, the mean of all lights: [`Pixels::reaching`]
+    /// where that is turned to the light.
+    fn arriving(&self, segment: &Segment, hit: Hit, pixel: [u32; 2], i: u32) -> f64 {
+        let place = segment.at(hit.t);
+        self.mean(|lamp| {
+            let facing = self.caster.vector_at(segment, hit, &lamp.facing);
+            let turned = turned(facing, lamp.middle(place));
+            match turned > 0.0 {
+                true => turned * self.reaching_of(lamp, place, pixel, i),
+                false => 0.0,
+            }
+        })
     }
 
     /// The share of the light that reaches a place of a segment, the mean of all lights: none through an opaque
     /// caster, some through a translucent one. Ray `i` of a pixel goes to another point of an area.
     fn reaching(&self, segment: &Segment, t: f64, pixel: [u32; 2], i: u32) -> f64 {
         let place = segment.at(t);
-        let of = |lamp: &Lamp| {
-            let (toward, within) = lamp.toward(place, pixel, i);
-            if within == 0.0 {
-                return 0.0;
-            }
-            let away = self.diagonal * AWAY;
-            let (from, way) = match lamp.light.source {
-                Source::Directional { .. } => {
-                    (place + toward * away, toward * (2.0 * self.diagonal))
-                }
-                Source::Spot(_) => {
-                    let before = toward.normalize_or_zero() * away;
-                    (place + before, toward - before)
-                }
-            };
-            within * self.passing(&Segment::new(from, way))
-        };
+        self.mean(|lamp| self.reaching_of(lamp, place, pixel, i))
+    }
+
+    /// The mean of all lights.
+    fn mean(&self, of: impl Fn(&Lamp) -> f64) -> f64 {
         self.lamps.iter().map(of).sum::<f64>() / self.lamps.len().max(1) as f64
+    }
+
+    /// [`Pixels::reaching`] of one light.
+    fn reaching_of(&self, lamp: &Lamp, place: DVec3, pixel: [u32; 2], i: u32) -> f64 {
+        let within = lamp.within(place);
+        if within == 0.0 {
+            return 0.0;
+        }
+        let toward = lamp.toward(place, pixel, i);
+        let away = self.diagonal * AWAY;
+        let (from, way) = match lamp.light.source {
+            Source::Directional { .. } => (place + toward * away, toward * (2.0 * self.diagonal)),
+            Source::Spot(_) => {
+                let before = toward.normalize_or_zero() * away;
+                (place + before, toward - before)
+            }
+        };
+        within * self.passing(&Segment::new(from, way))
     }
 
     /// The share of light that passes what a segment meets.
@@ -542,8 +581,8 @@ impl Filter {
 }
 
 /// What percentage-closer filtering lets arrive that has the weights of the scene's filter and of
-/// bilinear lookup, and compares all depth samples, each with the list of all translucent surfaces in it.
-/// `leak_cut` is not part of it.
+/// bilinear lookup, and compares all depth samples, each with the list of all translucent surfaces in it; nothing
+/// at a surface that is turned from the light. `leak_cut` is not part of it.
 #[must_use]
 pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arriving {
     let caster = Caster::of(mesh);
@@ -551,12 +590,15 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
     let lens = Lens::new(camera.clip_from_world, scene.width, scene.height);
     let pixels = [scene.width, scene.height];
     let fragments = Fragments::find(&caster, &lens, pixels, &mut |s| advance(s * 0.3));
-    let world = Varying {
-        components: 3,
-        vertices: bytemuck::cast_slice(&mesh.positions).to_vec(),
+    let interpolated = |vertices: &[Vec3]| {
+        let varying = Varying {
+            components: 3,
+            vertices: bytemuck::cast_slice(vertices).to_vec(),
+        };
+        let of = fragments.interpolate(&caster, &lens, &[varying]);
+        bytemuck::cast_slice::<f32, Vec3>(&of[0]).to_vec()
     };
-    let world = fragments.interpolate(&caster, &lens, &[world]);
-    let world: &[Vec3] = bytemuck::cast_slice(&world[0]);
+    let world = interpolated(&mesh.positions);
     let mut arriving = vec![0.0; world.len()];
     let (numbers, _) = reaching(scene, mesh);
     let count = numbers.len();
@@ -573,16 +615,19 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
             count,
         };
         let uniform = uniform(scene, &lit, Show::Light);
-        let cone = light.spot();
+        let lamp = Lamp::of(scene, light, mesh);
+        let facing = interpolated(&lamp.facing);
         let mut rest = |share: f32| advance(0.6 + share * 0.4);
         in_bands(
             &mut arriving,
             1 << 10,
             &mut rest,
             |band, part: &mut [f64]| {
-                let places = &world[band << 10..];
-                for (value, p) in part.iter_mut().zip(places) {
-                    let within = cone.map_or(1.0, |spot| spot.within(p.as_dvec3()));
+                let places = world[band << 10..].iter().zip(&facing[band << 10..]);
+                for (value, (p, facing)) in part.iter_mut().zip(places) {
+                    let place = p.as_dvec3();
+                    let turned = turned(facing.as_dvec3(), lamp.middle(place));
+                    let within = turned * lamp.within(place);
                     if within > 0.0 {
                         let row = |row: Vec4| row_times_point(row, *p);
                         let w = row(uniform.row_w);

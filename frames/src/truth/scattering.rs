@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Arriving, Errors, Pixels};
 use crate::error::Result;
 use crate::scene::{Mesh, Scene};
-use crate::visibility::cast::{SAMPLES, Segment, in_bands};
+use crate::visibility::cast::{Hit, SAMPLES, Segment, in_bands};
 
 /// Rays through a pixel, along x and along y.
 const GRID: u32 = 4;
@@ -214,7 +214,7 @@ pub fn behind(light: &Arriving, through: &Arriving, scattered: &Arriving) -> Arr
 struct Met {
     segment: Segment,
     length: f64,
-    is_surface: bool,
+    surface: Option<Hit>,
 }
 
 impl Met {
@@ -233,7 +233,7 @@ impl Pixels {
         Met {
             segment: Segment::new(eye, way),
             length: way.length(),
-            is_surface: hit.is_some(),
+            surface: hit.map(|hit| Hit { t: 1.0, ..hit }),
         }
     }
 }
@@ -308,11 +308,8 @@ impl Through {
             let inside = [i % super::GRID, i / super::GRID];
             let inside = inside.map(|k| (f64::from(k) + 0.5) / f64::from(super::GRID));
             let met = self.pixels.ray(self.eye, at, inside);
-            let arriving = match met.is_surface {
-                true => self.pixels.reaching(&met.segment, 1.0, at, i),
-                false => 1.0,
-            };
-            arriving * met.passing(self.extinction)
+            let arriving = |hit| self.pixels.arriving(&met.segment, hit, at, i);
+            met.surface.map_or(1.0, arriving) * met.passing(self.extinction)
         };
         (0..RAYS).map(ray).sum::<f64>() / f64::from(RAYS)
     }

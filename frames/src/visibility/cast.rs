@@ -311,10 +311,24 @@ impl Caster {
         let [a, b, c] = self
             .vertices(hit.triangle)
             .map(|v| f64::from(values[v as usize]));
+        let [wa, wb, wc] = self.weights_at(segment, hit);
+        (wa * a + wb * b + wc * c) as f32
+    }
+
+    /// A vector at the vertices, where a segment meets a triangle.
+    #[must_use]
+    pub fn vector_at(&self, segment: &Segment, hit: Hit, values: &[Vec3]) -> DVec3 {
+        let [a, b, c] = self
+            .vertices(hit.triangle)
+            .map(|v| values[v as usize].as_dvec3());
+        let [wa, wb, wc] = self.weights_at(segment, hit);
+        a * wa + b * wb + c * wc
+    }
+
+    fn weights_at(&self, segment: &Segment, hit: Hit) -> [f64; 3] {
         // Seen edge-on, any point of the triangle will do.
         let weights = segment.weights(self.corners(hit.triangle));
-        let [wa, wb, wc] = weights.unwrap_or([1.0 / 3.0; 3]);
-        (wa * a + wb * b + wc * c) as f32
+        weights.unwrap_or([1.0 / 3.0; 3])
     }
 
     /// The share of light that passes all that a segment meets, of surfaces with these opacities at their
