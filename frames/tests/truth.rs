@@ -160,9 +160,10 @@ fn the_filtered_truth_is_a_soft_picture_of_the_hard_one() {
     assert!(nothing.errors(&sharp).unwrap().rms > 0.2);
 }
 
-/// What a technique is for: it is nearer to the rays than no shadow at all. More moments, and a second
-/// warp, leave a tighter bound, so that less is too light. Maps of 32 bits. (Techniques of different kinds
-/// have no such order: an exponential leaks less far from a caster, and more near it.)
+/// What a technique is for: it is nearer to the rays than no shadow at all. Four moments leave a tighter bound than
+/// two, and so does a second warp, so that less is too light. Maps of 32 bits. (Techniques of different kinds have no
+/// such order: an exponential leaks less far from a caster, and more near it.) More than four moments are as near as
+/// four: their bounds are tighter, but their rounding needs a bias that is 10 to 300 times as large.
 #[test]
 fn more_moments_and_warps_leak_less() {
     let (one, mesh) = scene("yard", 1024, "");
@@ -181,17 +182,19 @@ fn more_moments_and_warps_leak_less() {
         let errors = technique(&scene, &mesh).errors(&sharp).unwrap();
         println!("{name}: {errors}; without shadow {without}");
         assert!(errors.rms < 0.8 * without, "{name}: {errors}");
-        errors.wrongly_lit
+        errors
     };
     let order = |names: &[&str]| {
-        let errors: Vec<f64> = names.iter().map(|name| error(name)).collect();
+        let errors: Vec<f64> = names.iter().map(|name| error(name).wrongly_lit).collect();
         assert!(errors.is_sorted(), "{names:?}: {errors:?}");
     };
-    order(&["hamburger-6", "hamburger", "vsm"]);
-    order(&["moments-10", "moments-8", "moments-6", "moments-4"]);
-    order(&["evsm4", "evsm2"]);
-    order(&["tmsm"]);
-    order(&["esm"]);
+    order(&["tmsm", "hamburger", "vsm"]);
+    order(&["evsm4", "evsm2", "esm"]);
+    let four = error("moments-4").rms;
+    for more in ["hamburger-6", "moments-6", "moments-8", "moments-10"] {
+        let ratio = error(more).rms / four;
+        assert!((0.95..1.05).contains(&ratio), "{more}: {ratio}");
+    }
 }
 
 /// Terms of a Fourier series make the comparison steeper, so that less is too light. 8 bits, which its authors store,
