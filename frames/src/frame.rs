@@ -112,7 +112,7 @@ fn with_lights(
     let is_translucent = !mesh.translucent().is_empty();
     let opacities = is_translucent.then(|| graph.buffer("opacities", &mesh.all_opacities()));
     let camera = graph.parameter("camera", &transform(camera.clip_from_world));
-    // Those of the light alone are lit as if they faced it, or not at all.
+    // For pictures of the light alone, each light has normals of its own: see `facing`. Planes are the surfaces'.
     let planes = match show {
         Show::Light => graph.buffer("planes", &mesh.normals),
         Show::Picture | Show::Scattered => graph.buffer("normals", &mesh.normals),

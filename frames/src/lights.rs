@@ -125,10 +125,7 @@ pub fn area(light: &Light, view: &LightView) -> Area {
 pub fn facing(light: &Light, mesh: &Mesh) -> Vec<Vec3> {
     let vertices = mesh.positions.iter().zip(&mesh.normals);
     let facing = |(place, normal): (&Vec3, &Vec3)| {
-        let toward = match light.source {
-            Source::Directional { direction } => -direction,
-            Source::Spot(spot) => spot.position - *place,
-        };
+        let toward = light.toward(place.as_dvec3()).as_vec3();
         toward * normal.dot(toward)
     };
     vertices.map(facing).collect()
@@ -284,11 +281,7 @@ mod tests {
             };
             let receiver = DVec3::new(0.3, 0.0, -0.2);
             for share in [0.1, 0.3, 0.6] {
-                let toward = match light.source {
-                    Source::Spot(spot) => spot.position.as_dvec3() - receiver,
-                    Source::Directional { .. } => -along,
-                };
-                let edge = toward + across * f64::from(light.area.radius);
+                let edge = light.toward(receiver) + across * f64::from(light.area.radius);
                 let (behind, before) = (project(receiver), project(receiver + edge * share));
                 let texels = 0.5 * (before.x - behind.x) * f64::from(size);
                 let reach = f64::from(area.spread.x) * (behind.z - before.z);

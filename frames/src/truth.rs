@@ -270,11 +270,11 @@ struct Lamp {
     facing: Vec<Vec3>,
 }
 
-/// 1 if a normal of [`facing`] and the way to the light go the same way, 0 if they go opposite ways, and what
-/// shading makes of it between those.
-fn turned(facing: DVec3, toward: DVec3) -> f64 {
-    let product = facing.normalize_or_zero().dot(toward.normalize_or_zero());
-    product.max(0.0)
+/// 1 where a surface is turned to the light, 0 where it is turned away: the cosine that shading makes of a normal of
+/// [`facing`], interpolated, and of the way to the light.
+fn turned_to(facing: DVec3, toward: DVec3) -> f64 {
+    let cosine = facing.normalize_or_zero().dot(toward.normalize_or_zero());
+    cosine.max(0.0)
 }
 
 impl Lamp {
@@ -294,14 +294,6 @@ impl Lamp {
         }
     }
 
-    /// The way from a place to the light's middle, all of it to a spot light.
-    fn middle(&self, place: DVec3) -> DVec3 {
-        match self.light.source {
-            Source::Spot(spot) => spot.position.as_dvec3() - place,
-            Source::Directional { direction } => -direction.as_dvec3().normalize_or(DVec3::Y),
-        }
-    }
-
     /// What the cone of a spot light leaves of its light at a place.
     fn within(&self, place: DVec3) -> f64 {
         self.light.spot().map_or(1.0, |spot| spot.within(place))
@@ -310,7 +302,7 @@ impl Lamp {
     /// The way from a place to the light, all of it to a spot light. Ray `i` of a pixel goes to another point of an
     /// area.
     fn toward(&self, place: DVec3, pixel: [u32; 2], i: u32) -> DVec3 {
-        let middle = self.middle(place);
+        let middle = self.light.toward(place);
         if self.light.area.radius == 0.0 {
             return middle;
         }
@@ -402,11 +394,11 @@ impl Pixels {
         let place = segment.at(hit.t);
         self.mean(|lamp| {
             let facing = self.caster.vector_at(segment, hit, &lamp.facing);
-            let turned = turned(facing, lamp.middle(place));
-            match turned > 0.0 {
-                true => turned * self.reaching_of(lamp, place, pixel, i),
-                false => 0.0,
+            let turned = turned_to(facing, lamp.light.toward(place));
+            if turned == 0.0 {
+                return 0.0;
             }
+            turned * self.reaching_of(lamp, place, pixel, i)
         })
     }
 
@@ -626,7 +618,7 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
                 let places = world[band << 10..].iter().zip(&facing[band << 10..]);
                 for (value, (p, facing)) in part.iter_mut().zip(places) {
                     let place = p.as_dvec3();
-                    let turned = turned(facing.as_dvec3(), lamp.middle(place));
+                    let turned = turned_to(facing.as_dvec3(), light.toward(place));
                     let within = turned * lamp.within(place);
                     if within > 0.0 {
                         let row = |row: Vec4| row_times_point(row, *p);

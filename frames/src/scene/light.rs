@@ -79,6 +79,16 @@ impl Light {
         }
     }
 
+    /// The way from a place to the light's middle: all of it to a spot light, of unit length to one that is infinitely
+    /// far away.
+    #[must_use]
+    pub fn toward(&self, place: DVec3) -> DVec3 {
+        match self.source {
+            Source::Directional { direction } => -direction.as_dvec3().normalize_or(DVec3::Y),
+            Source::Spot(spot) => spot.position.as_dvec3() - place,
+        }
+    }
+
     /// What a medium's technique would have to be, if this one is not for the light; `None` if it is.
     #[must_use]
     pub fn refuses(&self, scattering: &Scattering) -> Option<&'static str> {

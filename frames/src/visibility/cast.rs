@@ -311,7 +311,7 @@ impl Caster {
         let [a, b, c] = self
             .vertices(hit.triangle)
             .map(|v| f64::from(values[v as usize]));
-        let [wa, wb, wc] = self.weights_at(segment, hit);
+        let [wa, wb, wc] = self.weights(segment, hit.triangle);
         (wa * a + wb * b + wc * c) as f32
     }
 
@@ -321,13 +321,14 @@ impl Caster {
         let [a, b, c] = self
             .vertices(hit.triangle)
             .map(|v| values[v as usize].as_dvec3());
-        let [wa, wb, wc] = self.weights_at(segment, hit);
+        let [wa, wb, wc] = self.weights(segment, hit.triangle);
         a * wa + b * wb + c * wc
     }
 
-    fn weights_at(&self, segment: &Segment, hit: Hit) -> [f64; 3] {
-        // Seen edge-on, any point of the triangle will do.
-        let weights = segment.weights(self.corners(hit.triangle));
+    /// How much of each vertex is in the place where a segment meets a triangle. Seen edge-on, any point of the
+    /// triangle will do.
+    pub(crate) fn weights(&self, segment: &Segment, triangle: u32) -> [f64; 3] {
+        let weights = segment.weights(self.corners(triangle));
         weights.unwrap_or([1.0 / 3.0; 3])
     }
 

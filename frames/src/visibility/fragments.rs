@@ -143,10 +143,7 @@ impl Fragments {
             let at = [(i % self.width) as u32, (i / self.width) as u32];
             let segment = lens.segment(at, [0.5, 0.5]);
             for Fragment { triangle, .. } in &self.all[pixel] {
-                // Seen edge-on through the centre, any point of the triangle will do.
-                let weights = segment
-                    .weights(caster.corners(*triangle))
-                    .unwrap_or([1.0 / 3.0; 3]);
+                let weights = caster.weights(&segment, *triangle);
                 let corners = caster.vertices(*triangle).map(|v| v as usize);
                 for (values, varying) in all.iter_mut().zip(varyings) {
                     values.extend((0..varying.components).map(|c| {
