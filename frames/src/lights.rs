@@ -1,9 +1,8 @@
 //! From a scene's lights to what kernels take of each, and which of them a picture can do without.
 
 use hankel_dsl::glam::{DVec3, Vec3, Vec4};
-use hankel_moments::FixedPoint;
 use hankel_shadows::shade::Light as Uniform;
-use hankel_shadows::soft::{Area, MOST_REACH};
+use hankel_shadows::soft::Area;
 
 use crate::frame::{Show, camera_view};
 use crate::graph::Omission;
@@ -109,14 +108,12 @@ pub fn area(light: &Light, view: &LightView) -> Area {
         Some(near) => (light.area.radius / near, view.depth / (near + view.depth)),
     };
     let spread = view.texel.map(|texel| radius * view.depth / texel);
-    // Texels of the largest rectangle that is read of a table, which is a texel wide at least.
-    let [x, y] = spread.map(|s| 2 * s.clamp(0.5, MOST_REACH).ceil() as u32);
     Area {
         spread: spread.into(),
         slack: (STEEPEST * radius).min(0.5),
         margin: (MARGIN * radius).min(0.5),
-        one: FixedPoint::for_kernel(x * y).one,
         narrowing,
+        padding: 0.0,
     }
 }
 

@@ -1,16 +1,19 @@
 //! Passes that techniques share: functions that take handles and return a handle.
 
 use std::borrow::Cow;
+use std::marker::PhantomData;
 
-use hankel_dsl::glam::{IVec2, UVec2};
+use hankel_dsl::glam::{IVec2, UVec4};
 use hankel_dsl::native::describe::TexelFormat;
+use hankel_dsl::native::layout::Element;
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_host::device::Blend;
+use hankel_moments::Fixed6;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_shadows::blur::Taps;
 use hankel_shadows::mips::Raster;
 use hankel_shadows::shade::encoding;
-use hankel_shadows::soft::Lines;
+use hankel_shadows::soft::{Halving, Level, Pyramid, PyramidLines};
 
 use crate::graph::{AddCompute, AddDraw, Graph, Handle, Result, Shape, Surfaces};
 use crate::scene::{Area, DepthRange, Shadow};
@@ -458,42 +461,90 @@ pub fn mips(graph: &mut Graph, map: Handle) -> Result<Handle> {
     graph.levels("mips", &levels)
 }
 
-/// The summed-area table of each texel's mean moments: `resolve` makes elements of depths, `sum` adds them up
-/// along lines.
+/// The kernels that make a pyramid of summed-area tables, with elements of type `T`.
+pub struct Tables<T> {
+    /// Makes elements of depths.
+    pub resolve: &'static str,
+    /// Makes a level of the one before.
+    pub halve: &'static str,
+    /// Adds elements up along lines.
+    pub sum: &'static str,
+    /// What an element is.
+    pub element: PhantomData<T>,
+}
+
+/// Of four moments.
+pub const TABLES: Tables<UVec4> = Tables {
+    resolve: "resolve_summed",
+    halve: "halve_summed",
+    sum: "prefix_sums",
+    element: PhantomData,
+};
+
+/// Of six.
+pub const TABLES_6: Tables<Fixed6> = Tables {
+    resolve: "resolve_summed_6",
+    halve: "halve_summed_6",
+    sum: "prefix_sums_6",
+    element: PhantomData,
+};
+
+/// Summed-area tables of each texel's mean moments, and what levels there are
+/// ([`Pyramid`]).
 ///
 /// # Errors
 /// See [`light_depth`].
-pub fn summed_area(
+pub fn summed_area<T: Element>(
     graph: &mut Graph,
     given: &Given,
     depth: Handle,
-    resolve: &'static str,
-    sum: &'static str,
-) -> Result<Handle> {
+    kernels: &Tables<T>,
+) -> Result<[Handle; 2]> {
     graph.omit("blur", "the filter's width differs from pixel to pixel");
     graph.omit("mips", "the table has regions of all sizes");
-    let size = given.shadow.size;
-    let texels = graph.constant("size", &UVec2::splat(size));
-    let mut table = graph
-        .compute("resolve", resolve)
+    let size = [given.shadow.size; 2];
+    let pyramid = Pyramid::of(size);
+    let levels: Vec<Level> = pyramid.all().collect();
+    let elements: u32 = levels
+        .iter()
+        .map(|level| level.size.element_product())
+        .sum();
+    let texels = graph.constant("size", &pyramid.size);
+    let empty = graph.zeros::<T>("table", elements as usize);
+    let resolved = graph
+        .compute("resolve", kernels.resolve)
         .arg("size", texels)
-        .arg("area", given.area)
         .arg("depth", depth)
-        .elements(size as usize * size as usize)?;
-    for (label, across) in [("sum rows", 0), ("sum columns", 1)] {
-        let lines = Lines {
-            invocations: 64 * size,
-            length: size,
-            across,
+        .arg("table", empty)
+        .finish()?;
+    // All of these kernels write their table.
+    let mut table = resolved.changed("table").unwrap_or(empty);
+    for level in levels.windows(2) {
+        let halving = Halving {
+            size: level[1].size,
+            whole: level[0].size,
+            first: level[0].first,
             padding: 0,
         };
+        let halving = graph.constant("halving", &halving);
+        let pass = graph.compute("halve", kernels.halve);
+        let halved = pass.arg("halving", halving).arg("table", table).finish()?;
+        table = halved.changed("table").unwrap_or(table);
+    }
+    for (label, across) in [("sum rows", 0), ("sum columns", 1)] {
+        let lines = levels.iter().map(|level| level.size[1 - across]);
+        let lines = PyramidLines {
+            size: pyramid.size,
+            invocations: 64 * lines.sum::<u32>(),
+            across: across as u32,
+        };
         let lines = graph.constant("lines", &lines);
-        let pass = graph.compute(label, sum);
+        let pass = graph.compute(label, kernels.sum);
         let summed = pass.arg("lines", lines).arg("table", table).finish()?;
-        // The kernel writes its table.
         table = summed.changed("table").unwrap_or(table);
     }
-    Ok(table)
+    let pyramid = graph.constant("pyramid", &pyramid);
+    Ok([table, pyramid])
 }
 
 /// A picture as it is seen through the medium, by a kernel that `kernel` with the picture's format names; `bind`

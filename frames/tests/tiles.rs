@@ -6,7 +6,7 @@ mod common;
 use std::path::Path;
 
 use common::shaders;
-use hankel_dsl::glam::Vec4;
+use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_frames::graph::{Graph, Handle};
 use hankel_frames::scene::{Mesh, Scene};
@@ -15,7 +15,7 @@ use hankel_frames::{Clock, Executor, Quiet, Show, graph_of};
 use hankel_host::device::{
     Bind, Device, NativeDevice, Program, Shader, TextureShape, VulkanDevice,
 };
-use hankel_shadows::soft::Lines;
+use hankel_shadows::soft::PyramidLines;
 use hankel_shadows::tiles::{Listed, tiles_of};
 
 fn scene(geometry: &str, shadow: &str) -> (Scene, Mesh) {
@@ -146,11 +146,10 @@ fn a_buffer_says_how_many_run() {
     ];
     for device in &mut devices {
         let mut summed = |invocations: u32, in_buffer: bool| {
-            let lines = Lines {
+            let lines = PyramidLines {
+                size: UVec2::new(331, 5),
                 invocations,
-                length: 331,
                 across: 0,
-                padding: 0,
             };
             let lines = bytemuck::bytes_of(&lines);
             let said = device.buffer_from("lines", lines).unwrap();

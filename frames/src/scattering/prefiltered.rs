@@ -6,8 +6,9 @@
 //! the light. But there the transmittance to the camera and the phase function depend on a ray's inclination at each
 //! place of a row, and the weights of a row's means must not. The papers say nothing of that.
 
+use hankel_dsl::glam::UVec2;
 use hankel_moments::bias::SYMMETRIC_6_32;
-use hankel_shadows::soft::Lines;
+use hankel_shadows::scattering::MapRows;
 
 use super::Scattering;
 use crate::graph::{Graph, GraphError, Handle, Result};
@@ -78,11 +79,10 @@ fn means(
         .arg("rows", rectification.rows)
         .arg("map", map)
         .elements(columns as usize * rows as usize)?;
-    let lines = Lines {
+    let lines = MapRows {
         invocations: 64 * rows,
         length: columns,
-        across: 0,
-        padding: 0,
+        padding: UVec2::ZERO,
     };
     let lines = graph.constant("lines", &lines);
     let summed = graph

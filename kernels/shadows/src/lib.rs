@@ -18,8 +18,8 @@
 //! | and what is seen through them | [`tint`](translucent::tint), [`tinted`](translucent::tinted) |
 //! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba8unorm`](blur::blur_rgba8unorm), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float), [`blur_packed_10`](packed::blur_packed_10), [`blur_packed_16`](packed::blur_packed_16) |
 //! | mip levels | [`halve`](mips::halve), [`halve_rgba8unorm`](mips::halve_rgba8unorm), [`halve_rgba16float`](mips::halve_rgba16float), [`halve_r32float`](mips::halve_r32float) |
-//! | summed-area table of moments | [`resolve_summed`](soft::resolve_summed), [`prefix_sums`](soft::prefix_sums) twice |
-//! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) twice |
+//! | summed-area tables of moments | [`resolve_summed`](soft::resolve_summed), [`halve_summed`](soft::halve_summed) for each level after the first, [`prefix_sums`](soft::prefix_sums) twice |
+//! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`halve_summed_6`](soft::halve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) |
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface), [`surface_with_plane`](mips::surface_with_plane) |
 //! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
@@ -147,6 +147,8 @@ hankel_dsl::kernels![
     moment_maps::shade_moments_10_mips,
     soft::resolve_summed,
     soft::resolve_summed_6,
+    soft::halve_summed,
+    soft::halve_summed_6,
     soft::prefix_sums,
     soft::prefix_sums_6,
     soft::shade_soft,

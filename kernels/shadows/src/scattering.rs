@@ -31,7 +31,7 @@ use hankel_moments::{
 use crate::depth::row_times_point;
 use crate::grid::within;
 use crate::shade::{Light, within_cone};
-use crate::soft::{Lines, in_texels, nearest, texel};
+use crate::soft::{in_texels, nearest, texel};
 
 /// How a picture's pixels look into the world.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -556,6 +556,20 @@ pub fn rectify(
     lerp(of(depth(points.z1)), of(depth(points.z2)), points.w2)
 }
 
+/// The rows of a rectified map. A workgroup of 64 invocations has a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
+#[repr(C)]
+pub struct MapRows {
+    /// 64 for each row.
+    #[range(64..=1024)]
+    pub invocations: u32,
+    /// Texels of a row.
+    #[range(1..=64)]
+    pub length: u32,
+    /// Fills the structure up.
+    pub padding: UVec2,
+}
+
 /// Means along rows of a map in rectified coordinates, in its place: each texel becomes the mean of those
 /// before it in its row, and of itself. A texel's weight is what the medium in it scatters that reaches the
 /// camera, by the extinction of `rows` (see [`rectify`]).
@@ -575,7 +589,7 @@ pub fn prefix_means(
     #[group_id] row: u32,
     #[shared] totals: Shared<'_, Vec4, 64>,
     #[shared] weights: Shared<'_, f32, 64>,
-    #[uniform] lines: &Lines,
+    #[uniform] lines: &MapRows,
     #[uniform] rectified: &Rectified,
     #[storage]
     #[length(1..=16)]

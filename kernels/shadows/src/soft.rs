@@ -8,6 +8,12 @@
 //! thing in the map and a penumbra's: with half width w, blocker and receiver at D_b and D_r, that is
 //! w (D_r - D_b) / D_b on the receiver, and w (1 / D_b - 1 / D_r) as seen from the light. Penumbrae are
 //! therefore as wide as their blockers are far, without a division.
+//!
+//! Mean moments come from a pyramid of summed-area tables: each level is the table of a map of half the size. A
+//! region is read from the first level where it is so small that its sum is below 2^32. So no region is too large, and
+//! an integer has 21.8 bits for a number from 0 to 1 whatever the size of the light. With one table it has what the
+//! largest region leaves: 17.3 bits for 112 x 234 texels. Moments have to be biased by as much as they are rounded, and
+//! a bias lets light into shadows that are close to their blockers.
 
 use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
@@ -16,7 +22,7 @@ use hankel_dsl::{
 use hankel_moments::{
     Blockers, Fixed4, Fixed6, FixedPoint, Moments4, Moments6, Quantized4, Quantized6, Region, Span,
     blockers_2, blockers_4, blockers_6, dequantize_symmetric_4, dequantize_symmetric_6,
-    hamburger_4, hamburger_6, quantize_symmetric_4, quantize_symmetric_6,
+    quantize_symmetric_4, quantize_symmetric_6,
 };
 
 use crate::grid::within;
@@ -42,26 +48,21 @@ pub struct Area {
     /// distance.
     #[range(0.0..=0.5)]
     pub margin: f32,
-    /// The integer that stands for 1 in the summed-area table ([`FixedPoint`]).
-    #[range(1..=16_777_216)]
-    pub one: u32,
     /// What of these two shares is gone for a receiver at depth 1: the farther off a spot light is, the
     /// smaller it looks. 0 for a directional light.
     #[range(0.0..=1.0)]
     pub narrowing: f32,
+    /// Fills the structure up.
+    pub padding: f32,
 }
 
-/// Texels to each side that a summed-area table is read over, at most. There, its numbers have as many
-/// bits as those of a map of 16 bits.
-pub const MOST_REACH: f32 = 128.0;
+/// Texels of a region that is read from a level of a pyramid, at most, with those that it covers in part.
+pub const MOST_TEXELS: u32 = 34 * 34;
+
+/// What stands for 1 in a pyramid's integers.
+pub const POINT: FixedPoint = FixedPoint::for_kernel(MOST_TEXELS);
 
 impl Area {
-    /// The table's fixed point.
-    #[inline(always)]
-    fn point(&self) -> FixedPoint {
-        FixedPoint { one: self.one }
-    }
-
     /// What a share of a distance for a receiver at depth 0 is for one at depth `z`.
     #[inline(always)]
     fn seen_from(&self, share: f32, z: f32) -> f32 {
@@ -80,21 +81,108 @@ impl Area {
     }
 }
 
-/// Lines of a table: its rows or its columns. A workgroup of 64 invocations has a line.
+/// A pyramid of summed-area tables, one after the other, each with its rows from the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
 #[repr(C)]
-pub struct Lines {
-    /// 64 for each line.
-    #[range(64..=1024)]
-    pub invocations: u32,
-    /// Elements of a line.
-    #[range(1..=64)]
-    pub length: u32,
-    /// 0: a line's elements follow each other (rows). 1: lines do (columns).
-    #[values(0, 1)]
-    pub across: u32,
+pub struct Pyramid {
+    /// Texels of the first level: those of the map.
+    #[range(1..=16)]
+    pub size: UVec2,
+    /// How many levels there are. Each has half as many texels along an axis as the one before, rounded up. The last
+    /// one has [`MOST_TEXELS`] at most, so that any region may be read from it.
+    #[range(1..=4)]
+    pub levels: u32,
     /// Fills the structure up.
     pub padding: u32,
+}
+
+/// A level of a [`Pyramid`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Level {
+    /// Elements before its first one.
+    pub first: u32,
+    /// Its texels.
+    pub size: UVec2,
+}
+
+impl Level {
+    /// The one with half as many texels.
+    #[inline(always)]
+    #[must_use]
+    pub fn next(self) -> Self {
+        let half = |n: u32| n / 2 + n % 2;
+        Self {
+            first: self.first + self.size.x * self.size.y,
+            size: UVec2::new(half(self.size.x), half(self.size.y)),
+        }
+    }
+}
+
+impl Pyramid {
+    /// The first level.
+    #[inline(always)]
+    #[must_use]
+    pub fn base(&self) -> Level {
+        Level {
+            first: 0,
+            size: self.size,
+        }
+    }
+
+    /// All levels for a map of `size` texels.
+    #[must_use]
+    pub fn of(size: [u32; 2]) -> Self {
+        let mut this = Self {
+            size: UVec2::from_array(size),
+            levels: 1,
+            padding: 0,
+        };
+        let mut level = this.base();
+        while level.size.element_product() > MOST_TEXELS {
+            level = level.next();
+            this.levels += 1;
+        }
+        this
+    }
+
+    /// All levels, the largest first.
+    pub fn all(&self) -> impl Iterator<Item = Level> {
+        core::iter::successors(Some(self.base()), |level| Some(level.next()))
+            .take(self.levels as usize)
+    }
+}
+
+/// Two levels of a pyramid: one to read, and the next one to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
+#[repr(C)]
+pub struct Halving {
+    /// Texels of the level to write.
+    #[range(1..=16)]
+    pub size: UVec2,
+    /// Texels of the level to read.
+    #[range(1..=32)]
+    pub whole: UVec2,
+    /// Elements before the first one of the level to read; those of the next level follow its last one.
+    #[range(0..=64)]
+    pub first: u32,
+    /// Fills the structure up.
+    pub padding: u32,
+}
+
+/// Which lines of a pyramid's levels are summed up: their rows or their columns. A workgroup of 64 invocations has
+/// a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Element)]
+#[repr(C)]
+pub struct PyramidLines {
+    /// Texels of the first level.
+    #[range(1..=64)]
+    pub size: UVec2,
+    /// 64 for each line of all levels.
+    #[range(64..=1024)]
+    pub invocations: u32,
+    /// 0: rows. 1: columns.
+    #[values(0, 1)]
+    pub across: u32,
 }
 
 /// What a table's entries are made of: integers modulo 2^32.
@@ -102,6 +190,15 @@ trait Sums: Copy {
     const ZERO: Self;
     fn plus(self, other: Self) -> Self;
     fn minus(self, other: Self) -> Self;
+    /// A fourth of each, the nearest integer.
+    fn quarter(self) -> Self;
+    /// Those of the far end, which is all that lies beyond a map.
+    fn far() -> Self;
+}
+
+#[inline(always)]
+fn quarter(n: u32) -> u32 {
+    (n + 2) / 4
 }
 
 impl Sums for UVec4 {
@@ -113,6 +210,19 @@ impl Sums for UVec4 {
     #[inline(always)]
     fn minus(self, other: Self) -> Self {
         vector(fixed(self).minus(fixed(other)))
+    }
+    #[inline(always)]
+    fn quarter(self) -> Self {
+        Self::new(
+            quarter(self.x),
+            quarter(self.y),
+            quarter(self.z),
+            quarter(self.w),
+        )
+    }
+    #[inline(always)]
+    fn far() -> Self {
+        vector(Fixed4::of(far_4(), POINT))
     }
 }
 
@@ -133,6 +243,33 @@ impl Sums for Fixed6 {
     fn minus(self, other: Self) -> Self {
         self.minus(other)
     }
+    #[inline(always)]
+    fn quarter(self) -> Self {
+        Self {
+            r0: quarter(self.r0),
+            g0: quarter(self.g0),
+            b0: quarter(self.b0),
+            r1: quarter(self.r1),
+            g1: quarter(self.g1),
+            b1: quarter(self.b1),
+        }
+    }
+    #[inline(always)]
+    fn far() -> Self {
+        Self::of(far_6(), POINT)
+    }
+}
+
+/// Moments of the far end. Beyond a map, nothing is nearer.
+#[inline(always)]
+fn far_4() -> Quantized4<f32> {
+    quantize_symmetric_4(Moments4::of_depth(1.0))
+}
+
+/// The same of six.
+#[inline(always)]
+fn far_6() -> Quantized6<f32> {
+    quantize_symmetric_6(Moments6::of_depth(1.0))
 }
 
 #[inline(always)]
@@ -161,24 +298,37 @@ macro_rules! prefix_sums {
         )]
         pub fn $name(
             #[local_index] me: u32,
-            #[group_id] line: u32,
-            #[group_count] count: u32,
+            #[group_id] group: u32,
             #[shared] totals: Shared<'_, $element, 64>,
-            #[uniform] lines: &Lines,
+            #[uniform] lines: &PyramidLines,
             #[storage] table: StorageMut<'_, $element>,
         ) {
             // Lines do not reach beyond the table, whatever the uniform says.
             let entries = table.len();
             let is_row = lines.across == 0;
-            let step = if is_row { 1 } else { count };
-            let first_of_all = if is_row { line * lines.length } else { line };
-            let place = |k: u32| first_of_all + k * step;
-            let share = lines.length.div_ceil(64);
+            let count = |size: UVec2| if is_row { size.y } else { size.x };
+            let mut level = Level {
+                first: 0,
+                size: lines.size,
+            };
+            let mut line = group;
+            while line >= count(level.size) && count(level.size) > 0 && level.first < entries {
+                line -= count(level.size);
+                level = level.next();
+            }
+            let (step, length) = if is_row {
+                (1, level.size.x)
+            } else {
+                (level.size.x, level.size.y)
+            };
+            let start = level.first + if is_row { line * level.size.x } else { line };
+            let place = |k: u32| start + k * step;
+            let share = length.div_ceil(64);
             let first = me * share;
-            let end = if first + share < lines.length {
+            let end = if first + share < length {
                 first + share
             } else {
-                lines.length
+                length
             };
             let mut total = <$element as Sums>::ZERO;
             let mut k = first;
@@ -213,9 +363,9 @@ macro_rules! prefix_sums {
 }
 
 prefix_sums!(
-    /// Prefix sums along the lines of a table, in its place, modulo 2^32: each element becomes the sum of
-    /// those before it in its line, and of itself. Once along rows and once along columns makes a summed-area
-    /// table.
+    /// Prefix sums along the lines of all levels of a pyramid, in their place, modulo 2^32: each element becomes
+    /// the sum of those before it in its line, and of itself. Once along rows and once along columns makes
+    /// summed-area tables.
     ///
     /// A workgroup has a line. Each of its invocations adds up a 64th of it; a scan of these totals (Hillis
     /// and Steele: Data Parallel Algorithms, 1986) tells each what comes before its part.
@@ -239,14 +389,65 @@ pub(crate) fn texel(i: u32, size: UVec2) -> UVec2 {
     UVec2::new(x.unwrap_or(0), within(y.unwrap_or(0) as i32, size.y))
 }
 
+macro_rules! halve {
+    ($(#[doc = $doc:literal])* $name:ident, $element:ident, $inputs:ident) => {
+        $(#[doc = $doc])*
+        #[kernel(
+            compute,
+            threads(8, 8),
+            range(halving.size),
+            inputs = crate::inputs::soft::$inputs
+        )]
+        pub fn $name(
+            #[index] at: UVec2,
+            #[uniform] halving: &Halving,
+            #[storage] table: StorageMut<'_, $element>,
+        ) {
+            let Halving { size, whole, first, .. } = *halving;
+            let entries = table.len();
+            let texel = |x: u32, y: u32| {
+                let place = first + y * whole.x + x;
+                if x < whole.x && y < whole.y && place < entries {
+                    table.get(place)
+                } else {
+                    <$element as Sums>::far()
+                }
+            };
+            let (x, y) = (2 * at.x, 2 * at.y);
+            let above = Sums::plus(texel(x, y), texel(x + 1, y));
+            let below = Sums::plus(texel(x, y + 1), texel(x + 1, y + 1));
+            let mean = Sums::quarter(Sums::plus(above, below));
+            let place = first + whole.x * whole.y + at.y * size.x + at.x;
+            if place < entries {
+                table.set(place, mean);
+            }
+        }
+    };
+}
+
+halve!(
+    /// A level of a pyramid that is to be made of sums, from the one before it: the mean of 2 x 2 texels. What lies
+    /// beyond the map counts as its far end.
+    halve_summed,
+    UVec4,
+    halved
+);
+
+halve!(
+    /// As [`halve_summed`], of six integers.
+    halve_summed_6,
+    Fixed6,
+    halved_6
+);
+
 /// The nearest texel of a texture.
 #[inline(always)]
 fn inside(at: UVec2, size: UVec2) -> UVec2 {
     UVec2::new(within(at.x as i32, size.x), within(at.y as i32, size.y))
 }
 
-/// Mean of a texel's four moments, depths moved to [-1, 1], in the optimised basis, as integers: what
-/// [`prefix_sums`] makes a summed-area table of. Rows from the top, one after the other.
+/// Mean of a texel's four moments, depths moved to [-1, 1], in the optimised basis, as integers: the first level of
+/// a pyramid, before [`halve_summed`] makes the others and [`prefix_sums`] their sums.
 #[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved)]
 pub fn resolve_summed(
     #[index] at: UVec2,
@@ -254,9 +455,9 @@ pub fn resolve_summed(
     #[values(1, 4)]
     samples: u32,
     #[uniform] size: &UVec2,
-    #[uniform] area: &Area,
     #[texture] depth: Texture2dMultisampled<'_>,
-) -> UVec4 {
+    #[storage] table: StorageMut<'_, UVec4>,
+) {
     let q = mean_symmetric(depth, inside(at, depth.size()), samples);
     let q = Quantized4 {
         r: q.x,
@@ -264,20 +465,23 @@ pub fn resolve_summed(
         b: q.z,
         a: q.w,
     };
-    vector(Fixed4::of(q, area.point()))
+    let place = at.y * size.x + at.x;
+    if place < table.len() {
+        table.set(place, vector(Fixed4::of(q, POINT)));
+    }
 }
 
 /// The same of six moments.
-#[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved)]
+#[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved_6)]
 pub fn resolve_summed_6(
     #[index] at: UVec2,
     #[constant(id = 0, default = 4)]
     #[values(1, 4)]
     samples: u32,
     #[uniform] size: &UVec2,
-    #[uniform] area: &Area,
     #[texture] depth: Texture2dMultisampled<'_>,
-) -> Fixed6 {
+    #[storage] table: StorageMut<'_, Fixed6>,
+) {
     let texels = quantized(depth, inside(at, depth.size()), samples);
     let q = Quantized6 {
         r0: texels.first.x,
@@ -287,55 +491,68 @@ pub fn resolve_summed_6(
         g1: texels.second.y,
         b1: texels.second.z,
     };
-    Fixed6::of(q, area.point())
+    let place = at.y * size.x + at.x;
+    if place < table.len() {
+        table.set(place, Fixed6::of(q, POINT));
+    }
 }
 
 /// The rectangle within `reach` texels of a place, which is given in texels.
 #[inline(always)]
 pub(crate) fn region(place: Vec2, reach: Vec2, size: UVec2) -> Region {
     Region {
-        x: Span::around(place.x, Real::min(reach.x, MOST_REACH), size.x),
-        y: Span::around(place.y, Real::min(reach.y, MOST_REACH), size.y),
+        x: Span::around(place.x, reach.x, size.x),
+        y: Span::around(place.y, reach.y, size.y),
     }
 }
 
-/// Where in a table the sum over so many columns and rows stands, and whether it stands there: nothing comes
-/// before the first of them.
+/// A region of a pyramid: in the first level where it has no more than [`MOST_TEXELS`], or in the last one.
 #[inline(always)]
-fn entry(columns: u32, rows: u32, size: UVec2) -> (u32, bool) {
-    // Without a branch.
-    let is_any = (columns > 0) & (rows > 0);
-    (
-        if is_any {
-            (rows - 1) * size.x + columns - 1
-        } else {
-            0
-        },
-        is_any,
-    )
+fn region_of(pyramid: &Pyramid, place: Vec2, reach: Vec2) -> (Level, Region) {
+    let most = MOST_TEXELS as f32;
+    // Texels that it covers, those at its edges in part.
+    let texels = |reach: Vec2| (2.0 * reach.x + 2.0) * (2.0 * reach.y + 2.0);
+    let mut level = pyramid.base();
+    let (mut place, mut reach) = (place, reach);
+    let mut k = 1;
+    while k < pyramid.levels && texels(reach) > most {
+        level = level.next();
+        place = Vec2::new(0.5 * place.x, 0.5 * place.y);
+        reach = Vec2::new(0.5 * reach.x, 0.5 * reach.y);
+        k += 1;
+    }
+    (level, region(place, reach, level.size))
 }
 
-/// A summed-area table of four moments.
+/// Where in a pyramid the sum over so many columns and rows of a level stands, and the bits of it that count: none if
+/// there are no columns or no rows, as nothing comes before the first of them. Without a branch: a region has 16 of
+/// these.
+#[inline(always)]
+fn entry(columns: u32, rows: u32, level: Level) -> (u32, u32) {
+    let (is_column, is_row) = (columns.min(1), rows.min(1));
+    let index = level.first + (rows - is_row) * level.size.x + (columns - is_column);
+    (index, (is_column & is_row).wrapping_neg())
+}
+
+/// A pyramid of summed-area tables of four moments.
 struct Table<'a> {
     entries: Buffer<'a, UVec4>,
-    size: UVec2,
-    point: FixedPoint,
+    pyramid: &'a Pyramid,
 }
 
 impl Table<'_> {
     /// The mean moments within `reach` texels of a place. Beyond the map, nothing is nearer than its end.
     #[inline(always)]
     fn around(&self, place: Vec2, reach: Vec2) -> Moments4<f32> {
-        let beyond = quantize_symmetric_4(Moments4::of_depth(1.0));
-        let region = region(place, reach, self.size);
-        let q = region.mean_4(self.point, beyond, |columns, rows| {
-            let (i, is_any) = entry(columns, rows, self.size);
-            let sum = fixed(self.entries.get(i));
+        let (level, region) = region_of(self.pyramid, place, reach);
+        let q = region.mean_4(POINT, far_4(), |columns, rows| {
+            let (i, bits) = entry(columns, rows, level);
+            let sum = self.entries.get(i);
             Fixed4 {
-                r: if is_any { sum.r } else { 0 },
-                g: if is_any { sum.g } else { 0 },
-                b: if is_any { sum.b } else { 0 },
-                a: if is_any { sum.a } else { 0 },
+                r: sum.x & bits,
+                g: sum.y & bits,
+                b: sum.z & bits,
+                a: sum.w & bits,
             }
         });
         dequantize_symmetric_4(q)
@@ -345,25 +562,23 @@ impl Table<'_> {
 /// The same of six.
 struct Table6<'a> {
     entries: Buffer<'a, Fixed6>,
-    size: UVec2,
-    point: FixedPoint,
+    pyramid: &'a Pyramid,
 }
 
 impl Table6<'_> {
     #[inline(always)]
     fn around(&self, place: Vec2, reach: Vec2) -> Moments6<f32> {
-        let beyond = quantize_symmetric_6(Moments6::of_depth(1.0));
-        let region = region(place, reach, self.size);
-        let q = region.mean_6(self.point, beyond, |columns, rows| {
-            let (i, is_any) = entry(columns, rows, self.size);
+        let (level, region) = region_of(self.pyramid, place, reach);
+        let q = region.mean_6(POINT, far_6(), |columns, rows| {
+            let (i, bits) = entry(columns, rows, level);
             let sum = self.entries.get(i);
             Fixed6 {
-                r0: if is_any { sum.r0 } else { 0 },
-                g0: if is_any { sum.g0 } else { 0 },
-                b0: if is_any { sum.b0 } else { 0 },
-                r1: if is_any { sum.r1 } else { 0 },
-                g1: if is_any { sum.g1 } else { 0 },
-                b1: if is_any { sum.b1 } else { 0 },
+                r0: sum.r0 & bits,
+                g0: sum.g0 & bits,
+                b0: sum.b0 & bits,
+                r1: sum.r1 & bits,
+                g1: sum.g1 & bits,
+                b1: sum.b1 & bits,
             }
         });
         dequantize_symmetric_6(q)
@@ -379,9 +594,41 @@ pub(crate) fn in_texels(uv: Vec2, size: UVec2) -> Vec2 {
 /// What the lecture adds of the receiver's own depth to the mean of the blockers'.
 const EPSILON: f32 = 1e-3;
 
+/// How often blockers are searched by moments. The first time it is wherever the light may be behind something, which
+/// mixes near blockers with far ones that the receiver does not see; then within the penumbra that the search before
+/// has found.
+const SEARCHES: u32 = 2;
+
+/// The shadow of a receiver at depth `z`: as many searches for its blockers, each within the penumbra that the one
+/// before has found, and then their share within the last penumbra. A search that finds none is the last: all is light.
+/// All but the first compare with a depth that is nearer, by the area's margin. `blockers` tells those of a region that
+/// are nearer than some depth.
+///
+/// One loop has all of it, so that a shader has the code that reads a region once.
+#[inline(always)]
+fn shadow(
+    area: &Area,
+    z: f32,
+    searches: u32,
+    blockers: impl Fn(Vec2, f32) -> Blockers<f32>,
+) -> f32 {
+    let margin = area.seen_from(area.margin, z);
+    let (mut distance, mut nearer, mut share) = (Real::saturate(z), 0.0, 1.0);
+    let mut step = 0;
+    while step <= searches && share > 0.0 {
+        let found = blockers(area.reach(distance), z - nearer);
+        share = found.share;
+        // They are told from the nearer depth; distances are those of depths in [-1, 1].
+        let moment = found.moment + 2.0 * nearer * share;
+        distance = 0.5 * Blockers { share, moment }.distance(EPSILON);
+        nearer = margin * distance;
+        step += 1;
+    }
+    share
+}
+
 /// Shading with moment soft shadow mapping: the blockers' distance by the moments of all that the light may
-/// be behind, the penumbra's width by that, and the shadow by the moments within. `table` is the summed-area
-/// table of a map of `size` texels.
+/// be behind, the penumbra's width by that, and the shadow by the moments within. `table` is the pyramid.
 #[kernel(
     fragment,
     inputs = crate::inputs::soft::shaded,
@@ -401,25 +648,21 @@ pub fn shade_soft(
     colour: Vec3,
     #[uniform] light: &Light,
     #[uniform] area: &Area,
-    #[uniform]
-    #[range(1..=16)]
-    size: &UVec2,
+    #[uniform] pyramid: &Pyramid,
     #[storage]
-    #[length(256)]
+    #[length(512)]
     table: Buffer<'_, UVec4>,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
         let table = Table {
             entries: table,
-            size: *size,
-            point: area.point(),
+            pyramid,
         };
-        let place = in_texels(uv, *size);
-        let all = biased(light, table.around(place, area.reach(z)));
-        let distance = 0.5 * blockers_4(all, symmetric_depth(z)).distance(EPSILON);
-        let near = biased(light, table.around(place, area.reach(distance)));
-        let margin = area.seen_from(area.margin, z);
-        hamburger_4(near, symmetric_depth(z - margin * distance))
+        let place = in_texels(uv, pyramid.size);
+        let around = |reach: Vec2| biased(light, table.around(place, reach));
+        shadow(area, z, SEARCHES, |reach, z| {
+            blockers_4(around(reach), symmetric_depth(z))
+        })
     })
 }
 
@@ -445,26 +688,21 @@ pub fn shade_soft_6(
     #[uniform] light: &Light,
     #[uniform] area: &Area,
     #[uniform] target: &Moments6<f32>,
-    #[uniform]
-    #[range(1..=16)]
-    size: &UVec2,
+    #[uniform] pyramid: &Pyramid,
     #[storage]
-    #[length(256)]
+    #[length(512)]
     table: Buffer<'_, Fixed6>,
 ) -> Vec4 {
     shade_with(light, world, normal, colour, |uv, z| {
         let table = Table6 {
             entries: table,
-            size: *size,
-            point: area.point(),
+            pyramid,
         };
-        let place = in_texels(uv, *size);
+        let place = in_texels(uv, pyramid.size);
         let around = |reach: Vec2| table.around(place, reach).lerp(*target, light.moment_bias);
-        let blockers = blockers_6(around(area.reach(z)), symmetric_depth(z));
-        let distance = 0.5 * blockers.distance(EPSILON);
-        let margin = area.seen_from(area.margin, z);
-        let receiver = symmetric_depth(z - margin * distance);
-        hamburger_6(around(area.reach(distance)), receiver).lower
+        shadow(area, z, SEARCHES, |reach, z| {
+            blockers_6(around(reach), symmetric_depth(z))
+        })
     })
 }
 
@@ -490,11 +728,9 @@ pub fn shade_vssm(
     colour: Vec3,
     #[uniform] light: &Light,
     #[uniform] area: &Area,
-    #[uniform]
-    #[range(1..=16)]
-    size: &UVec2,
+    #[uniform] pyramid: &Pyramid,
     #[storage]
-    #[length(256)]
+    #[length(512)]
     table: Buffer<'_, UVec4>,
     #[texture] depth: Texture2dMultisampled<'_>,
     #[constant(id = 0, default = 3)]
@@ -504,12 +740,11 @@ pub fn shade_vssm(
     shade_with(light, world, normal, colour, |uv, z| {
         let table = Table {
             entries: table,
-            size: *size,
-            point: area.point(),
+            pyramid,
         };
-        let place = in_texels(uv, *size);
+        let place = in_texels(uv, pyramid.size);
         let per_part = 1.0 / parts as f32;
-        let blockers = |reach: Vec2, z: f32| {
+        shadow(area, z, 1, |reach, z| {
             let (mut share, mut moment) = (0.0, 0.0);
             let half = Vec2::new(reach.x * per_part, reach.y * per_part);
             let turn = |k: u32| (2 * k + 1) as f32 * per_part - 1.0;
@@ -551,10 +786,7 @@ pub fn shade_vssm(
                 share: share * scale,
                 moment: moment * scale,
             }
-        };
-        let distance = 0.5 * blockers(area.reach(z), z).distance(EPSILON);
-        let margin = area.seen_from(area.margin, z);
-        blockers(area.reach(distance), z - margin * distance).share
+        })
     })
 }
 

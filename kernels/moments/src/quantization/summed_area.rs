@@ -27,7 +27,8 @@ pub struct Span {
     pub first_share: f32,
     /// How much of the last one counts, 0 to 1.
     pub last_share: f32,
-    /// Length in texels, also of what lies beyond the table.
+    /// Length in texels, also of what lies beyond the table: the sum of all shares, so that the weights of a mean have
+    /// the sum 1. Twice the reach differs from it by what the ends were rounded.
     pub length: f32,
     /// Length of what lies on the table.
     pub inside: f32,
@@ -43,20 +44,26 @@ impl Span {
         let edge = size as f32;
         let middle = Real::clamp(middle, -65536.0, edge + 65536.0);
         let reach = Real::clamp(reach, 0.5, 32768.0);
+        let (start, stop) = (middle - reach, middle + reach);
         let on = |x: f32| Real::clamp(x, 0.0, edge);
-        let (from, to) = (on(middle - reach), on(middle + reach));
+        let (from, to) = (on(start), on(stop));
         let first = Real::min(Real::floor(from), edge - 1.0);
         let whole = first + 1.0;
         let last = Real::max(Real::floor(to), whole);
+        let first_share = Real::saturate(Real::min(whole, to) - from);
+        let last_share = Real::saturate(to - last);
+        let inside = first_share + (last - whole) + last_share;
+        let before = Real::min(stop, 0.0) - Real::min(start, 0.0);
+        let after = Real::max(stop, edge) - Real::max(start, edge);
         Self {
             first: to_i32(first) as u32,
             whole: to_i32(whole) as u32,
             last: to_i32(last) as u32,
             end: to_i32(Real::min(last + 1.0, edge)) as u32,
-            first_share: Real::saturate(Real::min(whole, to) - from),
-            last_share: Real::saturate(to - last),
-            length: reach + reach,
-            inside: to - from,
+            first_share,
+            last_share,
+            length: inside + (before + after),
+            inside,
         }
     }
 }
@@ -85,39 +92,52 @@ macro_rules! means {
                 before: impl Fn(u32, u32) -> $fixed,
             ) -> $quantized<f32> {
                 let Self { x, y } = self;
+                let zero: f32 = lit!(0.0);
+                let one: f32 = lit!(1.0);
+                // Sums over the three parts of so many rows.
                 let row = |rows: u32| {
                     let start = before(x.first, rows);
                     let (whole, last) = (before(x.whole, rows), before(x.last, rows));
                     let end = before(x.end, rows);
                     (whole.minus(start), last.minus(whole), end.minus(last))
                 };
-                // Sums over rectangles above the same row, from each other.
-                let band = |above: ($fixed, $fixed, $fixed), below: ($fixed, $fixed, $fixed)| {
+                // A loop, so that a shader has the code that reads entries once for each of four columns, and not
+                // for each of sixteen entries.
+                let nothing = $fixed { $($channel: 0,)* };
+                let mut above = (nothing, nothing, nothing);
+                let mut mean = $quantized { $($channel: zero,)* };
+                let mut k = 0;
+                while k < 4 {
+                    // What lies above the first rows counts as nothing.
+                    let (rows, share) = if k == 0 {
+                        (y.first, zero)
+                    } else if k == 1 {
+                        (y.whole, y.first_share)
+                    } else if k == 2 {
+                        (y.last, one)
+                    } else {
+                        (y.end, y.last_share)
+                    };
+                    let below = row(rows);
                     let first = below.0.minus(above.0);
                     let whole = below.1.minus(above.1);
                     let last = below.2.minus(above.2);
-                    $quantized {
-                        $($channel: first.$channel as f32 * x.first_share
-                            + whole.$channel as f32
-                            + last.$channel as f32 * x.last_share,)*
-                    }
-                };
-                let (start, whole) = (row(y.first), row(y.whole));
-                let (last, end) = (row(y.last), row(y.end));
-                let (top, middle, bottom) = (band(start, whole), band(whole, last), band(last, end));
+                    $(mean.$channel += (first.$channel as f32 * x.first_share
+                        + whole.$channel as f32
+                        + last.$channel as f32 * x.last_share)
+                        * share;)*
+                    above = below;
+                    k += 1;
+                }
                 let texels = x.length * y.length;
                 let missing = texels - x.inside * y.inside;
-                let one: f32 = lit!(1.0);
-                let scale = one / (texels * Real::max(point.one as f32, one));
+                // A point that is known becomes one constant. Of `texels * point` a compiler may make it, too, and
+                // would round otherwise than all others.
+                let unit = one / Real::max(point.one as f32, one);
+                let scale = unit / texels;
                 let missing = missing / texels;
                 $quantized {
-                    $($channel: Real::saturate(
-                        (top.$channel * y.first_share
-                            + middle.$channel
-                            + bottom.$channel * y.last_share)
-                            * scale
-                            + missing * beyond.$channel,
-                    ),)*
+                    $($channel: Real::saturate(mean.$channel * scale + missing * beyond.$channel),)*
                 }
             }
         }

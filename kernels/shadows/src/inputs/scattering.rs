@@ -3,7 +3,7 @@
 
 use std::vec::Vec;
 
-use hankel_dsl::glam::{Vec3, Vec4};
+use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
 use hankel_moments::bias::{SYMMETRIC_4_16, SYMMETRIC_6_32};
@@ -13,9 +13,8 @@ use hankel_moments::{
 };
 
 use super::maps::{self, SAMPLES, SIZE};
-use crate::scattering::{Medium, Rectified, View};
+use crate::scattering::{MapRows, Medium, Rectified, View};
 use crate::shade::{Light, encoding};
-use crate::soft::Lines;
 
 /// Distances of the near and of the far plane.
 const RANGE: [f64; 2] = [0.05, 4.0];
@@ -344,7 +343,7 @@ pub fn rectified(_: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// Rows whose means are to be taken: of a map, and of lengths that the workgroup has fewer and more parts than.
+/// MapRows whose means are to be taken: of a map, and of lengths that the workgroup has fewer and more parts than.
 #[must_use]
 pub fn means(_: &Request) -> Vec<Given> {
     let sizes = [TABLE, [331, 5], [1, 3]];
@@ -357,11 +356,10 @@ pub fn means(_: &Request) -> Vec<Given> {
             Given::new(camera.what)
                 .uniform(
                     "lines",
-                    &Lines {
+                    &MapRows {
                         invocations: 64 * size[1],
                         length: size[0],
-                        across: 0,
-                        padding: 0,
+                        padding: UVec2::ZERO,
                     },
                 )
                 .uniform("rectified", &camera.rectified(size))

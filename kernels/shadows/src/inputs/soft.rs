@@ -1,16 +1,17 @@
 //! What soft shadows read: summed-area tables of the small scene of [`maps`], and lights of several
 //! sizes.
 
+use std::vec;
 use std::vec::Vec;
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
 use hankel_moments::bias::{SYMMETRIC_4_16_LECTURE, SYMMETRIC_6_16};
-use hankel_moments::{FixedPoint, Moments4, Moments6, quantize_symmetric_4, quantize_symmetric_6};
+use hankel_moments::{Moments4, Moments6, quantize_symmetric_4, quantize_symmetric_6};
 
 use super::maps::{self, SAMPLES, SIZE};
-use crate::soft::{Area, Lines};
+use crate::soft::{Area, Halving, Level, POINT, Pyramid, PyramidLines};
 
 /// Lights from hardly more than a point to one whose penumbrae fill half of the map, the second and the third
 /// spot lights.
@@ -19,13 +20,18 @@ fn areas() -> [Area; 3] {
         spread: Vec2::new(spread, 0.6 * spread),
         slack: 0.1,
         margin: 0.05,
-        one: FixedPoint::for_kernel((2.0 * spread + 2.0) as u32 * (1.2 * spread + 2.0) as u32).one,
         narrowing,
+        padding: 0.0,
     })
 }
 
+/// The integers of numbers from 0 to 1.
+fn fixed<const N: usize>(numbers: [f64; N]) -> [u32; N] {
+    numbers.map(|x| (x.clamp(0.0, 1.0) * f64::from(POINT.one)).round() as u32)
+}
+
 /// The integers of the map's texels, whose channels `of` gives for a depth in [-1, 1].
-fn texels<const N: usize>(one: u32, of: impl Fn(f64) -> [f64; N]) -> Vec<[u32; N]> {
+fn texels<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[u32; N]> {
     let depths = maps::samples();
     let texel = |samples: &[f64]| {
         let mut mean = [0.0; N];
@@ -34,7 +40,7 @@ fn texels<const N: usize>(one: u32, of: impl Fn(f64) -> [f64; N]) -> Vec<[u32; N
                 *mean += x / SAMPLES as f64;
             }
         }
-        mean.map(|x| (x.clamp(0.0, 1.0) * f64::from(one)).round() as u32)
+        fixed(mean)
     };
     depths.chunks_exact(SAMPLES).map(texel).collect()
 }
@@ -52,8 +58,7 @@ fn six(z: f64) -> [f64; 6] {
 }
 
 /// The summed-area table of texels.
-fn summed<const N: usize>(mut sums: Vec<[u32; N]>) -> Vec<[u32; N]> {
-    let width = SIZE[0] as usize;
+fn summed<const N: usize>(mut sums: Vec<[u32; N]>, width: usize) -> Vec<[u32; N]> {
     for i in 0..sums.len() {
         let before = |there: bool, back: usize| if there { sums[i - back] } else { [0; N] };
         let (left, above) = (i % width > 0, i >= width);
@@ -69,27 +74,76 @@ fn summed<const N: usize>(mut sums: Vec<[u32; N]>) -> Vec<[u32; N]> {
     sums
 }
 
-/// Tables whose rows, or columns, are to be summed up: of a map, and of any integers, in lines that the
+/// Levels of the map's pyramid: more than its size needs, so that several are read.
+const LEVELS: u32 = 3;
+
+fn pyramid() -> Pyramid {
+    Pyramid {
+        size: UVec2::from_array(SIZE),
+        levels: LEVELS,
+        padding: 0,
+    }
+}
+
+/// The texels of each level of a pyramid, `far` beyond the map.
+fn levels<const N: usize>(base: Vec<[u32; N]>, far: [u32; N]) -> Vec<(Level, Vec<[u32; N]>)> {
+    let mut all = vec![(pyramid().base(), base)];
+    for (k, level) in pyramid().all().enumerate().skip(1) {
+        let (whole, texels) = &all[k - 1];
+        let halved = |i: u32| {
+            let (x, y) = (2 * (i % level.size.x), 2 * (i / level.size.x));
+            let at = |x: u32, y: u32| match x < whole.size.x && y < whole.size.y {
+                true => texels[(y * whole.size.x + x) as usize],
+                false => far,
+            };
+            let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            std::array::from_fn(|c| (four.iter().map(|t| t[c]).sum::<u32>() + 2) / 4)
+        };
+        let count = level.size.x * level.size.y;
+        all.push((level, (0..count).map(halved).collect()));
+    }
+    all
+}
+
+/// The pyramid of the map, whose channels `of` gives for a depth in [-1, 1].
+fn tables<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<[u32; N]> {
+    let far = fixed(of(1.0));
+    let levels = levels(texels(of), far).into_iter();
+    let table = |(level, texels): (Level, _)| summed(texels, level.size.x as usize);
+    levels.flat_map(table).collect()
+}
+
+/// Pyramids whose rows, or columns, are to be summed up: of a map, and of any integers, in lines that the
 /// workgroup has fewer and more parts than.
-fn tables<const N: usize>(request: &Request, of_map: &[[u32; N]]) -> Vec<Given> {
+fn to_sum<const N: usize>(request: &Request, of: impl Fn(f64) -> [f64; N]) -> Vec<Given> {
     let mut s = Source::new(request.seed);
-    let [width, height] = SIZE;
     let mut any = |count: u32| {
         let mut element = || [0; N].map(|_: u32| s.bits() as u32);
         (0..count).map(|_| element()).collect::<Vec<_>>()
     };
-    let lines = |count: u32, length: u32, across: u32| Lines {
+    let far = fixed(of(1.0));
+    let all = levels(texels(of), far);
+    let of_map: Vec<[u32; N]> = all.iter().flat_map(|(_, t)| t.iter().copied()).collect();
+    let lines = |of: fn(&Level) -> u32| all.iter().map(|(level, _)| of(level)).sum();
+    let sums = |count: u32, size: [u32; 2], across: u32| PyramidLines {
+        size: UVec2::from_array(size),
         invocations: 64 * count,
-        length,
         across,
-        padding: 0,
     };
     [
-        ("rows of a map", lines(height, width, 0), of_map.to_vec()),
-        ("columns of a map", lines(width, height, 1), of_map.to_vec()),
-        ("long rows", lines(5, 331, 0), any(5 * 331)),
-        ("long columns", lines(7, 192, 1), any(7 * 192)),
-        ("one row of one", lines(1, 1, 0), any(1)),
+        (
+            "rows of a map",
+            sums(lines(|l| l.size.y), SIZE, 0),
+            of_map.clone(),
+        ),
+        (
+            "columns of a map",
+            sums(lines(|l| l.size.x), SIZE, 1),
+            of_map.clone(),
+        ),
+        ("long rows", sums(5, [331, 5], 0), any(5 * 331)),
+        ("long columns", sums(7, [7, 192], 1), any(7 * 192)),
+        ("one row of one", sums(1, [1, 1], 0), any(1)),
     ]
     .into_iter()
     .map(|(what, lines, table)| {
@@ -100,34 +154,83 @@ fn tables<const N: usize>(request: &Request, of_map: &[[u32; N]]) -> Vec<Given> 
     .collect()
 }
 
-/// Tables of four moments, to be summed up.
+/// Pyramids of four moments, to be summed up.
 #[must_use]
 pub fn table(request: &Request) -> Vec<Given> {
-    tables(request, &texels(FixedPoint::for_kernel(300).one, four))
+    to_sum(request, four)
 }
 
-/// Tables of six moments, to be summed up.
+/// Pyramids of six moments, to be summed up.
 #[must_use]
 pub fn table_6(request: &Request) -> Vec<Given> {
-    tables(request, &texels(FixedPoint::for_kernel(300).one, six))
+    to_sum(request, six)
 }
 
-/// Depths of several samples, and a fixed point.
+/// Pyramids whose levels are to be made, one for each.
+fn to_halve<const N: usize>(of: impl Fn(f64) -> [f64; N]) -> Vec<Given> {
+    let far = fixed(of(1.0));
+    let all = levels(texels(of), far);
+    let made = |k: usize| {
+        let known = all[..=k]
+            .iter()
+            .flat_map(|(_, texels)| texels.iter().copied());
+        let [(whole, _), (level, texels)] = [&all[k], &all[k + 1]];
+        let mut table: Vec<[u32; N]> = known.collect();
+        table.resize(table.len() + texels.len(), [0; N]);
+        Given::new("a level of a map")
+            .uniform(
+                "halving",
+                &Halving {
+                    size: level.size,
+                    whole: whole.size,
+                    first: whole.first,
+                    padding: 0,
+                },
+            )
+            .buffer("table", table.as_flattened())
+    };
+    (0..all.len() - 1).map(made).collect()
+}
+
+/// Pyramids of four moments, whose levels are to be made.
 #[must_use]
-pub fn resolved(request: &Request) -> Vec<Given> {
-    let all = areas().into_iter().flat_map(|area| {
-        let given = maps::depths(request).into_iter();
-        given.map(move |given| {
+pub fn halved(_: &Request) -> Vec<Given> {
+    to_halve(four)
+}
+
+/// Pyramids of six moments, whose levels are to be made.
+#[must_use]
+pub fn halved_6(_: &Request) -> Vec<Given> {
+    to_halve(six)
+}
+
+/// Depths of several samples, and an empty table of `N` channels.
+fn to_resolve<const N: usize>(request: &Request) -> Vec<Given> {
+    let empty = vec![[0_u32; N]; (SIZE[0] * SIZE[1]) as usize];
+    let given = maps::depths(request).into_iter();
+    given
+        .map(|given| {
             given
                 .uniform("size", &UVec2::from_array(SIZE))
-                .uniform("area", &area)
+                .buffer("table", empty.as_flattened())
         })
-    });
-    all.collect()
+        .collect()
+}
+
+/// Depths of several samples, for four moments.
+#[must_use]
+pub fn resolved(request: &Request) -> Vec<Given> {
+    to_resolve::<4>(request)
+}
+
+/// Depths of several samples, for six.
+#[must_use]
+pub fn resolved_6(request: &Request) -> Vec<Given> {
+    to_resolve::<6>(request)
 }
 
 /// Fragments and lights: `of` adds what a technique looks up.
-fn shaded_by(request: &Request, moment_bias: f32, of: impl Fn(Given, Area) -> Given) -> Vec<Given> {
+fn shaded_by(request: &Request, moment_bias: f32, of: impl Fn(Given) -> Given) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     areas()
         .into_iter()
@@ -140,29 +243,31 @@ fn shaded_by(request: &Request, moment_bias: f32, of: impl Fn(Given, Area) -> Gi
                 .buffer("colour", &colours)
                 .uniform("light", &maps::light(&bias, moment_bias, 1e-3, 1))
                 .uniform("area", &area);
-            of(given, area)
+            of(given)
         })
         .collect()
+}
+
+/// The pyramid of four moments.
+fn with_tables(given: Given) -> Given {
+    given
+        .uniform("pyramid", &pyramid())
+        .buffer("table", tables(four).as_flattened())
 }
 
 /// What moment soft shadow mapping reads.
 #[must_use]
 pub fn shaded(request: &Request) -> Vec<Given> {
-    shaded_by(request, 2e-5, |given, area| {
-        let table = summed(texels(area.one, four));
-        given
-            .uniform("size", &UVec2::from_array(SIZE))
-            .buffer("table", table.as_flattened())
-    })
+    shaded_by(request, 1e-6, with_tables)
 }
 
 /// What moment soft shadow mapping reads with six moments.
 #[must_use]
 pub fn shaded_6(request: &Request) -> Vec<Given> {
-    shaded_by(request, 5e-5, |given, area| {
-        let table = summed(texels(area.one, six));
+    shaded_by(request, 5e-6, |given| {
+        let table = tables(six);
         given
-            .uniform("size", &UVec2::from_array(SIZE))
+            .uniform("pyramid", &pyramid())
             .uniform("target", &SYMMETRIC_6_16.six())
             .buffer("table", table.as_flattened())
     })
@@ -171,7 +276,7 @@ pub fn shaded_6(request: &Request) -> Vec<Given> {
 /// What variance soft shadow mapping reads.
 #[must_use]
 pub fn shaded_parts(request: &Request) -> Vec<Given> {
-    shaded(request).into_iter().map(with_depths).collect()
+    shaded_by(request, 2e-5, |given| with_depths(with_tables(given)))
 }
 
 /// Depths of several samples.
@@ -190,7 +295,7 @@ pub fn searched(request: &Request) -> Vec<Given> {
             .map(|i| Vec2::new(part(i, 0.754_877_67) as f32, part(i, 0.569_840_3) as f32))
             .collect::<Vec<_>>()
     };
-    shaded_by(request, 0.0, |given, _| {
+    shaded_by(request, 0.0, |given| {
         with_depths(
             given
                 .buffer("search", &points(16))

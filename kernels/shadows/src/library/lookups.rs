@@ -43,15 +43,16 @@ pub fn penumbra_reach(distance: f32, spread: Vec2) -> Vec2 {
         spread,
         slack: 0.0,
         margin: 0.0,
-        one: 1,
         narrowing: 0.0,
+        padding: 0.0,
     };
     area.reach(distance)
 }
 
 /// The mean of four moments in the basis optimised for 4 x 16 bits, over the rectangle within `reach` texels of
 /// `place`, also in texels, from a summed-area table of `size` entries (\[BHS\], lecture, "Caveat: bilinear
-/// interpolation"). `one` stands for 1 in the table. Beyond the table, nothing is nearer than depth 1.
+/// interpolation"). `one` stands for 1 in the table: no more than 2^32 over the texels of the largest rectangle.
+/// Beyond the table, nothing is nearer than depth 1.
 ///
 /// `sum_before` gives the sum over so many columns and so many rows, from the first on: the entry at the last of
 /// them, and 0 where there are none. It is called 16 times.
