@@ -600,9 +600,11 @@ const EPSILON: f32 = 1e-3;
 const SEARCHES: u32 = 2;
 
 /// The shadow of a receiver at depth `z`: as many searches for its blockers, each within the penumbra that the one
-/// before has found, and then their share within the last penumbra. A search that finds none is the last: all is light.
-/// All but the first compare with a depth that is nearer, by the area's margin. `blockers` tells those of a region that
-/// are nearer than some depth.
+/// before has found, and then their share within the last penumbra. All but the first compare with a depth that is
+/// nearer, by the area's margin. `blockers` tells those of a region that are nearer than some depth.
+///
+/// A search that finds no blockers is not the last, as a lower bound is often 0 for thin casters in a large region. After
+/// two of them the next lookup would be the one before.
 ///
 /// One loop has all of it, so that a shader has the code that reads a region once.
 #[inline(always)]
@@ -613,13 +615,15 @@ fn shadow(
     blockers: impl Fn(Vec2, f32) -> Blockers<f32>,
 ) -> f32 {
     let margin = area.seen_from(area.margin, z);
-    let (mut distance, mut nearer, mut share) = (Real::saturate(z), 0.0, 1.0);
+    let (mut distance, mut before) = (Real::saturate(z), 1.0);
+    let (mut nearer, mut share) = (0.0, 0.0);
     let mut step = 0;
-    while step <= searches && share > 0.0 {
+    while step <= searches && (distance > 0.0 || before > 0.0) {
         let found = blockers(area.reach(distance), z - nearer);
         share = found.share;
         // They are told from the nearer depth; distances are those of depths in [-1, 1].
         let moment = found.moment + 2.0 * nearer * share;
+        before = distance;
         distance = 0.5 * Blockers { share, moment }.distance(EPSILON);
         nearer = margin * distance;
         step += 1;
