@@ -89,7 +89,7 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
     let most = all.iter().map(Vec::len).max().unwrap_or(0);
     report.fact("configurations of a scene, at most", most);
     report.notes.push(
-        "Times are medians of interleaved rounds, each after a run of the same frame. The error is the \
+        "Times are medians of interleaved rounds, each after runs of the same frame. The error is the \
          root mean square of the light that arrives (1 minus the shadow; 0 where a surface is turned from the \
          light) against 256 rays through each pixel, over all pixels. In a scene with a medium it is the light \
          that comes through that, with what the medium scatters: phase function and absorption are left out, so \

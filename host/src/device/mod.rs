@@ -562,6 +562,12 @@ pub trait Device {
     /// Which of the devices this is.
     fn backend(&self) -> Backend;
 
+    /// Whether work runs on a GPU, whose clocks fall while it waits: not of the native device, nor of a driver that
+    /// runs on the processor.
+    fn is_gpu(&self) -> bool {
+        false
+    }
+
     /// Makes a buffer of `bytes` bytes, filled with zeros. `label` is for messages.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::ops::Range;
 
 use super::VulkanDevice;
+use crate::device::Device;
 use crate::device::error::Result;
 
 /// What an adapter must have: timestamps between passes.
@@ -56,8 +57,7 @@ impl VulkanDevice {
     /// done. Its wall time is right.
     #[must_use]
     pub fn has_clock(&self) -> bool {
-        let is_software = self.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
-        self.has_timestamps() && (!is_software || self.by_timestamps)
+        self.has_timestamps() && (self.is_gpu() || self.by_timestamps)
     }
 
     /// Whether the adapter can write timestamps.

@@ -339,6 +339,10 @@ impl Device for VulkanDevice {
         Backend::Vulkan
     }
 
+    fn is_gpu(&self) -> bool {
+        self.adapter.get_info().device_type != wgpu::DeviceType::Cpu
+    }
+
     fn buffer(&mut self, label: &str, bytes: usize) -> Result<BufferId> {
         let memory = self.make_buffer(label, bytes)?;
         let index = self.buffers.len() as u32;
