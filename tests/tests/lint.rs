@@ -8,7 +8,8 @@ use hankel_codegen::translate::Ir;
 use hankel_dsl::native::describe::{Kernel, Output, Role, Stage};
 use hankel_tests::Crate;
 
-/// Whether it reads or writes no texture, and its invocations do not work together.
+/// Whether it looks nothing up in a texture or a buffer, writes to its own place alone, and its invocations do not work
+/// together.
 fn maps_rows(kernel: &Kernel) -> bool {
     if matches!(
         kernel.stage,
@@ -19,7 +20,12 @@ fn maps_rows(kernel: &Kernel) -> bool {
     ) {
         return false;
     }
-    let reads = |role: &Role| matches!(role, Role::Texture { .. });
+    let reads = |role: &Role| {
+        matches!(
+            role,
+            Role::Texture { .. } | Role::Storage { .. } | Role::StorageMut { .. }
+        )
+    };
     let writes = |output: &Output| matches!(output, Output::Texture { .. });
     !kernel.params.iter().any(|param| reads(&param.role)) && !kernel.outputs.iter().any(writes)
 }
@@ -82,6 +88,8 @@ fn filters_loop_over_their_samples() {
         ("resolve_unit", 0),
         // Rows and columns.
         ("shade_pcf", 2),
+        // Levels of the pyramid, and searches until two have found no blockers; a region's rows are four.
+        ("shade_soft", 2),
     ] {
         let found = &all[kernel].1;
         assert_eq!(found.len(), loops, "{kernel}: {found:?}");
