@@ -871,7 +871,7 @@ fn a_new_crate_builds_at_once() {
     let test = Command::new("cargo")
         .args(["test", "--release"])
         .current_dir(&path)
-        .env("CARGO_TARGET_DIR", &target)
+        .env("CARGO_TARGET_DIR", target.join("hankel/native"))
         .output()
         .expect("cargo starts");
     assert!(

@@ -60,8 +60,13 @@ fn a_kernel_crate_is_built_loaded_and_run() {
             root.join("kernels/dsl")
         ),
     );
-    // The same versions as here, so that nothing new is fetched.
+    // The same versions as here, so that nothing new is fetched, and where the command line's tests have built them.
     fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    fs::create_dir_all(folder.join(".cargo")).unwrap();
+    write(
+        folder.join(".cargo/config.toml"),
+        &format!("[build]\ntarget-dir = {:?}\n", root.join("target")),
+    );
     write(
         folder.join("src/lib.rs"),
         "//! Test.\n#![no_std]\nuse hankel_dsl::{Buffer, Element, Real, kernel, lit};\n\

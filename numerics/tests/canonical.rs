@@ -41,14 +41,19 @@ fn in_type<R: Real + From<f32>>(d: &Canonical<f32>) -> Canonical<R> {
     }
 }
 
-/// What the upstream gradients are of.
+/// Compiled once for each number and order: written out, it is megabytes of code.
 #[inline(never)]
+fn found<R: Real, const N: usize>(m: [R; MAX_MOMENTS], eta: R) -> Canonical<R> {
+    canonical::<R, N>(m, eta)
+}
+
+/// What the upstream gradients are of.
 fn result<R: Real + From<f32>, const N: usize>(
     m: [R; MAX_MOMENTS],
     eta: R,
     d: &Canonical<f32>,
 ) -> R {
-    let (found, d) = (canonical::<R, N>(m, eta), in_type::<R>(d));
+    let (found, d) = (found::<R, N>(m, eta), in_type::<R>(d));
     let mut sum = found.own * d.own;
     for i in 0..N {
         sum += found.weights[i] * d.weights[i] + found.reciprocals[i] * d.reciprocals[i];
@@ -74,13 +79,16 @@ macro_rules! for_all_orders {
         $function::<3>();
         $function::<4>();
         $function::<5>();
+        $function::<6>();
     };
 }
 
-fn agrees<const N: usize>() {
+/// Compares derivatives of rows of some families by the adjoint with what `expected` gives for a row, upstream gradients
+/// and the number of the derivative.
+fn with_rows<const N: usize>(
+    expected: impl Fn([Wide; MAX_MOMENTS], Wide, &Canonical<f32>, usize) -> f64,
+) {
     let mut random = fastrand::Rng::with_seed(N as u64);
-    // What differences of second order leave out is the step's square, and rounding is far below that.
-    let step = Wide::from(1.0 / (1_u128 << 100) as f64);
     for family in ["paper", "generic-symmetric", "silhouettes-biased"] {
         for row in rows::<f64>(family, N, 8) {
             let (m, eta) = (row.m.map(Wide::from), Wide::from(row.eta));
@@ -91,46 +99,63 @@ fn agrees<const N: usize>() {
             let found: Vec<f64> = found.collect();
             let most = found.iter().fold(0.0, |most: f64, g| most.max(g.abs()));
             for (direction, found) in found.iter().enumerate() {
-                let at = |step: Wide| {
-                    let (mut m, mut eta) = (m, eta);
-                    if direction <= 2 * N {
-                        m[direction] += step;
-                    } else {
-                        eta += step;
-                    }
-                    result::<Wide, N>(m, eta, &d)
-                };
-                let difference = f64::from((at(step) - at(-step)) / (step + step));
+                let expected = expected(m, eta, &d, direction);
                 assert!(
-                    (found - difference).abs() <= 1e-14 * most,
-                    "n = {N} {family} {row:?} {direction}: {found:e} {difference:e}"
-                );
-                let (mut duals, mut query) = (m.map(Dual::constant), Dual::constant(eta));
-                if direction <= 2 * N {
-                    duals[direction] = Dual::variable(m[direction]);
-                } else {
-                    query = Dual::variable(eta);
-                }
-                let dual = f64::from(result::<Dual<Wide>, N>(duals, query, &d).derivative);
-                assert!(
-                    (found - dual).abs() <= 1e-14 * most,
-                    "n = {N} {family} {row:?} {direction}: {found:e} {dual:e}"
+                    (found - expected).abs() <= 1e-14 * most,
+                    "n = {N} {family} {row:?} {direction}: {found:e} {expected:e}"
                 );
             }
         }
     }
 }
 
+fn follows_from_differences<const N: usize>() {
+    // What differences of second order leave out is the step's square, and rounding is far below that.
+    let step = Wide::from(1.0 / (1_u128 << 100) as f64);
+    with_rows::<N>(|m, eta, d, direction| {
+        let at = |step: Wide| {
+            let (mut m, mut eta) = (m, eta);
+            if direction <= 2 * N {
+                m[direction] += step;
+            } else {
+                eta += step;
+            }
+            result::<Wide, N>(m, eta, d)
+        };
+        f64::from((at(step) - at(-step)) / (step + step))
+    });
+}
+
 #[test]
-fn the_adjoint_agrees_with_differences_and_dual_numbers() {
-    for_all_orders!(agrees);
+fn the_adjoint_agrees_with_differences() {
+    for_all_orders!(follows_from_differences);
+}
+
+fn follows_from_dual_numbers<const N: usize>() {
+    with_rows::<N>(|m, eta, d, direction| {
+        let (mut m, mut eta) = (m.map(Dual::constant), Dual::constant(eta));
+        if direction <= 2 * N {
+            m[direction].derivative = Wide::from(1.0);
+        } else {
+            eta.derivative = Wide::from(1.0);
+        }
+        f64::from(result::<Dual<Wide>, N>(m, eta, d).derivative)
+    });
+}
+
+/// The source is the same for all orders, and those that are not here would take minutes to compile in these numbers.
+#[test]
+fn the_adjoint_agrees_with_dual_numbers() {
+    follows_from_dual_numbers::<1>();
+    follows_from_dual_numbers::<2>();
+    follows_from_dual_numbers::<3>();
 }
 
 fn bounds_follow<const N: usize>() {
     for family in ["paper", "generic-symmetric", "silhouettes-biased"] {
         for row in rows::<f64>(family, N, 20) {
             let (m, eta) = (row.m.map(Wide::from), Wide::from(row.eta));
-            let points = canonical::<Wide, N>(m, eta);
+            let points = found::<Wide, N>(m, eta);
             for own in [0.0_f32, 1.0] {
                 let mut d = Canonical::none();
                 d.own = own;
@@ -160,14 +185,14 @@ fn the_adjoint_of_bounds_follows() {
     for_all_orders!(bounds_follow);
 }
 
-/// Families, and for N from 1 to 5 the largest median that is accepted, in f32 and f64, in epsilons of the format:
+/// Families, and for N from 1 to 6 the largest median that is accepted, in f32 and f64, in epsilons of the format:
 /// a quarter above what `docs/accuracy.md` has.
-const FAMILIES: [(&str, [f64; 5]); 5] = [
-    ("paper", [1.0, 5.0, 25.0, 220.0, 1.6e3]),
-    ("generic-symmetric", [1.25, 6.0, 25.0, 110.0, 500.0]),
-    ("generic-unit", [1.6, 30.0, 800.0, 1.7e4, 7e5]),
-    ("silhouettes-biased", [1.6, 1e4, 1.5e4, 2e4, 1.1e4]),
-    ("self-biased", [1.1e4, 4.5e4, 6e4, 1.2e4, 5.5e3]),
+const FAMILIES: [(&str, [f64; 6]); 5] = [
+    ("paper", [1.0, 5.0, 25.0, 220.0, 1.6e3, 1.3e4]),
+    ("generic-symmetric", [1.25, 6.0, 25.0, 110.0, 500.0, 3.1e3]),
+    ("generic-unit", [1.6, 30.0, 800.0, 1.7e4, 7e5, 1.7e7]),
+    ("silhouettes-biased", [1.6, 1e4, 1.5e4, 2e4, 1.1e4, 7.3e3]),
+    ("self-biased", [1.1e4, 4.5e4, 6e4, 1.2e4, 5.5e3, 9e3]),
 ];
 
 /// The errors of all derivatives of a row, the largest over the largest derivative: median and 90 %.
@@ -223,6 +248,7 @@ fn derivatives_are_as_exact_as_the_documentation_says() {
     lines::<3>(&mut table);
     lines::<4>(&mut table);
     lines::<5>(&mut table);
+    lines::<6>(&mut table);
     for line in &table {
         let [[a, b], [c, d]] = line.errors;
         let (family, n) = (line.family, line.n);

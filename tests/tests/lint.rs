@@ -60,7 +60,7 @@ fn maps_over_rows_are_clean() {
         kinds.map(|kind| format!("{kind}_n{n}"))
     });
     let points =
-        (1..=5).flat_map(|n| ["canonical", "canonical_adjoint"].map(|kind| format!("{kind}_n{n}")));
+        (1..=6).flat_map(|n| ["canonical", "canonical_adjoint"].map(|kind| format!("{kind}_n{n}")));
     let others = [
         "moment_bound_adjoint_compensated_n3",
         "hamburger_6msm_compensated",
@@ -88,8 +88,9 @@ fn filters_loop_over_their_samples() {
         ("resolve_unit", 0),
         // Rows and columns.
         ("shade_pcf", 2),
-        // Levels of the pyramid, and searches until two have found no blockers; a region's rows are four.
-        ("shade_soft", 2),
+        // Levels of the pyramid for the searches' regions and for the shadow's; searches until two have found no
+        // blockers. A region's rows are four.
+        ("shade_soft", 3),
     ] {
         let found = &all[kernel].1;
         assert_eq!(found.len(), loops, "{kernel}: {found:?}");

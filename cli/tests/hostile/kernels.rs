@@ -1,7 +1,6 @@
 //! Kernels that do not come back, or do what no shader may.
 
 use std::fs;
-use std::path::Path;
 
 use crate::desk::{Desk, root};
 
@@ -42,7 +41,7 @@ fn bad(name: &str, sources: &str) -> Desk {
     );
     desk.write("bad/src/lib.rs", sources);
     // What it depends on is built once for all tests of this kind.
-    let shared = Path::new(env!("CARGO_TARGET_TMPDIR")).join("crates/parabola/target");
+    let shared = root().join("target");
     desk.write(
         ".cargo/config.toml",
         format!("[build]\ntarget-dir = {shared:?}\n"),

@@ -227,6 +227,62 @@ proptest! {
         }
     }
 
+    /// From a quarter of the entries: the mean of all texels that a region touches, with what is beyond the table as in
+    /// the region itself.
+    #[test]
+    fn all_texels_that_a_region_touches_count_alike(
+        size in [1..13_u32, 1..13_u32],
+        middle in [-4.0..=16.0_f32, -4.0..=16.0_f32],
+        reach in [0.5..=9.0_f32, 0.5..=9.0_f32],
+        seed in 0..1000_u32,
+    ) {
+        let count = size[0] * size[1];
+        let value = |i: u32| ((i * 7919 + seed) % 4099 * 2_654 % 1009) as f32 / 1008.0;
+        let texels = Texels { size, values: (0..count).map(value).collect() };
+        let point = FixedPoint::for_kernel(20 * 20);
+        let beyond = 0.625_f32;
+        let region = Region {
+            x: Span::around(middle[0], reach[0], size[0]),
+            y: Span::around(middle[1], reach[1], size[1]),
+        };
+        let sum = |columns, rows, factor| texels.before(columns, rows, |x| point.to_fixed(x * factor));
+        let four = region.mean_touched_4(
+            point,
+            Quantized4 { r: beyond, g: beyond, b: beyond, a: beyond },
+            |c, r| Fixed4 { r: sum(c, r, 1.0), g: sum(c, r, 0.5), b: sum(c, r, 0.25), a: sum(c, r, 0.125) },
+        );
+        let six = region.mean_touched_6(
+            point,
+            Quantized6 { r0: beyond, g0: beyond, b0: beyond, r1: beyond, g1: beyond, b1: beyond },
+            |c, r| Fixed6 {
+                r0: sum(c, r, 1.0), g0: sum(c, r, 0.5), b0: sum(c, r, 0.25),
+                r1: sum(c, r, 0.125), g1: sum(c, r, 0.75), b1: sum(c, r, 0.375),
+            },
+        );
+        let touched = |axis: usize| {
+            let edge = size[axis] as f32;
+            let on = |x: f32| x.clamp(0.0, edge);
+            let (from, to) = (on(middle[axis] - reach[axis]), on(middle[axis] + reach[axis]));
+            let share = f64::from(to - from) / (2.0 * f64::from(reach[axis]));
+            let first = from.floor().min(edge - 1.0) as u32;
+            (first..((to.floor() + 1.0).min(edge) as u32).max(first + 1), share)
+        };
+        let ((columns, along_x), (rows, along_y)) = (touched(0), touched(1));
+        let count = f64::from(columns.end - columns.start) * f64::from(rows.end - rows.start);
+        let total: f64 = rows
+            .flat_map(|y| columns.clone().map(move |x| (x, y)))
+            .map(|(x, y)| f64::from(texels.values[(y * size[0] + x) as usize]))
+            .sum();
+        let inside = along_x * along_y;
+        let most = 0.5 / f64::from(point.one) + 2e-6;
+        let found = [four.r, four.g, four.b, four.a, six.g1, six.b1];
+        for (found, factor) in found.into_iter().zip([1.0, 0.5, 0.25, 0.125, 0.75, 0.375]) {
+            let expected = inside * factor * total / count + (1.0 - inside) * f64::from(beyond);
+            prop_assert!((f64::from(found) - expected).abs() < most, "{found} {expected}");
+        }
+        prop_assert_eq!([four.r, four.g, four.b, four.a], [six.r0, six.g0, six.b0, six.r1]);
+    }
+
     /// No numbers make an index beyond the table.
     #[test]
     fn a_span_stays_on_its_table(middle in any::<f32>(), reach in any::<f32>(), size in 1..=65536_u32) {

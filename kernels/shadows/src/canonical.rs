@@ -7,7 +7,8 @@ use hankel_moments::{
 };
 
 use crate::moment_bounds::{
-    Derivative1, Derivative2, Derivative3, Derivative4, Derivative5, Row1, Row2, Row3, Row4, Row5,
+    Derivative1, Derivative2, Derivative3, Derivative4, Derivative5, Derivative6, Row1, Row2, Row3,
+    Row4, Row5, Row6,
 };
 
 /// Which moments are meant.
@@ -151,4 +152,14 @@ order! {
     canonical_n5,
     /// Derivatives of what depends on points and weights of `canonical_n5`, from those to each of them.
     canonical_adjoint_n5
+}
+
+order! {
+    6; m0 d_m0 0, m1 d_m1 1, m2 d_m2 2, m3 d_m3 3, m4 d_m4 4, m5 d_m5 5, m6 d_m6 6, m7 d_m7 7, m8 d_m8 8, m9 d_m9 9, m10 d_m10 10, m11 d_m11 11, m12 d_m12 12;
+    reciprocal_0 weight_0 0, reciprocal_1 weight_1 1, reciprocal_2 weight_2 2, reciprocal_3 weight_3 3, reciprocal_4 weight_4 4, reciprocal_5 weight_5 5;
+    Row6, Derivative6, Canonical6; rows_6, adjoint_rows_6;
+    /// The distribution with twelve power moments and their total that contains the query point: six other points.
+    canonical_n6,
+    /// Derivatives of what depends on points and weights of `canonical_n6`, from those to each of them.
+    canonical_adjoint_n6
 }

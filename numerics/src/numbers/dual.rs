@@ -56,7 +56,7 @@ impl<R: Real + From<f32>> From<f32> for Dual<R> {
 
 impl<R: Real> Neg for Dual<R> {
     type Output = Self;
-    #[inline(always)]
+    #[inline(never)]
     fn neg(self) -> Self {
         Self {
             value: -self.value,
@@ -123,7 +123,7 @@ impl<R: Real> Real for Dual<R> {
             derivative: R::select(is_positive, self.derivative / divisor, lit!(0.0)),
         }
     }
-    #[inline(always)]
+    #[inline(never)]
     fn abs(self) -> Self {
         let is_negative = self.value.lt(lit!(0.0));
         Self {
@@ -135,7 +135,7 @@ impl<R: Real> Real for Dual<R> {
     fn floor(self) -> Self {
         Self::constant(self.value.floor())
     }
-    #[inline(always)]
+    #[inline(never)]
     fn min(self, other: Self) -> Self {
         let is_less = self.value.lt(other.value);
         Self {
@@ -143,7 +143,7 @@ impl<R: Real> Real for Dual<R> {
             derivative: R::select(is_less, self.derivative, other.derivative),
         }
     }
-    #[inline(always)]
+    #[inline(never)]
     fn max(self, other: Self) -> Self {
         let is_greater = self.value.gt(other.value);
         Self {
@@ -163,7 +163,7 @@ impl<R: Real> Real for Dual<R> {
     fn eq(self, other: Self) -> R::Mask {
         self.value.eq(other.value)
     }
-    #[inline(always)]
+    #[inline(never)]
     fn select(mask: R::Mask, a: Self, b: Self) -> Self {
         Self {
             value: R::select(mask, a.value, b.value),

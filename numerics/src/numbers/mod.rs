@@ -28,25 +28,25 @@ macro_rules! remaining_operators {
     ([$($generics:tt)*] $number:ty) => {
         impl<$($generics)*> std::ops::Sub for $number {
             type Output = Self;
-            #[inline(always)]
+            #[inline(never)]
             fn sub(self, other: Self) -> Self {
                 std::ops::Add::add(self, -other)
             }
         }
         impl<$($generics)*> std::ops::AddAssign for $number {
-            #[inline(always)]
+            #[inline(never)]
             fn add_assign(&mut self, other: Self) {
                 *self = *self + other;
             }
         }
         impl<$($generics)*> std::ops::SubAssign for $number {
-            #[inline(always)]
+            #[inline(never)]
             fn sub_assign(&mut self, other: Self) {
                 *self = *self - other;
             }
         }
         impl<$($generics)*> std::ops::MulAssign for $number {
-            #[inline(always)]
+            #[inline(never)]
             fn mul_assign(&mut self, other: Self) {
                 *self = *self * other;
             }
@@ -60,27 +60,27 @@ macro_rules! ordered {
         type Mask = bool;
         const IS_WIDE: bool = true;
 
-        #[inline(always)]
+        #[inline(never)]
         fn min(self, other: Self) -> Self {
             if self < other { self } else { other }
         }
-        #[inline(always)]
+        #[inline(never)]
         fn max(self, other: Self) -> Self {
             if self > other { self } else { other }
         }
-        #[inline(always)]
+        #[inline(never)]
         fn lt(self, other: Self) -> bool {
             self < other
         }
-        #[inline(always)]
+        #[inline(never)]
         fn le(self, other: Self) -> bool {
             self <= other
         }
-        #[inline(always)]
+        #[inline(never)]
         fn eq(self, other: Self) -> bool {
             self == other
         }
-        #[inline(always)]
+        #[inline(never)]
         fn select(mask: bool, a: Self, b: Self) -> Self {
             if mask { a } else { b }
         }

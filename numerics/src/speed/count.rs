@@ -225,7 +225,8 @@ fn traced(f: impl FnOnce()) -> Operations {
     operations
 }
 
-/// A number that remembers what it comes from, on the thread where it was made.
+/// A number that remembers what it comes from, on the thread where it was made. Its operations are calls: kernels are
+/// inlined wholly, and with operations of this size in them were half of this crate's code.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<P> {
     /// The value.
@@ -250,6 +251,7 @@ impl<P: Format> Counted<P> {
         }
     }
 
+    #[inline(never)]
     fn fixed(value: P) -> Self {
         let kind = Kind::Constant(value.widen().to_bits());
         Self {
@@ -258,6 +260,7 @@ impl<P: Format> Counted<P> {
         }
     }
 
+    #[inline(never)]
     fn of(value: P, kind: Kind, operands: &[u32]) -> Self {
         let number = node(kind, operands, || Kind::Constant(value.widen().to_bits()));
         Self { value, number }
@@ -307,6 +310,7 @@ impl Mask for CountedMask {
 
 impl<P: Format> Add for Counted<P> {
     type Output = Self;
+    #[inline(never)]
     fn add(self, o: Self) -> Self {
         Self::of(self.value + o.value, Kind::Sum, &[self.number, o.number])
     }
@@ -314,6 +318,7 @@ impl<P: Format> Add for Counted<P> {
 
 impl<P: Format> Sub for Counted<P> {
     type Output = Self;
+    #[inline(never)]
     fn sub(self, o: Self) -> Self {
         if o.is(0.0) {
             return self;
@@ -328,6 +333,7 @@ impl<P: Format> Sub for Counted<P> {
 
 impl<P: Format> Mul for Counted<P> {
     type Output = Self;
+    #[inline(never)]
     fn mul(self, o: Self) -> Self {
         if self.is(1.0) {
             return o;
@@ -345,6 +351,7 @@ impl<P: Format> Mul for Counted<P> {
 
 impl<P: Format> Div for Counted<P> {
     type Output = Self;
+    #[inline(never)]
     fn div(self, o: Self) -> Self {
         // A quotient by a power of two is a product.
         let mantissa = (1_u64 << 52) - 1;
@@ -363,6 +370,7 @@ impl<P: Format> Div for Counted<P> {
 
 impl<P: Format> Neg for Counted<P> {
     type Output = Self;
+    #[inline(never)]
     fn neg(self) -> Self {
         Self::of(-self.value, Kind::Negative, &[self.number])
     }
@@ -371,6 +379,7 @@ impl<P: Format> Neg for Counted<P> {
 macro_rules! assign {
     ($($operator:ident $function:ident $by:tt),*) => {$(
         impl<P: Format> $operator for Counted<P> {
+            #[inline(never)]
             fn $function(&mut self, o: Self) {
                 *self = *self $by o;
             }
@@ -387,18 +396,23 @@ impl<P: Format> Real for Counted<P> {
     fn literal<const BITS: u64>() -> Self {
         Self::fixed(P::literal::<BITS>())
     }
+    #[inline(never)]
     fn epsilon() -> Self {
         Self::fixed(P::epsilon())
     }
+    #[inline(never)]
     fn sqrt(self) -> Self {
         Self::of(self.value.sqrt(), Kind::Root, &[self.number])
     }
+    #[inline(never)]
     fn abs(self) -> Self {
         Self::of(self.value.abs(), Kind::Magnitude, &[self.number])
     }
+    #[inline(never)]
     fn floor(self) -> Self {
         Self::of(self.value.floor(), Kind::Floor, &[self.number])
     }
+    #[inline(never)]
     fn min(self, o: Self) -> Self {
         Self::of(
             self.value.min(o.value),
@@ -406,6 +420,7 @@ impl<P: Format> Real for Counted<P> {
             &[self.number, o.number],
         )
     }
+    #[inline(never)]
     fn max(self, o: Self) -> Self {
         Self::of(
             self.value.max(o.value),
@@ -413,9 +428,11 @@ impl<P: Format> Real for Counted<P> {
             &[self.number, o.number],
         )
     }
+    #[inline(never)]
     fn lt(self, o: Self) -> CountedMask {
         Self::compared(self.value.lt(o.value), Kind::Less, &[self.number, o.number])
     }
+    #[inline(never)]
     fn le(self, o: Self) -> CountedMask {
         Self::compared(
             self.value.le(o.value),
@@ -423,6 +440,7 @@ impl<P: Format> Real for Counted<P> {
             &[self.number, o.number],
         )
     }
+    #[inline(never)]
     fn eq(self, o: Self) -> CountedMask {
         Self::compared(
             self.value.eq(o.value),
@@ -430,6 +448,7 @@ impl<P: Format> Real for Counted<P> {
             &[self.number, o.number],
         )
     }
+    #[inline(never)]
     fn select(mask: CountedMask, a: Self, b: Self) -> Self {
         let chosen = if mask.value { a } else { b };
         let is_known = GRAPH.with_borrow(|graph| graph.is_constant(mask.number));
@@ -443,11 +462,13 @@ impl<P: Format> Real for Counted<P> {
         )
     }
     // As lanes do both.
+    #[inline(never)]
     fn two_sum(self, o: Self) -> (Self, Self) {
         let sum = self + o;
         let from_o = sum - self;
         (sum, (self - (sum - from_o)) + (o - from_o))
     }
+    #[inline(never)]
     fn two_product(self, o: Self) -> (Self, Self) {
         let product = self * o;
         let error = self.value.two_product(o.value).1;

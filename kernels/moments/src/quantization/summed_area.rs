@@ -3,7 +3,8 @@
 //!
 //! Entries wrap, so they must not be interpolated. Along each axis the rectangle's two ends lie within a
 //! texel each: with the whole texels between, these make three by three smaller rectangles. Their sums do
-//! not wrap. They are weighted by how much of them the rectangle covers. That takes 4 x 4 entries.
+//! not wrap. They are weighted by how much of them the rectangle covers. That takes 4 x 4 entries. Where a texel more or
+//! less does not matter, all texels that the rectangle touches take 2 x 2.
 
 use hankel_dsl::{Real, lit, to_i32};
 
@@ -52,6 +53,7 @@ impl Span {
         let last = Real::max(Real::floor(to), whole);
         let first_share = Real::saturate(Real::min(whole, to) - from);
         let last_share = Real::saturate(to - last);
+        let end = if last_share > 0.0 { last + 1.0 } else { last };
         let inside = first_share + (last - whole) + last_share;
         let before = Real::min(stop, 0.0) - Real::min(start, 0.0);
         let after = Real::max(stop, edge) - Real::max(start, edge);
@@ -59,7 +61,7 @@ impl Span {
             first: to_i32(first) as u32,
             whole: to_i32(whole) as u32,
             last: to_i32(last) as u32,
-            end: to_i32(Real::min(last + 1.0, edge)) as u32,
+            end: to_i32(end) as u32,
             first_share,
             last_share,
             length: inside + (before + after),
@@ -78,7 +80,7 @@ pub struct Region {
 }
 
 macro_rules! means {
-    ($region:ident: $fixed:ident, $quantized:ident, $($channel:ident)*) => {
+    ($region:ident, $touched:ident: $fixed:ident, $quantized:ident, $($channel:ident)*) => {
         impl Region {
             /// The mean over the rectangle, each channel in [0, 1]. `before` gives the sum, modulo 2^32, over
             /// so many columns and so many rows, from the first on. What lies beyond the table counts as
@@ -140,9 +142,36 @@ macro_rules! means {
                     $($channel: Real::saturate(mean.$channel * scale + missing * beyond.$channel),)*
                 }
             }
+
+            /// As the mean over the rectangle, but texels that it covers in part count as those that it covers wholly.
+            /// What lies beyond the table has the share that it has in the rectangle. Reads 4 entries in place of 16.
+            #[inline(always)]
+            #[must_use]
+            pub fn $touched(
+                self,
+                point: FixedPoint,
+                beyond: $quantized<f32>,
+                before: impl Fn(u32, u32) -> $fixed,
+            ) -> $quantized<f32> {
+                let Self { x, y } = self;
+                let one: f32 = lit!(1.0);
+                let row = |rows: u32| before(x.end, rows).minus(before(x.first, rows));
+                let sum = row(y.end).minus(row(y.first));
+                let inside = (x.inside * y.inside) / (x.length * y.length);
+                let texels = ((x.end - x.first) * (y.end - y.first)) as f32;
+                // As above: an order of operations in which a known point does not change a rounding.
+                let unit = one / Real::max(point.one as f32, one);
+                let scale = inside * (unit / texels);
+                let missing = one - inside;
+                $quantized {
+                    $($channel: Real::saturate(
+                        sum.$channel as f32 * scale + missing * beyond.$channel
+                    ),)*
+                }
+            }
         }
     };
 }
 
-means!(mean_4: Fixed4, Quantized4, r g b a);
-means!(mean_6: Fixed6, Quantized6, r0 g0 b0 r1 g1 b1);
+means!(mean_4, mean_touched_4: Fixed4, Quantized4, r g b a);
+means!(mean_6, mean_touched_6: Fixed6, Quantized6, r0 g0 b0 r1 g1 b1);

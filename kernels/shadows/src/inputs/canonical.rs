@@ -101,5 +101,6 @@ orders! {
     2 rows_2 adjoint_rows_2,
     3 rows_3 adjoint_rows_3,
     4 rows_4 adjoint_rows_4,
-    5 rows_5 adjoint_rows_5
+    5 rows_5 adjoint_rows_5,
+    6 rows_6 adjoint_rows_6
 }
