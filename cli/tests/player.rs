@@ -208,7 +208,7 @@ fn image_passes_are_played_as_draws() {
 #[test]
 fn frames_of_single_samples_are_all_in_webgl_2() {
     let desk = Desk::new();
-    for technique in techniques::ALL.iter().filter(|t| t.resolves) {
+    for technique in techniques::ALL.iter().filter(|t| t.takes_one_sample) {
         for map in technique.maps {
             let (name, format) = (technique.name, map.format.name());
             let range = map.depth_range.name();
@@ -235,17 +235,20 @@ fn frames_of_single_samples_are_all_in_webgl_2() {
             );
         }
     }
-    // What looks at all samples itself says so.
+    // What needs several samples says so.
     desk.write(
         "scene.toml",
         SCENE.replace(
             "[shadow]",
-            "[shadow]\ntechnique = \"pcf\"\nmultisampling = 1",
+            "[shadow]\ntechnique = \"pcss\"\nmultisampling = 1",
         ),
     );
     desk.hankel("render scene.toml --out r.png").fails(
         2,
-        &["shadow.multisampling", "`pcf` looks at all samples itself"],
+        &[
+            "shadow.multisampling",
+            "`pcss` has no kernel for one sample of depth",
+        ],
     );
 }
 
@@ -264,6 +267,7 @@ fn frames_of_single_samples_are_played_in_webgl_2() {
         ("evsm4", "rgba16float", ""),
         ("convolution", "rgba8unorm", ""),
         ("esm", "r32float", ""),
+        ("pcf", "r32float", ""),
     ] {
         let shadow = format!(
             "[shadow]\ntechnique = \"{technique}\"\nformat = \"{format}\"\nmultisampling = 1\n{more}"

@@ -53,7 +53,7 @@ fn scenes() -> Vec<(String, Scene)> {
                 map.depth_range.name()
             );
             add(plain, shadow.clone(), one);
-            if technique.resolves {
+            if technique.takes_one_sample {
                 add(plain, format!("{shadow}\nmultisampling = 1"), one);
             }
         }

@@ -415,7 +415,10 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         ),
         (
             format!("{LEAST}[shadow]\ntechnique = 'soft'\nmultisampling = 1\n"),
-            &["`shadow.multisampling` is 1", "`soft` looks at all samples"],
+            &[
+                "`shadow.multisampling` is 1",
+                "`soft` has no kernel for one sample",
+            ],
         ),
         (LEAST.replace("[light]", ""), &["direction"]),
         ("geometry = ".into(), &["scene.toml:1"]),

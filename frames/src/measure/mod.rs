@@ -173,8 +173,8 @@ pub struct Choices {
     pub filters: Vec<u32>,
     /// What the map holds.
     pub fits: Vec<Fit>,
-    /// Samples of depth in a texel, 4 or 1, of techniques that [resolve](Technique::resolves) them. Others look at all
-    /// four themselves, whatever is said here.
+    /// Samples of depth in a texel, 4 or 1, of techniques that [take one](Technique::takes_one_sample). Others have four,
+    /// whatever is said here.
     pub multisampling: Vec<u32>,
     /// Techniques of scattering, for scenes with a medium.
     pub scatterings: Vec<&'static Scattering>,
@@ -240,7 +240,7 @@ impl Choices {
                 true => &narrowest,
                 false => &self.filters,
             };
-            let multisampling = match technique.resolves {
+            let multisampling = match technique.takes_one_sample {
                 true => &self.multisampling[..],
                 false => &[SAMPLES],
             };

@@ -217,8 +217,8 @@ pub struct Shadow {
     pub technique: &'static Technique,
     /// Texels along an edge of the map, 16 to [`Scene::MAX_MAP`].
     pub size: u32,
-    /// Samples of depth in each texel, of which the map is made: [`SAMPLES`], or 1 if the technique resolves them
-    /// ([`Technique::resolves`]).
+    /// Samples of depth in each texel, of which the map is made: [`SAMPLES`], or 1 if the technique takes one
+    /// ([`Technique::takes_one_sample`]).
     pub multisampling: u32,
     /// How its map is stored, one of the technique's.
     pub map: Map,
@@ -276,7 +276,7 @@ impl Shadow {
     pub const fn by(self, technique: &'static Technique, map: Map) -> Self {
         Self {
             size: self.size,
-            multisampling: if technique.resolves {
+            multisampling: if technique.takes_one_sample {
                 self.multisampling
             } else {
                 SAMPLES

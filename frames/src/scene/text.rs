@@ -428,11 +428,11 @@ impl Reader<'_> {
         }
         let multisampling = match s.multisampling {
             Some(n) => {
-                let allowed = match (technique.resolves, *n.get_ref()) {
+                let allowed = match (technique.takes_one_sample, *n.get_ref()) {
                     (_, 4) | (true, 1) => None,
                     (true, _) => Some("4 or 1".into()),
                     (false, 1) => Some(format!(
-                        "4: `{}` looks at all samples itself; one is for techniques that resolve them to a map",
+                        "4: `{}` has no kernel for one sample of depth in a texel",
                         technique.name
                     )),
                     (false, _) => Some("4".into()),

@@ -31,7 +31,7 @@ pub const FOUR: Technique = Technique {
     depth_bias: 0.0,
     maps: MAPS,
     is_lower_bound: false,
-    resolves: true,
+    takes_one_sample: true,
     is_soft: false,
     add: |graph, given| {
         let [make, shade] = ["resolve_convolution", "shade_convolution"];

@@ -46,7 +46,7 @@ pub const POSITIVE: Technique = Technique {
     depth_bias: 0.0,
     maps: MAPS,
     is_lower_bound: true,
-    resolves: true,
+    takes_one_sample: true,
     is_soft: false,
     add: |graph, given| add(graph, given, 1),
 };

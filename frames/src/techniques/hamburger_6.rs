@@ -30,7 +30,7 @@ pub const TECHNIQUE: Technique = Technique {
         map(TexelFormat::Rg32Uint, WORDS[1].encoding, WORDS[1].bias),
     ],
     is_lower_bound: true,
-    resolves: true,
+    takes_one_sample: true,
     is_soft: false,
     add,
 };

@@ -16,7 +16,7 @@ pub const FOUR: Technique = Technique {
     depth_bias: 0.0,
     maps: &[map(SYMMETRIC_4_32)],
     is_lower_bound: true,
-    resolves: true,
+    takes_one_sample: true,
     is_soft: false,
     add: |graph, given| add(graph, given, ["resolve_plain", "shade_moments_4"], &["map"]),
 };

@@ -8,7 +8,9 @@ use hankel_host::device::Blend;
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{DEPTHS, Given, draw_translucent, opaque_depth, shade};
+use crate::passes::{
+    CANNOT_BLEND_ONE, DEPTHS, Given, TRANSLUCENT, draw_translucent, opaque_depth, shade,
+};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "pcf",
@@ -17,7 +19,7 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: false,
-    resolves: false,
+    takes_one_sample: true,
     is_soft: false,
     add,
 };
@@ -29,6 +31,14 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     );
     graph.omit("blur", "depths cannot be filtered before the comparison");
     let depth = opaque_depth(graph, given)?;
+    if given.shadow.multisampling == 1 {
+        if given.translucent.is_some() {
+            graph.omit(TRANSLUCENT, CANNOT_BLEND_ONE);
+        }
+        return shade(graph, given, "shade_single_pcf", |pass| {
+            pass.arg("depth", depth)
+        });
+    }
     let Some(translucent) = given.translucent else {
         return shade(graph, given, "shade_pcf", |pass| pass.arg("depth", depth));
     };

@@ -13,7 +13,7 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: true,
-    resolves: false,
+    takes_one_sample: false,
     is_soft: false,
     add,
 };

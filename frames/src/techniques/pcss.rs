@@ -16,7 +16,7 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: false,
-    resolves: false,
+    takes_one_sample: false,
     is_soft: true,
     add,
 };

@@ -20,7 +20,7 @@ pub const HAMBURGER: Technique = Technique {
     depth_bias: 0.0,
     maps: &[SYMMETRIC],
     is_lower_bound: true,
-    resolves: false,
+    takes_one_sample: false,
     is_soft: false,
     add: hamburger,
 };
@@ -32,7 +32,7 @@ pub const PCF_GAUSSIAN: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: true,
-    resolves: false,
+    takes_one_sample: false,
     is_soft: false,
     add: pcf_gaussian,
 };

@@ -27,7 +27,7 @@ pub const TECHNIQUE: Technique = Technique {
         ),
     ],
     is_lower_bound: true,
-    resolves: true,
+    takes_one_sample: true,
     is_soft: false,
     add,
 };

@@ -16,7 +16,7 @@ pub const TECHNIQUE: Technique = Technique {
         ..SUMMED
     }],
     is_lower_bound: false,
-    resolves: false,
+    takes_one_sample: false,
     is_soft: true,
     add,
 };

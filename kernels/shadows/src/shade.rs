@@ -354,6 +354,26 @@ pub fn shade_pcf(
     })
 }
 
+/// As [`shade_pcf`], with a map of one sample of depth in each texel: GLSL ES 3.00 has no other ones.
+#[kernel(fragment, inputs = crate::inputs::maps::shaded_single_depths)]
+pub fn shade_single_pcf(
+    #[varying] world: Vec3,
+    #[varying]
+    #[unit_vector]
+    normal: Vec3,
+    #[varying]
+    #[range(0.0..=1.0)]
+    colour: Vec3,
+    #[uniform] light: &Light,
+    #[texture] depth: Texture2d<'_>,
+) -> Vec4 {
+    shade_by(light, world, normal, colour, |uv, z| {
+        percentage_closer(depth.size(), light.filter_radius, uv, |at| {
+            if depth.load(at).x < z { 1.0 } else { 0.0 }
+        })
+    })
+}
+
 /// Shading with percentage-closer filtering that has the weights of a separable filter and of
 /// bilinear lookup, over all samples of each texel: what a filtered shadow map approximates, and
 /// what lower bounds are never darker than. `weights` are those of [`crate::blur::blur`].

@@ -628,6 +628,16 @@ pub fn shaded_warps(request: &Request) -> Vec<Given> {
 /// What shading with a map of depths reads.
 #[must_use]
 pub fn shaded_depths(request: &Request) -> Vec<Given> {
+    shaded_by(SAMPLES, request)
+}
+
+/// The same with one sample in each texel.
+#[must_use]
+pub fn shaded_single_depths(request: &Request) -> Vec<Given> {
+    shaded_by(1, request)
+}
+
+fn shaded_by(count: usize, request: &Request) -> Vec<Given> {
     let mut s = Source::new(request.seed);
     let map = samples();
     [(0, false), (1, false), (3, false), (1, true)]
@@ -644,9 +654,11 @@ pub fn shaded_depths(request: &Request) -> Vec<Given> {
                 .texture(
                     "depth",
                     SIZE,
-                    SAMPLES as u32,
+                    count as u32,
                     TexelFormat::R32Float,
-                    map.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
+                    map.iter()
+                        .step_by(SAMPLES / count)
+                        .map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
                 )
         })
         .collect()
