@@ -144,9 +144,9 @@ fn frames_are_measured_once() {
             .unwrap_or_else(|| panic!("no {id}"));
         table["rows"].as_array().expect("rows").clone()
     };
-    // Two sizes, filters and fits, in two sizes of the picture.
-    assert_eq!(rows("configurations").len(), 16);
-    assert_eq!(read("frames-configurations.csv").lines().count(), 17);
+    // Two sizes, filters, fits and numbers of samples, in two sizes of the picture.
+    assert_eq!(rows("configurations").len(), 32);
+    assert_eq!(read("frames-configurations.csv").lines().count(), 33);
     // Two passes, each against texels, taps and pixels.
     assert_eq!(rows("growth").len(), 6);
     assert_eq!((rows("fit").len(), rows("doubling").len()), (2, 2));

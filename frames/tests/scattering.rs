@@ -393,8 +393,8 @@ fn a_plan_chooses_how_a_medium_scatters() {
     let all = session
         .measure(&mut device, &NoShaders, &subject, &ask, &mut |_| ())
         .unwrap();
-    // Two sizes; the map of `pcf`, three of `hamburger` with four samples and three with one; four ways to scatter.
-    assert_eq!(all.len(), 2 * (1 + 2 * 3) * 4);
+    // Two sizes; the map of `pcf` and three of `hamburger`, each with four samples and with one; four ways to scatter.
+    assert_eq!(all.len(), 2 * (1 + 3) * 2 * 4);
     let scattered = |way: &str| {
         let is_it = |m: &&hankel_frames::measure::Measurement| {
             m.configuration.size == 128
