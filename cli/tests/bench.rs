@@ -147,9 +147,10 @@ fn frames_are_measured_once() {
     // Two sizes, filters, fits and numbers of samples, in two sizes of the picture.
     assert_eq!(rows("configurations").len(), 32);
     assert_eq!(read("frames-configurations.csv").lines().count(), 33);
-    // Two passes, each against texels, taps and pixels.
-    assert_eq!(rows("growth").len(), 6);
+    // With each number of samples two passes, each against texels, taps and pixels.
+    assert_eq!(rows("growth").len(), 12);
     assert_eq!((rows("fit").len(), rows("doubling").len()), (2, 2));
+    assert_eq!(rows("one-sample").len(), 2);
     let kept = read("measured.jsonl");
 
     // Nothing is measured twice, and the plan is compared with what is there.
