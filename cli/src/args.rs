@@ -272,7 +272,7 @@ A budget is a TOML file:
 It limits arithmetic, operations, registers, branches, texture, total (see `hankel list`), and findings:
 loops that cannot be unrolled and dynamic indices into a function's own arrays.
 
-Give the options that the folder was built with.")]
+Without options, they are those that manifest.json holds. If you give one, give all that the folder was built with.")]
 pub struct Check {
     /// The committed folder.
     #[arg(value_name = "FOLDER")]

@@ -233,6 +233,12 @@ fn hamburger_gives_the_same_light_and_shadow() {
 }
 
 #[test]
+fn one_sample_of_depth_gives_the_same_light_and_shadow() {
+    gives_that_light("pcf", "depth_bias = 0.003\nmultisampling = 1");
+    gives_that_light("hamburger", "multisampling = 1");
+}
+
+#[test]
 fn hausdorff_gives_the_same_light_and_shadow() {
     is_as_filtered_depths("hausdorff");
 }

@@ -568,13 +568,15 @@ fn what_is_left_out_is_said() {
             .any(|(what, _)| what == TRANSLUCENT);
         assert_eq!(is_blind, !shows, "{technique}");
     }
-    for (technique, format, part) in [
-        ("hamburger", "rgba32float", "32-bit"),
-        ("hamburger-6", "rgba32float", "32-bit"),
-        ("hamburger-6", "r32uint", "words"),
-        ("hamburger-6", "rg32uint", "words"),
+    for (technique, setting, part) in [
+        ("hamburger", "format = 'rgba32float'", "32-bit"),
+        ("hamburger-6", "format = 'rgba32float'", "32-bit"),
+        ("hamburger-6", "format = 'r32uint'", "words"),
+        ("hamburger-6", "format = 'rg32uint'", "words"),
+        ("hamburger", "multisampling = 1", "multisampling = 4"),
+        ("pcf", "multisampling = 1", "multisampling = 4"),
     ] {
-        let (scene, _) = scene(&format!("technique = '{technique}'\nformat = '{format}'"));
+        let (scene, _) = scene(&format!("technique = '{technique}'\n{setting}"));
         let omitted = omitted(&scene, &glass);
         assert!(
             omitted

@@ -53,6 +53,22 @@ fn current(page: &str, name: &str, table: &str) {
     );
 }
 
+/// Documentation outside of rustdoc: a link to an item is the item's name, and a bracket is a bracket.
+fn without_links(text: &str) -> String {
+    let mut parts = text.split("[`");
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        match part.split_once("`]") {
+            Some((path, rest)) => {
+                let name = path.rsplit("::").next().unwrap_or(path);
+                let _ = write!(plain, "`{name}`{rest}");
+            }
+            None => plain += part,
+        }
+    }
+    plain.replace("\\[", "[").replace("\\]", "]")
+}
+
 #[test]
 fn the_table_of_kernels_is_current() {
     let shadows = Crate::shadows();
@@ -107,7 +123,7 @@ fn the_table_of_kernels_is_current() {
             "| {name} | {stage} | {} | {} | {} |",
             numbers(&|c| c.operations),
             numbers(&|c| c.branches),
-            first.replace('|', "\\|"),
+            without_links(first).replace('|', "\\|"),
         );
     }
     current("docs/catalogue.md", "kernels", &table);

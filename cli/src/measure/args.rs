@@ -166,10 +166,9 @@ Examples:
   hankel bench candidates --functions 4 --regions 100 --out report
   hankel bench candidates --functions 3 --scene scenes/fence.toml --scene scenes/room.toml --out report
 
-All choices of so many of 37 functions of depth (`hankel judge --help` lists them): 37, 666, 7770, 66045 and
+All choices of so many of 37 functions of depth (`hankel judge --help` lists them, with z^9 to z^16 besides): 37, 666, 7770, 66045 and
 435897 for 1 to 5. The error of a choice is how far the best lower bound that its means allow is from
-percentage-closer filtering, on average, as a share of light. Four functions on 14 scenes with 100 regions each take
-an hour of processor time. OUT gets candidates.html, candidates.json, a CSV file for each table, and
+percentage-closer filtering, on average, as a share of light. Four functions with 100 regions of each scene take about an hour of processor time. OUT gets candidates.html, candidates.json, a CSV file for each table, and
 candidates-all.csv with every choice.")]
 pub struct BenchCandidates {
     /// How many functions a map holds the means of.

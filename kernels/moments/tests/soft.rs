@@ -137,6 +137,13 @@ fn few_blockers_are_near() {
     assert_eq!(of(0.0).distance(0.0), 0.0);
 }
 
+fn region(middle: [f32; 2], reach: [f32; 2], size: [u32; 2]) -> Region {
+    Region {
+        x: Span::around(middle[0], reach[0], size[0]),
+        y: Span::around(middle[1], reach[1], size[1]),
+    }
+}
+
 /// Texels of a table, and the exact mean over a rectangle of them.
 struct Texels {
     size: [u32; 2],
@@ -144,6 +151,15 @@ struct Texels {
 }
 
 impl Texels {
+    /// Numbers from 0 to 1 without any order.
+    fn of(size: [u32; 2], seed: u32) -> Self {
+        let value = |i: u32| ((i * 7919 + seed) % 4099 * 2_654 % 1009) as f32 / 1008.0;
+        Self {
+            size,
+            values: (0..size[0] * size[1]).map(value).collect(),
+        }
+    }
+
     /// The sum modulo 2^32 over so many columns and rows.
     fn before(&self, columns: u32, rows: u32, of: impl Fn(f32) -> u32) -> u32 {
         let mut sum = 0_u32;
@@ -184,15 +200,10 @@ proptest! {
         reach in [0.5..=9.0_f32, 0.5..=9.0_f32],
         seed in 0..1000_u32,
     ) {
-        let count = size[0] * size[1];
-        let value = |i: u32| ((i * 7919 + seed) % 4099 * 2_654 % 1009) as f32 / 1008.0;
-        let texels = Texels { size, values: (0..count).map(value).collect() };
+        let texels = Texels::of(size, seed);
         // The largest rectangle has 19 x 19 texels: of more, sums would wrap.
         let point = FixedPoint::for_kernel(19 * 19);
-        let region = Region {
-            x: Span::around(middle[0], reach[0], size[0]),
-            y: Span::around(middle[1], reach[1], size[1]),
-        };
+        let region = region(middle, reach, size);
         let wide = |p: [f32; 2]| p.map(f64::from);
         // Each channel has other values, and so have the six.
         let factors = [1.0_f32, 0.5, 0.25, 0.125, 0.75, 0.375];
@@ -236,15 +247,10 @@ proptest! {
         reach in [0.5..=9.0_f32, 0.5..=9.0_f32],
         seed in 0..1000_u32,
     ) {
-        let count = size[0] * size[1];
-        let value = |i: u32| ((i * 7919 + seed) % 4099 * 2_654 % 1009) as f32 / 1008.0;
-        let texels = Texels { size, values: (0..count).map(value).collect() };
+        let texels = Texels::of(size, seed);
         let point = FixedPoint::for_kernel(20 * 20);
         let beyond = 0.625_f32;
-        let region = Region {
-            x: Span::around(middle[0], reach[0], size[0]),
-            y: Span::around(middle[1], reach[1], size[1]),
-        };
+        let region = region(middle, reach, size);
         let sum = |columns, rows, factor| texels.before(columns, rows, |x| point.to_fixed(x * factor));
         let four = region.mean_touched_4(
             point,
@@ -303,10 +309,7 @@ proptest! {
         value in 0.0..=1.0_f32,
     ) {
         let point = FixedPoint::for_kernel(34 * 34);
-        let region = Region {
-            x: Span::around(middle[0], reach[0], 4096),
-            y: Span::around(middle[1], reach[1], 4096),
-        };
+        let region = region(middle, reach, [4096; 2]);
         let fixed = point.to_fixed(value);
         let all = |n: u32| Fixed4 { r: n, g: n, b: n, a: n };
         let beyond = Quantized4 { r: value, g: value, b: value, a: value };
