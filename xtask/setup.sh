@@ -19,8 +19,6 @@ first() {
 
 missing=
 need c++ g++
-# Compiles SPIRV-Tools in a third of g++'s time (xtask/cxx). The tests need version 19 for other things.
-if [ "${for_tests:-no}" = no ] && ! command -v clang++-19 >/dev/null 2>&1; then need clang++ clang; fi
 need_library libvulkan.so.1 libvulkan1
 if [ -z "$(first /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json)" ]; then
     missing="$missing mesa-vulkan-drivers"
