@@ -324,6 +324,9 @@ fn block(i: usize, row: &Row, column: Column, cell: &Cell, open: bool) -> String
         if rules.flushes {
             allowed += "; subnormal numbers may be taken for zero";
         }
+        if rules.rounds_products {
+            allowed += "; samplers round products of weights";
+        }
         if !rules.hostile {
             allowed += "; of hostile inputs, finite results need only stay finite";
         }

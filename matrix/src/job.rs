@@ -4,8 +4,7 @@
 //! be written in any language: a job is one line of JSON, the inputs are a file of bytes, and so
 //! are the results.
 //!
-//! - A runner starts by printing one line `{"ready": "name and versions of the device"}`, with `"flushes": true` if
-//!   the device flushes subnormal numbers.
+//! - A runner starts by printing one line, its [`Driver`]: `{"ready": "name and versions of the device"}`.
 //! - It reads a [`Job`] from each line of its standard input, and answers each with one line,
 //!   a [`Reply`].
 //! - [`Job::inputs`] holds the bytes that the arguments point into; of a texture they are packed,
@@ -19,6 +18,20 @@ use std::path::PathBuf;
 use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::TexelAccess;
 use serde::{Deserialize, Serialize};
+
+/// What a runner runs on, and what that does otherwise than others.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Driver {
+    /// Its name and versions.
+    #[serde(rename = "ready")]
+    pub name: String,
+    /// It flushes subnormal numbers.
+    #[serde(default)]
+    pub flushes: bool,
+    /// Its samplers round products of weights ([`hankel_host::parity::intervals`]).
+    #[serde(default)]
+    pub rounds_products: bool,
+}
 
 /// A kernel to be run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

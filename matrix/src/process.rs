@@ -12,7 +12,7 @@ use hankel_system::process::{Log, Program};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::job::{Kind, Reply};
+use crate::job::{Driver, Kind, Reply};
 
 /// How a program let us down.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
@@ -95,10 +95,8 @@ pub struct Runner {
     input: Option<ChildStdin>,
     lines: Receiver<String>,
     log: Log,
-    /// What it runs on, in its words.
-    pub ready: String,
-    /// Whether that flushes subnormal numbers.
-    pub flushes: bool,
+    /// What it runs on.
+    pub driver: Driver,
 }
 
 impl Runner {
@@ -136,14 +134,9 @@ impl Runner {
             program,
             lines,
             log,
-            ready: String::new(),
-            flushes: false,
+            driver: Driver::default(),
         };
-        (runner.ready, runner.flushes) = runner.answer(limit, &|value| {
-            let ready = value.get("ready")?.as_str()?.to_owned();
-            let flushes = value.get("flushes").and_then(Value::as_bool);
-            Some((ready, flushes.unwrap_or(false)))
-        })?;
+        runner.driver = runner.answer(limit, &|value| Driver::deserialize(value).ok())?;
         Ok(runner)
     }
 
@@ -279,7 +272,11 @@ mod tests {
             r#"{READY} read a; echo noise; echo '{{"id":1}}'; read b; echo '{{"id":2,"error":"no"}}'; read c"#
         );
         let mut runner = Runner::start(&mut shell(&script), LONG).unwrap();
-        assert_eq!((runner.ready.as_str(), runner.flushes), ("here", false));
+        let driver = Driver {
+            name: "here".into(),
+            ..Driver::default()
+        };
+        assert_eq!(runner.driver, driver);
         runner.ask(&"job", 1, LONG).unwrap();
         assert_eq!(runner.ask(&"job", 2, LONG), Err(Failure::refused("no")));
         assert!(runner.lives());

@@ -4,9 +4,8 @@ use std::io::{self, BufRead, Write};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::json;
 
-use crate::job::{Kind, Reply};
+use crate::job::{Driver, Kind, Reply};
 
 /// Why a job was not done.
 pub(crate) struct Problem {
@@ -23,17 +22,16 @@ impl From<String> for Problem {
     }
 }
 
-/// Says what the runner runs on, and whether that flushes subnormal numbers, then does the jobs of standard input until
-/// it ends. `run` gives a job's number with how it went.
+/// Says what the runner runs on, then does the jobs of standard input until it ends. `run` gives a job's number with how
+/// it went.
 ///
 /// # Errors
 /// In words: a line that is no job, an output that nobody reads.
 pub(crate) fn serve<J: DeserializeOwned>(
-    device: &str,
-    flushes: bool,
+    driver: &Driver,
     mut run: impl FnMut(&J) -> (u64, Result<(), Problem>),
 ) -> Result<(), String> {
-    say(&json!({ "ready": device, "flushes": flushes }))?;
+    say(driver)?;
     for line in io::stdin().lock().lines() {
         let line = line.map_err(|e| format!("standard input: {e}"))?;
         let job = serde_json::from_str(&line).map_err(|e| format!("this is no job: {e}"))?;

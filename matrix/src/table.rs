@@ -480,6 +480,7 @@ pub(crate) mod tests {
                     why: say("a square root"),
                 },
                 flushes: true,
+                rounds_products: false,
                 hostile: false,
             }),
             line: line.clone(),

@@ -12,7 +12,7 @@ use hankel_host::parity::execute::{self, ExecuteError};
 use serde::{Deserialize, Serialize};
 
 use crate::adopt;
-use crate::job::{Arg, Job, Kind};
+use crate::job::{Arg, Driver, Job, Kind};
 use crate::serve::{self, Problem};
 
 /// A job with what the host's device needs beyond it.
@@ -54,8 +54,16 @@ pub fn serve(as_it_is: bool) -> Result<(), String> {
             name = format!("{name}, {floats}");
         }
     }
-    let flushes = floats.flushes && !floats.keeps_subnormals;
-    serve::serve(&name, flushes, |job: &VulkanJob| {
+    let rounds_products = device.rounds_products().map_err(|e| e.to_string())?;
+    if rounds_products {
+        name += ", samplers round products of weights";
+    }
+    let driver = Driver {
+        name,
+        flushes: floats.flushes && !floats.keeps_subnormals,
+        rounds_products,
+    };
+    serve::serve(&driver, |job: &VulkanJob| {
         (job.job.id, run(&mut device, &floats, job))
     })
 }

@@ -11,13 +11,19 @@
 //! The fraction of a level of detail has 8 bits in Direct3D 11 as well, so that the level is moved by
 //! 1/256 up and down, where a texture has levels.
 //!
+//! A bilinear filter has four weights, products of those along both axes. NVIDIA's GPUs round these to 8 bits, too, such
+//! that the weights along either axis stay (`host/tests/filter.rs` measures it): the product is off by up to 1/512, which
+//! no place of a coordinate is like. For [such devices](Products::Rounded) the kernel is run with products moved up and
+//! down as well, at nine of the places, and the levels of even and of odd number are moved one after the other: of two
+//! neighbours, one may be rounded up and the other down.
+//!
 //! The filter's own sums round, too. Each channel is moved by 4 units of 2^-24 of the largest texel
 //! up and down; what the channels change is added up.
 //!
 //! All that is read through one sampler is moved alike. What several samplers change is added up.
 
-use hankel_dsl::native::Deviation;
 use hankel_dsl::native::describe::{Kernel, Role, TextureKind};
+use hankel_dsl::native::{Deviation, Levels};
 
 use super::execute::Written;
 use super::numbers::Numbers;
@@ -29,6 +35,8 @@ const PLACES: [i16; 5] = [-4, -2, 0, 2, 4];
 const PLACES_3D: [i16; 3] = [-4, 0, 4];
 /// Rounding of a level of detail, in 1/1024: 1/256.
 const LEVEL: i16 = 4;
+/// Rounding of a product of two weights, in 1/1024: 1/512, half a step of 8 bits.
+const TWIST: i8 = 2;
 /// Rounding of the filter's sums, in 2^-24 of the largest texel: three sums, and products of two.
 const SUMS: i8 = 4;
 
@@ -57,6 +65,15 @@ impl Interval {
     }
 }
 
+/// What a device does with the products of two weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Products {
+    /// They are as exact as floats are.
+    Exact,
+    /// They are rounded to 8 bits ([`rounds_products`](crate::device::VulkanDevice::rounds_products)).
+    Rounded,
+}
+
 /// Where each number of a result may lie.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Intervals(Vec<Interval>);
@@ -75,7 +92,8 @@ impl Intervals {
     }
 
     /// What the samplers of `kernel` may do to what it writes with the inputs of `case`, `reference`
-    /// with samplers as specified; none for a kernel without samplers. `run` runs a case natively.
+    /// with samplers as specified; none for a kernel without samplers. `run` runs a case natively. Samplers of devices
+    /// that round `products` may do more.
     ///
     /// # Errors
     /// Those of `run`.
@@ -83,6 +101,7 @@ impl Intervals {
         kernel: &Kernel,
         case: &Case,
         reference: &Written,
+        products: Products,
         mut run: impl FnMut(&Case) -> Result<Written, E>,
     ) -> Result<Option<Self>, E> {
         let samplers: Vec<usize> = (0..case.args.len())
@@ -98,6 +117,7 @@ impl Intervals {
             .iter()
             .map(|&x| Interval { low: x, high: x })
             .collect();
+        let has_levels = case.args.iter().any(has_levels);
         for sampler in samplers {
             let mut with = |deviation: Deviation| {
                 let mut moved = case.clone();
@@ -106,15 +126,37 @@ impl Intervals {
                 }
                 run(&moved).map(|written| numbers.values(&written))
             };
-            let places: Vec<Vec<f64>> = grid
-                .offsets()
-                .map(|offset| {
+            let moved: &[Levels] = match products {
+                Products::Rounded if has_levels => &[Levels::Even, Levels::Odd],
+                _ => &[Levels::All],
+            };
+            for &levels in moved {
+                let mut at = |offset, twist| {
                     with(Deviation {
+                        levels,
                         offset,
+                        twist,
                         ..Deviation::NONE
                     })
-                })
-                .collect::<Result<_, _>>()?;
+                };
+                let places = grid.offsets().map(|offset| at(offset, 0));
+                let places = places.collect::<Result<Vec<_>, _>>()?;
+                let twisted = match products {
+                    Products::Exact => Vec::new(),
+                    Products::Rounded => {
+                        let ends = grid.coarse().offsets();
+                        let both = ends.flat_map(|it| [(it, -TWIST), (it, TWIST)]);
+                        both.map(|(offset, twist)| at(offset, twist))
+                            .collect::<Result<_, _>>()?
+                    }
+                };
+                for (i, interval) in intervals.iter_mut().enumerate() {
+                    let (down, up) = reach(i, centre[i], places.iter().chain(&twisted));
+                    let step = grid.step(i, &places);
+                    interval.low -= down + step;
+                    interval.high += up + step;
+                }
+            }
             let mut sums = Vec::new();
             for channel in 0..4 {
                 for sign in [-SUMS, SUMS] {
@@ -123,7 +165,7 @@ impl Intervals {
                     sums.push(with(deviation)?);
                 }
             }
-            if case.args.iter().any(has_levels) {
+            if has_levels {
                 for level in [-LEVEL, LEVEL] {
                     sums.push(with(Deviation {
                         level,
@@ -132,9 +174,9 @@ impl Intervals {
                 }
             }
             for (i, interval) in intervals.iter_mut().enumerate() {
-                let (down, up) = around(i, centre[i], grid, &places, &sums);
-                interval.low -= down;
-                interval.high += up;
+                let rounding = added(i, centre[i], &sums);
+                interval.low -= rounding;
+                interval.high += rounding;
             }
         }
         Ok(Some(Self(intervals)))
@@ -186,6 +228,21 @@ impl Grid {
         })
     }
 
+    /// The ends and the middle along each axis.
+    fn coarse(self) -> Self {
+        Self {
+            places: &PLACES_3D,
+            ..self
+        }
+    }
+
+    /// The largest step of number `i` between two neighbours, which may be hidden between them.
+    fn step(self, i: usize, places: &[Vec<f64>]) -> f64 {
+        self.neighbours()
+            .map(|(a, b)| apart(places[a][i], places[b][i]))
+            .fold(0.0, f64::max)
+    }
+
     /// Pairs of neighbours.
     fn neighbours(self) -> impl Iterator<Item = (usize, usize)> {
         let n = self.places.len();
@@ -198,10 +255,10 @@ impl Grid {
     }
 }
 
-/// How far number `i` may lie below and above `centre`; `sums` are pairs, down and up.
-fn around(i: usize, centre: f64, grid: Grid, places: &[Vec<f64>], sums: &[Vec<f64>]) -> (f64, f64) {
+/// How far number `i` of these results lies below and above `centre`.
+fn reach<'a>(i: usize, centre: f64, results: impl Iterator<Item = &'a Vec<f64>>) -> (f64, f64) {
     let (mut down, mut up) = (0.0_f64, 0.0_f64);
-    for values in places {
+    for values in results {
         let d = apart(values[i], centre);
         if values[i] < centre {
             down = down.max(d);
@@ -209,19 +266,17 @@ fn around(i: usize, centre: f64, grid: Grid, places: &[Vec<f64>], sums: &[Vec<f6
             up = up.max(d);
         }
     }
-    let step = grid
-        .neighbours()
-        .map(|(a, b)| apart(places[a][i], places[b][i]))
-        .fold(0.0, f64::max);
-    // Down and up of each channel, and of the level.
-    let rounding: f64 = sums
-        .chunks(2)
+    (down, up)
+}
+
+/// How far all of these together may take number `i` from `centre`; they are pairs: a channel or the level, down and up.
+fn added(i: usize, centre: f64, sums: &[Vec<f64>]) -> f64 {
+    sums.chunks(2)
         .map(|pair| {
             let distances = pair.iter().map(|values| apart(values[i], centre));
             distances.fold(0.0, f64::max)
         })
-        .sum();
-    (down + step + rounding, up + step + rounding)
+        .sum()
 }
 
 /// The distance; nothing between equal infinities and between NaNs, infinite where only one is
@@ -306,7 +361,8 @@ mod tests {
         sums[0] = vec![0.25];
         sums[1] = vec![-0.5];
         sums[6] = vec![2.0];
-        let (down, up) = around(0, 0.0, grid, &places, &sums);
-        assert_eq!((down, up), (11.0 + 10.0 + 2.5, 11.0 + 10.0 + 2.5));
+        assert_eq!(reach(0, 0.0, places.iter()), (11.0, 11.0));
+        assert_eq!(grid.step(0, &places), 10.0);
+        assert_eq!(added(0, 0.0, &sums), 2.5);
     }
 }

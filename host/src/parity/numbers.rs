@@ -70,6 +70,9 @@ pub struct Rules {
     pub tolerance: Tolerance,
     /// Subnormal numbers may be taken for zero.
     pub flushes: bool,
+    /// Samplers round products of weights, which [`Intervals`] have to know.
+    #[serde(default)]
+    pub rounds_products: bool,
     /// Of absurd inputs the results are compared like others; else only in that what is finite in
     /// the reference is finite.
     pub hostile: bool,
@@ -89,6 +92,7 @@ impl Rules {
             hostile: tolerance.ulp == 0 && tolerance.absolute == 0.0 && !samples,
             tolerance,
             flushes: inputs::flushes(kernel),
+            rounds_products: false,
         }
     }
 }

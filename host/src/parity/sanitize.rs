@@ -143,6 +143,7 @@ pub fn check<E: fmt::Display>(
             ..kernel.tolerance.clone()
         },
         flushes: false,
+        rounds_products: false,
         hostile: true,
     };
     for order in others {

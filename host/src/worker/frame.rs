@@ -245,7 +245,7 @@ impl Arrived {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hankel_dsl::native::{Address, Compare, Deviation, Filter};
+    use hankel_dsl::native::{Address, Compare, Deviation, Filter, Levels};
 
     #[test]
     fn a_call_arrives_as_it_was_sent_and_comes_back() {
@@ -268,8 +268,10 @@ mod tests {
                 Arg::Sampler(Sampler {
                     compare: Some(Compare::Greater),
                     deviation: Deviation {
+                        levels: Levels::Odd,
                         offset: [-4, 3, 0],
                         level: 2,
+                        twist: -1,
                         channels: [1, -2, 3, -4],
                     },
                     ..Sampler::new(Filter::Linear, Address::MirrorRepeat)

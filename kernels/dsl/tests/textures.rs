@@ -225,7 +225,15 @@ fn a_deviation_changes_weights_and_channels_as_it_says() {
         channels: [4, 0, 0, 0],
         ..Deviation::NONE
     };
+    let twisted = Deviation {
+        twist: 2,
+        ..Deviation::NONE
+    };
+    let corner = [0.0, 0.0, 0.0, 1.0];
     assert_eq!(filtered(columns, Deviation::NONE), 0.5);
     assert_eq!(filtered(columns, moved), 0.75);
     assert_eq!(filtered(columns, summed), 0.5 + 1.0 / 4_194_304.0);
+    // The weights along either axis stay.
+    assert_eq!(filtered(columns, twisted), 0.5);
+    assert_eq!(filtered(corner, twisted), 0.25 + 1.0 / 512.0);
 }

@@ -13,7 +13,7 @@ mod run;
 mod texels;
 mod text;
 
-use crate::job::Job;
+use crate::job::{Driver, Job};
 
 use context::Context;
 
@@ -60,8 +60,11 @@ impl Gl {
 /// No device; a line that is no job; an output that cannot be written.
 pub fn serve() -> Result<(), String> {
     let mut gl = Gl::open()?;
-    let name = gl.name();
-    crate::serve::serve(&name, false, |job: &Job| {
+    let driver = Driver {
+        name: gl.name(),
+        ..Driver::default()
+    };
+    crate::serve::serve(&driver, |job: &Job| {
         (job.id, gl.run(job).map_err(Into::into))
     })
 }

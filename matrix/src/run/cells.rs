@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 use hankel_codegen::files::sha256;
 use hankel_dsl::native::describe::Precision;
 use hankel_host::parity::execute::Written;
-use hankel_host::parity::numbers::{Found, Numbers};
+use hankel_host::parity::intervals::{Intervals, Products};
+use hankel_host::parity::numbers::{Found, Numbers, Rules};
 
 use super::Request;
 use super::engine::Engine;
@@ -15,6 +16,7 @@ use super::permits::{Permits, locked};
 use super::reference::Ready;
 use crate::cache::Cache;
 use crate::column::Column;
+use crate::job::Driver;
 use crate::machine::Machine;
 use crate::process::Failure;
 use crate::report::{Cell, Outcome};
@@ -76,7 +78,7 @@ impl<'a> Shared<'a> {
                 &it.simd
             };
             let results = results.clone().map_err(Failure::refused);
-            let mut cell = judge(it, column, false, None, results, Duration::ZERO);
+            let mut cell = judge(it, column, None, None, results, Duration::ZERO);
             if column == Column::Native {
                 finite(it, &mut cell);
             }
@@ -153,7 +155,7 @@ impl<'a> Shared<'a> {
                 judge(
                     unit.it,
                     column,
-                    engine.flushes,
+                    engine.driver.as_ref(),
                     Some(unit.code),
                     results,
                     began.elapsed(),
@@ -180,7 +182,7 @@ impl<'a> Shared<'a> {
         }
         Ran {
             column,
-            device: engine.device,
+            device: engine.driver.map(|driver| driver.name),
             cells: found,
         }
     }
@@ -213,15 +215,20 @@ fn finite(it: &Ready<'_>, cell: &mut Cell) {
 fn judge(
     it: &Ready<'_>,
     column: Column,
-    flushes: bool,
+    driver: Option<&Driver>,
     code: Option<&Code>,
     results: Result<Vec<Written>, Failure>,
     took: Duration,
 ) -> Cell {
     let kernel = it.kernel();
+    let flushes = driver.map_or(column.flushes(), |driver| driver.flushes);
     // What flushes does so with 32-bit floats.
     let flushes = flushes && kernel.precision != Some(Precision::F64);
-    let rules = rules::of(kernel, column, flushes, it.flushed.is_some());
+    let rounds_products = driver.is_some_and(|driver| driver.rounds_products);
+    let rules = Rules {
+        rounds_products,
+        ..rules::of(kernel, column, flushes, it.flushed.is_some())
+    };
     let mut cell = Cell {
         outcome: Outcome::Passed,
         rules: Some(rules.clone()),
@@ -231,15 +238,18 @@ fn judge(
     };
     let text = code.map(|code| String::from_utf8_lossy(&code.bytes));
     let numbers = Numbers::of(kernel);
-    let compared = |reference: &[Written], results: &[Written]| {
+    let intervals = match column.language() {
+        // This processor's lanes round as its scalar code does.
+        None => Ok(Default::default()),
+        Some(_) if rounds_products => it.intervals(Products::Rounded),
+        Some(_) => it.intervals(Products::Exact),
+    };
+    let compared = |reference: &[Written], results: &[Written], intervals: &[Option<Intervals>]| {
         let mut found = Found::default();
         let cases = it.prepared.cases.iter().zip(reference).zip(results);
         for (i, ((case, a), b)) in cases.enumerate() {
-            // This processor's lanes round as its scalar code does.
-            let intervals = column
-                .language()
-                .and_then(|_| it.intervals.get(i)?.as_ref());
-            numbers.compare(case, &rules, intervals, a, b, &mut found);
+            let interval = intervals.get(i).and_then(Option::as_ref);
+            numbers.compare(case, &rules, interval, a, b, &mut found);
         }
         found
     };
@@ -248,7 +258,8 @@ fn judge(
         .iter()
         .map(Result::as_ref)
         .collect();
-    match (results, references) {
+    let expected = references.and_then(|references| Ok((references, intervals?)));
+    match (results, expected) {
         (Err(Failure::Lacks { what }), _) => cell.outcome = Outcome::Lacking { what },
         (Err(failure), _) => {
             cell.line = text
@@ -256,11 +267,11 @@ fn judge(
                 .and_then(|text| locate::of_message(text, &failure.to_string()));
             cell.outcome = Outcome::Foreign { failure };
         }
-        (Ok(results), Ok(references)) => {
+        (Ok(results), Ok((references, intervals))) => {
             // One size of subgroups for all cases.
             let found = references
                 .iter()
-                .map(|reference| compared(reference, &results))
+                .map(|reference| compared(reference, &results, intervals))
                 .min_by_key(|found| found.beyond)
                 .unwrap_or_default();
             if found.beyond > 0 {

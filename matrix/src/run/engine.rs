@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::Request;
 use super::cells::Unit;
 use crate::column::Column;
-use crate::job::Job;
+use crate::job::{Driver, Job};
 use crate::process::{Failure, Runner};
 use crate::tools::{Dxc, Tool};
 use crate::vulkan::{VulkanJob, Way};
@@ -31,10 +31,8 @@ pub(super) struct Engine<'a> {
     /// Why no runner starts: it would not for the next kernel either.
     broken: Option<Failure>,
     dxc: Option<Dxc>,
-    /// What runs them, in its own words, once it has been started.
-    pub(super) device: Option<String>,
-    /// Whether that flushes subnormal numbers.
-    pub(super) flushes: bool,
+    /// What runs them, once it has been started.
+    pub(super) driver: Option<Driver>,
 }
 
 impl<'a> Engine<'a> {
@@ -47,8 +45,7 @@ impl<'a> Engine<'a> {
             runner: None,
             broken: None,
             dxc: None,
-            device: None,
-            flushes: column.flushes(),
+            driver: None,
         }
     }
 
@@ -168,8 +165,10 @@ impl<'a> Engine<'a> {
         let mut command = self.command()?;
         match Runner::start(&mut command, limit) {
             Ok(runner) => {
-                self.device = Some(runner.ready.clone());
-                self.flushes |= runner.flushes;
+                self.driver = Some(Driver {
+                    flushes: self.column.flushes() || runner.driver.flushes,
+                    ..runner.driver.clone()
+                });
                 Ok(runner)
             }
             Err(failure) => {

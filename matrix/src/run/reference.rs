@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::slice;
+use std::sync::OnceLock;
 
 use hankel_codegen::files::sha256;
 use hankel_dsl::native::describe::{Kernel, Subgroups};
@@ -12,7 +13,7 @@ use hankel_host::device::{DeviceError, NativeDevice};
 use hankel_host::flush::flushed as flushed_run;
 use hankel_host::inputs::{self, Case};
 use hankel_host::parity::execute::{self, Written};
-use hankel_host::parity::intervals::Intervals;
+use hankel_host::parity::intervals::{Intervals, Products};
 use hankel_host::parity::{panics, sanitize};
 use rayon::prelude::*;
 
@@ -36,12 +37,28 @@ pub(super) struct Ready<'a> {
     by_size: [Vec<Result<Vec<Written>, String>>; 2],
     pub(super) simd: Result<Vec<Written>, String>,
     /// For each case what samplers may do to its numbers; none for kernels without samplers.
-    pub(super) intervals: Vec<Option<Intervals>>,
+    intervals: Vec<Option<Intervals>>,
+    /// The same of devices that round products of weights, found when the first column has one.
+    intervals_of_rounded: OnceLock<Result<Vec<Option<Intervals>>, String>>,
 }
 
 impl Ready<'_> {
     pub(super) fn kernel(&self) -> &Kernel {
         &self.subject.entry.kernel
+    }
+
+    /// For each case what samplers of a device may do to its numbers; none for kernels without samplers.
+    pub(super) fn intervals(&self, products: Products) -> Result<&[Option<Intervals>], &String> {
+        match products {
+            Products::Exact => Ok(&self.intervals),
+            Products::Rounded => self
+                .intervals_of_rounded
+                .get_or_init(|| {
+                    let reference = self.reference.clone()?;
+                    intervals(self.subject, &self.prepared, &reference, products)
+                })
+                .as_deref(),
+        }
     }
 
     /// What a column, whose device `flushes` subnormal numbers or not, is compared with: it agrees if it agrees with
@@ -129,20 +146,11 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         [Vec::new(), Vec::new()]
     };
     let simd = natively(Mode::default());
-    let intervals = reference.and_then(|reference| {
-        let intervals = prepared
-            .cases
-            .iter()
-            .zip(&reference)
-            .map(|(case, written)| {
-                Intervals::find(kernel, case, written, |moved| run(Mode::REFERENCE, moved))
-            });
-        match intervals.collect::<Result<Vec<_>, _>>() {
-            Ok(intervals) => Ok((reference, intervals)),
-            Err(e) => Err(e.to_string()),
-        }
+    let found = reference.and_then(|reference| {
+        let intervals = intervals(subject, &prepared, &reference, Products::Exact)?;
+        Ok((reference, intervals))
     });
-    let (reference, intervals) = match intervals {
+    let (reference, intervals) = match found {
         Ok((reference, intervals)) => (Ok(reference), intervals),
         Err(problem) => (Err(problem), Vec::new()),
     };
@@ -167,5 +175,30 @@ fn reference<'a>(request: &Request, subject: &'a Subject, work: &Path) -> io::Re
         by_size,
         simd,
         intervals,
+        intervals_of_rounded: OnceLock::new(),
     })
+}
+
+/// For each case what samplers may do to its numbers.
+fn intervals(
+    subject: &Subject,
+    prepared: &Prepared,
+    reference: &[Written],
+    products: Products,
+) -> Result<Vec<Option<Intervals>>, String> {
+    let program = subject.entry.program(None, &[]);
+    let run = |case: &Case| {
+        execute::dispatch(
+            &mut NativeDevice::with_mode(Mode::REFERENCE),
+            &program,
+            case,
+        )
+    };
+    let cases = prepared.cases.iter().zip(reference);
+    cases
+        .map(|(case, written)| {
+            Intervals::find(&subject.entry.kernel, case, written, products, run)
+                .map_err(|e| e.to_string())
+        })
+        .collect()
 }

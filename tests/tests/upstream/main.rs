@@ -275,7 +275,7 @@ fn result(
         };
         runner.ask(&job, 1, LIMIT)
     };
-    done.unwrap_or_else(|e| panic!("{}: {e}", runner.ready));
+    done.unwrap_or_else(|e| panic!("{}: {e}", runner.driver.name));
     read(&at("results"))
 }
 
@@ -365,9 +365,9 @@ fn runner(on: On) -> Runner {
     }
     let runner = Runner::start(&mut command, LIMIT).unwrap_or_else(|e| panic!("{e}"));
     assert!(
-        runner.ready.contains(device),
+        runner.driver.name.contains(device),
         "this test is about {device}; here is {}",
-        runner.ready
+        runner.driver.name
     );
     runner
 }

@@ -59,6 +59,7 @@ fn between(
     let rules = Rules {
         tolerance: exact,
         flushes: inputs::flushes(kernel),
+        rounds_products: false,
         hostile: true,
     };
     let numbers = Numbers::of(kernel);

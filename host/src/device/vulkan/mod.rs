@@ -1,6 +1,7 @@
 //! Any Vulkan adapter through wgpu: a GPU, or lavapipe on a machine without one.
 
 mod clock;
+mod filter;
 mod floats;
 mod indirect;
 mod own;
@@ -61,6 +62,7 @@ pub struct VulkanDevice {
     by_timestamps: bool,
     /// Measured when it is first asked for.
     floats: Option<Floats>,
+    rounds_products: Option<bool>,
 }
 
 /// How many workgroups run along x, y, z.
@@ -169,6 +171,7 @@ impl VulkanDevice {
             clock: None,
             by_timestamps: false,
             floats: None,
+            rounds_products: None,
         })
     }
 

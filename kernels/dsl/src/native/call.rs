@@ -130,10 +130,15 @@ impl Sampler {
 /// What a device may do with the numbers of a sampler, to find out natively what follows from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Deviation {
+    /// The levels of a texture for which `offset` and `twist` are.
+    pub levels: Levels,
     /// How far a coordinate is moved along each axis, in 1/1024 of a texel: rounding of the weights.
     pub offset: [i16; 3],
     /// How far the level of detail is moved, in 1/1024 of a level: rounding of its fraction.
     pub level: i16,
+    /// How far the product of the weights along both axes is moved, in 1/1024, while the sums of weights along either
+    /// stay: rounding of the weights of four texels.
+    pub twist: i8,
     /// What is added to each channel, in 2^-24 of the largest magnitude that is read: rounding of
     /// the filter's sums.
     pub channels: [i8; 4],
@@ -142,10 +147,41 @@ pub struct Deviation {
 impl Deviation {
     /// As the specification computes.
     pub const NONE: Self = Self {
+        levels: Levels::All,
         offset: [0; 3],
         level: 0,
+        twist: 0,
         channels: [0; 4],
     };
+}
+
+/// Some levels of a texture. Of two neighbours one is even, the other odd.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum Levels {
+    /// All of them.
+    #[default]
+    All,
+    /// Those of even number.
+    Even,
+    /// Those of odd number.
+    Odd,
+}
+
+impl Levels {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::All, Self::Even, Self::Odd];
+
+    /// Whether a level is one of these.
+    #[must_use]
+    pub const fn has(self, level: u32) -> bool {
+        match self {
+            Self::All => true,
+            Self::Even => level.is_multiple_of(2),
+            Self::Odd => !level.is_multiple_of(2),
+        }
+    }
 }
 
 /// What a sampler does between texels or levels. Names are WebGPU's.

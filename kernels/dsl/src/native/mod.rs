@@ -23,7 +23,7 @@ mod transpose;
 pub mod workgroup;
 
 pub use call::{
-    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Run, SUBGROUP_SIZE,
+    Address, Arg, Call, CallError, Compare, Deviation, Filter, Levels, Mode, Run, SUBGROUP_SIZE,
     SUBGROUP_SIZES, Sampler, TextureMut, TextureRef, level_size, texture_bytes,
 };
 

@@ -16,7 +16,7 @@ use std::{format, slice};
 
 use super::Entry;
 use super::call::{
-    Address, Arg, Call, CallError, Compare, Deviation, Filter, Mode, Sampler, TextureMut,
+    Address, Arg, Call, CallError, Compare, Deviation, Filter, Levels, Mode, Sampler, TextureMut,
     TextureRef,
 };
 use super::describe::Kernel;
@@ -96,6 +96,8 @@ struct RawSampler {
     offset: [i16; 3],
     level: i16,
     channels: [i8; 4],
+    twist: i8,
+    levels: u8,
 }
 
 impl RawSampler {
@@ -110,6 +112,8 @@ impl RawSampler {
             offset: sampler.deviation.offset,
             level: sampler.deviation.level,
             channels: sampler.deviation.channels,
+            twist: sampler.deviation.twist,
+            levels: sampler.deviation.levels as u8,
         }
     }
 
@@ -131,6 +135,8 @@ impl RawSampler {
                 offset: self.offset,
                 level: self.level,
                 channels: self.channels,
+                twist: self.twist,
+                levels: *Levels::ALL.get(usize::from(self.levels))?,
             },
         })
     }

@@ -182,6 +182,7 @@ impl<'a> Taps<'a> {
             let x = at[d] * size[d] as f32;
             let x = if linear { x - 0.5 } else { x };
             let x = match sampler.deviation.offset[d] {
+                _ if !sampler.deviation.levels.has(level) => x,
                 0 => x,
                 n => x + f32::from(n) / 1024.0,
             };
@@ -257,7 +258,12 @@ fn filter(
         let [a, b, c, d] = taps.square(dz, of);
         let near = a * (1.0 - weight[0]) + b * weight[0];
         let far = c * (1.0 - weight[0]) + d * weight[0];
-        near * (1.0 - weight[1]) + far * weight[1]
+        let value = near * (1.0 - weight[1]) + far * weight[1];
+        match sampler.deviation.twist {
+            _ if !sampler.deviation.levels.has(level) => value,
+            0 => value,
+            n => value + (a - b - c + d) * (f32::from(n) / 1024.0),
+        }
     };
     let front = slice(0);
     let value = if weight[2] == 0.0 {
