@@ -488,12 +488,17 @@ fn kind(kind: FileType) -> &'static str {
 /// What is at a path that must be a folder, or nothing yet; `None`: one of these.
 fn not_a_folder(path: &Path) -> Option<&'static str> {
     match std::fs::metadata(path) {
-        Ok(data) if data.is_dir() => None,
+        Ok(data) if data.is_dir() => is_root(path).then_some("the root of a file system"),
         Ok(data) if data.is_file() => Some("a file"),
         Ok(_) => Some("a device or FIFO"),
         Err(_) if path.is_symlink() => Some("a symbolic link that leads nowhere"),
         Err(_) => None,
     }
+}
+
+fn is_root(path: &Path) -> bool {
+    path.canonicalize()
+        .is_ok_and(|path| path.parent().is_none())
 }
 
 #[cfg(test)]
@@ -790,6 +795,8 @@ mod tests {
         assert!(Folder::open(&place.path().join("none")).unwrap().is_none());
         #[cfg(unix)]
         {
+            let text = Folder::create(Path::new("/")).err().unwrap().to_string();
+            assert!(text.starts_with("/ is the root of a file system"), "{text}");
             let link = place.path().join("link");
             std::os::unix::fs::symlink("nowhere", &link).unwrap();
             let text = Folder::create(&link).err().unwrap().to_string();

@@ -443,3 +443,20 @@ fn a_fitted_map_follows_the_camera() {
     fresh.run(Clock::Frame, &mut Quiet).unwrap();
     assert_eq!(fresh.picture().unwrap(), moved);
 }
+
+/// The reference of a scene file's keys is that of the code.
+#[test]
+fn the_page_has_every_key_of_a_scene_file() {
+    let page = include_str!("../../docs/frames.md");
+    let source = include_str!("../src/scene/mod.rs");
+    let keys = source
+        .split_once("//! ```toml\n")
+        .and_then(|(_, rest)| rest.split_once("//! ```\n"))
+        .expect("the reference")
+        .0;
+    let keys: Vec<&str> = keys
+        .lines()
+        .map(|line| line.trim_start_matches("//!").trim_start_matches(' '))
+        .collect();
+    assert!(page.contains(&keys.join("\n")), "docs/frames.md lacks it");
+}

@@ -22,7 +22,16 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
         .as_ref()
         .filter(|it| !it.starts_with(&args.out))
     {
-        drop(Output::create(file, &[])?);
+        let mut read: Vec<&Path> = args
+            .generate
+            .placement
+            .bindings
+            .iter()
+            .map(PathBuf::as_path)
+            .collect();
+        #[cfg(feature = "frames")]
+        read.extend(args.frame.scene.as_deref());
+        drop(Output::create(file, &read)?);
     }
     if args.form == Form::Kernels && !args.functions.is_empty() {
         return Err(Failure::input(
@@ -93,7 +102,9 @@ pub fn depend(args: &Build, record: &str, inputs: &[PathBuf]) -> Result<()> {
     if let Some(file) = &args.depfile {
         let record = args.out.join(record);
         let text = depfile::rule(&record, inputs);
-        Output::create(file, &[])?.finish(text.as_bytes())?;
+        let mut inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+        inputs.push(&record);
+        Output::create(file, &inputs)?.finish(text.as_bytes())?;
         // Make compares times: a record that stays as it was must not be older than its inputs.
         touch(&record)?;
     }

@@ -173,9 +173,9 @@ fn generate(session: &Session, request: &Request, draft: &Draft) -> Result<Gener
 /// The files that a frame follows from beside this program, as absolute paths.
 fn inputs(args: &Build, file: &Path, scene: &Scene) -> Result<Vec<PathBuf>> {
     let mut files = files(file, scene);
-    files.extend(args.generate.placement.bindings.as_deref());
-    let absolute = |file: &Path| {
-        std::path::absolute(file)
+    files.extend(args.generate.placement.bindings.clone());
+    let absolute = |file: PathBuf| {
+        std::path::absolute(&file)
             .map_err(|e| Failure::machine(format!("{}: {e}", file.display()), None))
     };
     files.into_iter().map(absolute).collect()

@@ -1,16 +1,15 @@
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use hankel_frames::graph::Summary;
 use hankel_frames::scene::Scene;
 use hankel_frames::truth::{Measured, measure};
 use hankel_frames::{Difference, Memory, Rendering, Timing, compare, render};
 use hankel_host::device::Backend;
-use hankel_system::output;
 use serde::Serialize;
 
 use crate::args::{Format, Render};
-use crate::commands::scene::{Asked, beside, files, is_exr, save};
+use crate::commands::scene::{Asked, beside, files, is_exr, places, save};
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::progress::Progress;
@@ -56,9 +55,8 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         vec![args.out.clone()]
     };
     let inputs = files(&args.scene, &scene);
-    let places: Vec<&Path> = pictures.iter().map(PathBuf::as_path).collect();
     // Whether they can be written shows before the long work starts.
-    let outputs = output::create_all(&places, &inputs)?;
+    let outputs = places(&pictures, &inputs)?;
     let session = Session::linked(quiet);
     let Some(scene) = asked.planned(scene, quiet || args.format == Format::Json)? else {
         return Ok(Outcome::CheckFailed);
@@ -157,26 +155,12 @@ fn print(args: &Render, quiet: bool, told: Told<'_>) {
         });
         return;
     }
-    if quiet {
-        return;
-    }
-    say!("{}", first.plan);
-    for r in renderings {
-        say!(
-            "{}: {:.2} s, {} triangles, {:.1} MB ({:.1} MB if passes shared no memory)",
-            r.device,
-            r.seconds(),
-            r.triangles,
-            r.memory.bytes as f64 / 1e6,
-            r.memory.unshared as f64 / 1e6
-        );
-        for t in &r.timings {
-            say!("  {:<16} {:>8.1} ms", t.name, t.seconds * 1e3);
-        }
+    if !quiet {
+        tell(first, renderings);
     }
     if let Some(difference) = difference {
         say!("difference: {difference}");
-        if let Some(edges) = first.edges {
+        if let Some(edges) = first.edges.filter(|_| !quiet) {
             say!(
                 "{:.2} % of the pixels lie on edges, where rounding decides",
                 edges * 100.0
@@ -204,7 +188,27 @@ fn print(args: &Render, quiet: bool, told: Told<'_>) {
             );
         }
     }
-    for p in &pictures {
-        say!("{}", p.display());
+    if !quiet {
+        for p in &pictures {
+            say!("{}", p.display());
+        }
+    }
+}
+
+/// What the frames are made of, and what they took.
+fn tell(first: &Rendering, renderings: &[&Rendering]) {
+    say!("{}", first.plan);
+    for r in renderings {
+        say!(
+            "{}: {:.2} s, {} triangles, {:.1} MB ({:.1} MB if passes shared no memory)",
+            r.device,
+            r.seconds(),
+            r.triangles,
+            r.memory.bytes as f64 / 1e6,
+            r.memory.unshared as f64 / 1e6
+        );
+        for t in &r.timings {
+            say!("  {:<16} {:>8.1} ms", t.name, t.seconds * 1e3);
+        }
     }
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use hankel_frames::Picture;
 use hankel_frames::graph::ImagePasses;
 use hankel_frames::plan::Wanted;
-use hankel_frames::scene::{Geometry, Scene, Shadow};
-use hankel_system::output::Output;
+use hankel_frames::scene::{Scene, Shadow};
+use hankel_system::output::{self, Output};
 
 use crate::args::{Backend, Maps};
 use crate::commands::plan::{of_maps, of_scene, technique};
@@ -85,12 +85,18 @@ pub fn with_technique(shadow: Shadow, name: &str) -> Result<Shadow> {
 }
 
 /// The files that a scene is read from.
-pub fn files<'a>(file: &'a Path, scene: &'a Scene) -> Vec<&'a Path> {
-    let mut files = vec![file];
-    if let Geometry::Model { file, .. } = &scene.geometry {
-        files.push(file);
-    }
+pub fn files(file: &Path, scene: &Scene) -> Vec<PathBuf> {
+    let mut files = vec![file.to_path_buf()];
+    files.extend(scene.files());
     files
+}
+
+/// Places for pictures, none of which is one of the `inputs`.
+pub fn places(pictures: &[PathBuf], inputs: &[PathBuf]) -> Result<Vec<Output>> {
+    fn paths(all: &[PathBuf]) -> Vec<&Path> {
+        all.iter().map(PathBuf::as_path).collect()
+    }
+    Ok(output::create_all(&paths(pictures), &paths(inputs))?)
 }
 
 /// Writes pictures to the places made for them.

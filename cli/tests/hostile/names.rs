@@ -144,6 +144,17 @@ fn a_short_direction_is_a_direction() {
     desk.hankel("render scene.toml --out p.png").code(0);
 }
 
+/// A prefix that no file system takes, or no GLSL compiler.
+#[test]
+fn a_prefix_begins_names_that_there_may_be() {
+    let desk = Desk::new();
+    for prefix in [&"a".repeat(65), "gl_x", "Own", "float"] {
+        desk.hankel(&format!("build --form functions --out l --prefix {prefix}"))
+            .fails(2, &["--prefix", "at most 64"]);
+    }
+    assert!(!desk.path("l").exists());
+}
+
 #[test]
 fn a_file_where_a_folder_belongs_is_misuse() {
     let desk = Desk::new();

@@ -53,8 +53,29 @@ fn inputs_are_not_overwritten() {
     desk.write("rows.csv", ROWS);
     desk.write("scene.toml", SCENE);
     desk.write("moments.csv", "m0,m1,m2,z\n1,0.5,0.34,0.9\n");
+    desk.write("places.toml", "[vsm.rows]\nwgsl = { binding = 7 }\n");
+    // A triangle, whose corners are in a file of their own. Applications may add what they like as `extras`.
+    let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let corners: Vec<u8> = corners.iter().flat_map(|it| it.to_le_bytes()).collect();
+    desk.write("corners.bin", corners);
+    desk.write(
+        "model.gltf",
+        r#"{"asset": {"version": "2.0", "extras": [1, "two"]}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+        "min": [0, 0, 0], "max": [1, 1, 1]}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": "corners.bin"}]}"#,
+    );
+    desk.write(
+        "model.toml",
+        SCENE.replace("procedural = \"box\"", "model = \"model.gltf\""),
+    );
     fs::hard_link(desk.path("rows.csv"), desk.path("same.csv")).expect("a link");
     for line in [
+        "build --out s --kernel vsm --bindings places.toml --depfile places.toml".into(),
+        "build --out s --scene scene.toml --depfile scene.toml".into(),
+        "render model.toml --out corners.bin".into(),
+        "render model.toml --out model.gltf".into(),
         format!("{EVAL} rows.csv"),
         format!("{EVAL} same.csv"),
         "judge --functions z,z^2 --input moments.csv --output ./moments.csv".into(),
@@ -68,6 +89,14 @@ fn inputs_are_not_overwritten() {
         (desk.read("rows.csv"), desk.read("scene.toml")),
         (ROWS.into(), SCENE.into())
     );
+    // The manifest of the folder itself, and of folders that are compared.
+    desk.hankel("build --out s --kernel vsm").code(0);
+    let manifest = desk.read("s/manifest.json");
+    desk.hankel("build --out s --kernel vsm --depfile s/manifest.json")
+        .fails(2, &["is read"]);
+    desk.hankel("diff s s --scene scene.toml --out s/manifest.json")
+        .fails(2, &["is compared"]);
+    assert_eq!(desk.read("s/manifest.json"), manifest);
 }
 
 /// Before the work, which would be lost.

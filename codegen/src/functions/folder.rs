@@ -12,6 +12,9 @@ use crate::error::{Error, Result};
 use crate::files::sha256;
 use crate::folder::{self, Found};
 
+/// Letters of a prefix at most.
+const LONGEST_PREFIX: usize = 64;
+
 /// Libraries in every language, in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Folder {
@@ -83,12 +86,15 @@ impl Folder {
             && prefix
                 .chars()
                 .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
-        if !is_name || super::names::is_taken(prefix) {
+        // GLSL keeps `GL_` for itself; file systems take names of 255 bytes.
+        let is_free = !super::names::is_taken(prefix) && !prefix.starts_with("gl_");
+        if !is_name || !is_free || prefix.len() > LONGEST_PREFIX {
             return Err(Error::Option {
                 option: "--prefix",
                 value: prefix.into(),
                 expected: "a prefix is made of lower-case letters, digits and single underscores, \
-                           begins with a letter, and is no word of a shading language",
+                           begins with a letter, has at most 64 of them, is no word of a shading language and \
+                           does not begin with `gl_`",
             });
         }
         let texts = super::files(libraries, prefix, sources);

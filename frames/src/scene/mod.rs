@@ -327,6 +327,15 @@ impl Scene {
         text::parse(text, file)
     }
 
+    /// The files that its geometry is read from, those of a model's buffers among them.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        match &self.geometry {
+            Geometry::Model { file, .. } => model::files(file),
+            Geometry::Procedural(_) => Vec::new(),
+        }
+    }
+
     /// Loads or makes the scene's triangles; at least one, none without area.
     ///
     /// # Errors

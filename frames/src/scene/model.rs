@@ -36,6 +36,26 @@ pub fn load(file: &Path) -> Result<Mesh> {
     .load(&bytes)
 }
 
+/// The files that a model is read from: its own, and those of its buffers.
+pub fn files(file: &Path) -> Vec<PathBuf> {
+    let mut files = vec![file.to_path_buf()];
+    // What is wrong with it is told when it is loaded.
+    let bytes = input::read(file, MAX_BYTES).unwrap_or_default();
+    if let Ok(Gltf { document, .. }) = Gltf::from_slice_without_validation(&bytes) {
+        let uris = document.into_json().buffers.into_iter();
+        let uris = uris.filter_map(|buffer| buffer.uri);
+        let is_file = |uri: &String| !uri.starts_with("data:") && !uri.contains("://");
+        files.extend(uris.filter(is_file).map(|uri| beside(file, &uri)));
+    }
+    files
+}
+
+/// The file that a model's `uri` names.
+fn beside(file: &Path, uri: &str) -> PathBuf {
+    let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+    file.parent().unwrap_or(Path::new("")).join(name.as_ref())
+}
+
 struct Loader<'a> {
     file: &'a Path,
     mesh: Mesh,
@@ -169,12 +189,7 @@ impl Loader<'_> {
         if uri.contains("://") {
             return self.fail(format!("buffer {index} lies at {uri}: only files are read"));
         }
-        let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
-        let path: PathBuf = self
-            .file
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(name.as_ref());
+        let path = beside(self.file, uri);
         let data =
             input::read(&path, self.room).or_else(|e| self.fail(format!("buffer {index}: {e}")))?;
         self.room -= data.len() as u64;

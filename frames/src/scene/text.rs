@@ -526,7 +526,7 @@ impl Reader<'_> {
         let colour = match &l.colour {
             Some(given) => {
                 let colour = Vec3::from_array(*given.get_ref());
-                if !(colour.min_element() >= 0.0 && colour.max_element() <= 1.0) {
+                if !colour.to_array().iter().all(|c| (0.0..=1.0).contains(c)) {
                     let allowed = "three numbers from 0 to 1: `light.strength` has no such limit";
                     return self.refuse(given.span(), "light.colour", colour, allowed);
                 }

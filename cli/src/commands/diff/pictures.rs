@@ -12,12 +12,11 @@ use hankel_codegen::translate::Options;
 use hankel_frames::scene::Scene;
 use hankel_frames::{AMPLIFICATION, Difference, FrameError, export, render};
 use hankel_host::device::Backend;
-use hankel_system::output;
 use serde::Serialize;
 
 use super::module;
 use crate::args::{Diff, Format};
-use crate::commands::scene::{beside, files, is_exr, save};
+use crate::commands::scene::{self, beside, files, is_exr, save};
 use crate::failure::{Failure, Result};
 use crate::progress::Progress;
 use crate::session::{Session, Words};
@@ -50,6 +49,26 @@ impl fmt::Display for Pictures {
     }
 }
 
+/// Refuses to write into a folder that is compared.
+fn refuse_within(out: &Path, folder: &Path) -> Result<()> {
+    let whole = |path: &Path| std::path::absolute(path).and_then(|path| path.canonicalize());
+    let parent = match out.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    match (whole(parent), whole(folder)) {
+        (Ok(parent), Ok(folder)) if parent.starts_with(&folder) => Err(Failure::input(
+            format!(
+                "{} lies in {}, which is compared",
+                out.display(),
+                folder.display()
+            ),
+            "Name a file elsewhere.",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Renders `args.scene`, if there is one, and writes the pictures.
 pub fn pictures(args: &Diff, quiet: bool) -> Result<Option<Pictures>> {
     let (Some(file), Some(out)) = (&args.scene, &args.out) else {
@@ -63,9 +82,11 @@ pub fn pictures(args: &Diff, quiet: bool) -> Result<Option<Pictures>> {
     }
     let scene = Scene::read(file)?;
     let places = vec![out.clone(), beside(out, "old"), beside(out, "difference")];
-    let paths: Vec<&Path> = places.iter().map(PathBuf::as_path).collect();
+    for folder in [&args.old, &args.new] {
+        refuse_within(out, folder)?;
+    }
     // Whether they can be written shows before the long work starts.
-    let outputs = output::create_all(&paths, &files(file, &scene))?;
+    let outputs = scene::places(&places, &files(file, &scene))?;
     let session = Session::linked(quiet);
     let own = own(&session, &scene)?;
     let all = session.all_words()?;
