@@ -373,9 +373,9 @@ fn cargo(
         "-Zmir-enable-passes=-GVN".into(),
         "-Zshare-generics=off".into(),
         // Its optimiser makes one constant of two in a row, which rounds otherwise than the source
-        // (tests/upstream/rust-gpu-merged-constants).
-        // `finish` runs it, with arithmetic held.
-        "-Cllvm-args=--module-output=single --spirv-metadata=name-variables --no-spirv-opt".into(),
+        // (tests/upstream/rust-gpu-merged-constants). `finish` runs it, with arithmetic held, and validates: references
+        // that are chosen have yet to be made valid.
+        "-Cllvm-args=--module-output=single --spirv-metadata=name-variables --no-spirv-opt --no-spirv-val".into(),
         format!("-Ctarget-feature={}", capabilities.join(",")),
     ];
     cargo

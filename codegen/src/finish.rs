@@ -13,7 +13,8 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, canonical, exact, libm, names, order, parts, refused, split, trim, uniform,
+    self, bounds, canonical, exact, libm, names, order, parts, references, refused, split, tables,
+    trim, uniform,
 };
 use crate::translate::reading;
 
@@ -44,8 +45,12 @@ pub struct Finished {
 pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let name = kernel.name.as_str();
     let words = spirv::words(raw, name)?;
-    validate(&words, name)?;
-    let mut module = spirv::load(&words, name)?;
+    // Of what cannot be read, spirv-val says more.
+    let mut module =
+        spirv::load(&words, name).or_else(|unread| validate(&words, name).and(Err(unread)))?;
+    // What is left may be resolved by spirv-opt, unless it is invalid.
+    let (has_references, left) = references::resolve(&mut module, name);
+    validate(&spirv::store(&module), name).map_err(|invalid| left.unwrap_or(invalid))?;
     let place = Some(format!("{}:{}", kernel.file, kernel.line));
     refused::check(&module, name).map_err(|failure| Failure {
         construct: failure.construct.clone().or_else(|| place.clone()),
@@ -56,6 +61,9 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let words = optimise(module, name)?;
     let mut module = spirv::load(&words, name)?;
     order::mend(&mut module);
+    if has_references {
+        references::near(&mut module);
+    }
     let divided = if uniform::divides_at_barrier(&module, Memory::Trusted) {
         Some(("workgroup", "barrier"))
     } else if uniform::divides_at_subgroup(&module, Memory::Trusted, Group::Subgroup) {
@@ -157,8 +165,10 @@ fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
             exact::fold(&mut module),
             bounds::fold(&mut module),
             parts::divide(&mut module),
+            tables::keep(&mut module),
+            references::sweep(&mut module),
         ];
-        if changes == [false; 3] {
+        if changes == [false; 5] {
             break;
         }
     }

@@ -46,6 +46,10 @@ pub fn lacking(kernel: &Kernel, column: Column, code: &[u8]) -> Option<String> {
                 .into(),
         );
     }
+    // `tests/upstream/glslang-wide-constructors`.
+    if code.windows(9).any(|it| it == b"uint64_t(") {
+        return Some("conversions to 64-bit integers (glslang's HLSL has no `uint64_t(x)`)".into());
+    }
     let wide = slots::slots(kernel).iter().any(|slot| match slot.role {
         Use::Uniform(l)
         | Use::Element(l)

@@ -97,9 +97,12 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry) {
                         let _ = writeln!(text, "#define {prefix}_{name}_{what} {space}u");
                     }
                 }
-                // GLSL ES 3.00 binds by name.
+                // A sampler that has become one with its textures is nowhere in the text.
+                None if !place.combined_with.is_empty() => {}
+                // GLSL ES 3.00 binds by name, buffers by that of the block.
                 None => {
-                    let known = place.name.as_deref().unwrap_or(&binding.name);
+                    let known = place.block.as_ref().or(place.name.as_ref());
+                    let known = known.unwrap_or(&binding.name);
                     let _ = writeln!(text, "#define {prefix}_{name} \"{known}\"");
                 }
             }

@@ -10,8 +10,10 @@ pub(crate) mod lines;
 pub mod names;
 pub mod order;
 pub mod parts;
+pub(crate) mod references;
 pub mod refused;
 pub mod split;
+pub(crate) mod tables;
 pub mod trim;
 pub mod uniform;
 

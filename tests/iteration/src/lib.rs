@@ -10,6 +10,10 @@
 use hankel_dsl::glam::{IVec4, UVec4, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
 
+mod idioms;
+
+use idioms::*;
+
 hankel_dsl::kernels![
     walked,
     changed,
@@ -30,6 +34,16 @@ hankel_dsl::kernels![
     tokens,
     rewritten,
     attempts,
+    linked,
+    sorted,
+    placed,
+    chosen,
+    numbered_pairs,
+    halved,
+    lit,
+    checked,
+    wide_bits,
+    mirrored,
 ];
 
 /// Four numbers four times: by reference in two ways, by value, and from the end.

@@ -441,6 +441,19 @@ fn glslang_refuses_templated_loads() {
 }
 
 #[test]
+fn glslang_refuses_constructors_of_wide_integers() {
+    let file = case("glslang-wide-constructors", "case.hlsl");
+    let (spirv, words) = glslang(&file, &["-D", "-e", "main"]);
+    assert!(
+        spirv.is_none(),
+        "mended: drop `lacking` of matrix/src/rules.rs"
+    );
+    assert!(words.contains("unsupported construction"), "{words}");
+    // DXC takes it.
+    dxc(&text("glslang-wide-constructors", "case.hlsl"));
+}
+
+#[test]
 fn glslang_includes_the_own_value_in_prefix_sums() {
     let scan = |spirv: &[u8]| -> Vec<Operand> {
         let made = module(spirv);
