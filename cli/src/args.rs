@@ -220,9 +220,9 @@ pub struct Build {
     /// What is generated: shaders with entry points, or libraries of functions.
     #[arg(long, value_enum, default_value_t)]
     pub form: Form,
-    /// What the names of a library begin with.
-    #[arg(long, value_name = "NAME", default_value = "hankel")]
-    pub prefix: String,
+    /// Libraries: what their names begin with [default: hankel].
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
     /// Libraries: only this function, and what it calls; `*` stands for any letters; may be repeated.
     #[arg(long = "function", value_name = "NAME")]
     pub functions: Vec<String>,

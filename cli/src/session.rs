@@ -33,6 +33,7 @@ use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
 use crate::args::{Generate, Placed};
 use crate::failure::{Failure, Result};
+use crate::print;
 use crate::progress::Progress;
 
 /// The built-in kernel crate within a checkout.
@@ -232,6 +233,12 @@ impl Session {
                 Ok(self.request_for(kernels, targets, manifest.options.options()?))
             }
             // A manifest that cannot be read is a file that differs.
+            Err(problem) if args.first_option().is_none() => {
+                print::note(format_args!(
+                    "{problem}\nIt says what the folder was built with, so this compares with a build without options."
+                ));
+                self.request(args)
+            }
             _ => self.request(args),
         }
     }

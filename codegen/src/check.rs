@@ -1,6 +1,6 @@
 //! For CI: compares what is committed with what the sources give, and holds budgets.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
@@ -307,9 +307,23 @@ fn extra(folder: &Folder, generated: &Generated) -> Result<Vec<String>> {
     Ok(extra)
 }
 
+/// Most lines of differences that a report prints; files beyond that are named only.
+const MAX_LINES: usize = 400;
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (mut room, mut told) = (MAX_LINES, BTreeSet::new());
         for changed in &self.changed {
+            // What is wrong with a folder is wrong with each of its files.
+            if !told.insert(changed.diff.as_str()) {
+                continue;
+            }
+            let lines = changed.diff.lines().count();
+            if lines > room {
+                writeln!(f, "changed: {}, {lines} lines of differences", changed.file)?;
+                continue;
+            }
+            room -= lines;
             writeln!(f, "{}", changed.diff)?;
         }
         if self.stopped {

@@ -33,11 +33,19 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
         read.extend(args.frame.scene.as_deref());
         drop(Output::create(file, &read)?);
     }
-    if args.form == Form::Kernels && !args.functions.is_empty() {
-        return Err(Failure::input(
-            "--function: it is for libraries, and shaders have kernels",
-            "Add --form functions, or choose kernels with --kernel.",
-        ));
+    if args.form == Form::Kernels {
+        if !args.functions.is_empty() {
+            return Err(Failure::input(
+                "--function: it is for libraries, and shaders have kernels",
+                "Add --form functions, or choose kernels with --kernel.",
+            ));
+        }
+        if args.prefix.is_some() {
+            return Err(Failure::input(
+                "--prefix: it is for libraries, and shaders have the names of their kernels",
+                "Add --form functions, or leave it out.",
+            ));
+        }
     }
     #[cfg(feature = "frames")]
     match &args.frame.scene {
@@ -147,6 +155,9 @@ fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     Ok(inputs)
 }
 
+/// Most kernels without a language that are named in a line; manifest.json has them all.
+const MAX_NAMED: usize = 6;
+
 /// Prints what a build did.
 pub fn tell(args: &Build, report: &Report, quiet: bool) {
     if args.format == Format::Json {
@@ -170,6 +181,11 @@ pub fn tell(args: &Build, report: &Report, quiet: bool) {
         kernels.push(kernel.as_str());
     }
     for ((language, why), kernels) in missing {
-        say!("no {language} of {}: {why}", kernels.join(", "));
+        let (named, others) = kernels.split_at(kernels.len().min(MAX_NAMED));
+        let more = match others.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        say!("no {language} of {}{more}: {why}", named.join(", "));
     }
 }

@@ -14,6 +14,9 @@ use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
 use crate::session::built_in_manifest;
 
+/// What the names of libraries begin with, if nothing is said.
+const PREFIX: &str = "hankel";
+
 /// Translates the libraries of the crate at `manifest`, or of the built-in one, and names the files
 /// and folders that they follow from. No kernel is compiled for it.
 fn folder(
@@ -72,7 +75,8 @@ fn embedded() -> Vec<CrateText> {
 /// Writes the libraries. Gives the files and folders that they follow from.
 pub fn build(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     let manifest = args.generate.source.manifest_path.as_deref();
-    let (folder, paths) = folder(manifest, &args.prefix, &args.functions)?;
+    let prefix = args.prefix.as_deref().unwrap_or(PREFIX);
+    let (folder, paths) = folder(manifest, prefix, &args.functions)?;
     let report = folder.write(&args.out, args.force)?;
     if args.format == Format::Json {
         print::json(&report);

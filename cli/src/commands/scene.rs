@@ -96,7 +96,9 @@ pub fn places(pictures: &[PathBuf], inputs: &[PathBuf]) -> Result<Vec<Output>> {
     fn paths(all: &[PathBuf]) -> Vec<&Path> {
         all.iter().map(PathBuf::as_path).collect()
     }
-    Ok(output::create_all(&paths(pictures), &paths(inputs))?)
+    let outputs = output::create_all(&paths(pictures), &paths(inputs))?;
+    pictures.iter().try_for_each(|it| check_name(it))?;
+    Ok(outputs)
 }
 
 /// Writes pictures to the places made for them.
@@ -111,6 +113,19 @@ pub fn save<const N: usize>(pictures: [&Picture; N], outputs: Vec<Output>) -> Re
 pub fn is_exr(out: &Path) -> bool {
     out.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+}
+
+/// Refuses the name of a picture that would be a PNG file with another extension. A name without one may be a
+/// device's.
+fn check_name(out: &Path) -> Result<()> {
+    let extension = out.extension().unwrap_or_default().to_string_lossy();
+    if matches!(extension.to_ascii_lowercase().as_str(), "png" | "exr" | "") {
+        return Ok(());
+    }
+    Err(Failure::input(
+        format!("{}: there are no `.{extension}` pictures", out.display()),
+        "Name a file .png, or .exr for linear light in floats.",
+    ))
 }
 
 /// `scan.png` and `vulkan` to `scan-vulkan.png`.

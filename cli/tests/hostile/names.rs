@@ -165,3 +165,59 @@ fn a_file_where_a_folder_belongs_is_misuse() {
     desk.hankel("new file/crate-of-mine").code(2);
     assert_eq!(desk.read("file"), "");
 }
+
+/// An option or a key that does nothing is not passed over.
+#[test]
+fn what_would_do_nothing_is_refused() {
+    const MODEL: &str = "{\"asset\":{\"version\":\"3.0\"}}";
+    let desk = Desk::new();
+    let scene = |light: &str| {
+        format!(
+            "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\ntarget = [0.0, 0.5, 0.0]\n\
+             [light]\ndirection = [-1.0, -2.0, -1.0]\n{light}[output]\nwidth = 16\nheight = 9\n"
+        )
+    };
+    desk.write("scene.toml", scene(""));
+    desk.write("shape.toml", scene("shape = \"square\"\n"));
+    desk.write("model.gltf", MODEL);
+    let model = scene("").replace("procedural = \"box\"", "model = \"model.gltf\"");
+    desk.write("model.toml", model);
+    for (line, words) in [
+        (
+            "build --out s --kernel vsm --prefix own",
+            ["--prefix", "--form functions"],
+        ),
+        (
+            "render scene.toml --out p.jpg",
+            ["p.jpg", "Name a file .png"],
+        ),
+        ("render shape.toml --out p.png", ["light.shape", "radius"]),
+        (
+            "render model.toml --out p.png",
+            ["glTF version is 3.0", "model.gltf"],
+        ),
+    ] {
+        desk.hankel(line).fails(2, &words);
+    }
+    assert!(!desk.path("s").exists() && !desk.path("p.jpg").exists());
+}
+
+/// A folder of which the own record is damaged: the cause comes first, and differences are cut.
+#[test]
+fn a_damaged_manifest_is_told_in_a_page() {
+    let desk = Desk::new();
+    desk.hankel("build --out s --kernel vsm").code(0);
+    desk.write("s/manifest.json", "{");
+    let done = desk.hankel("check s");
+    done.code(1);
+    assert!(done.err().contains("manifest.json"), "{}", done.err());
+    assert!(
+        done.err().contains("a build without options"),
+        "{}",
+        done.err()
+    );
+    assert!(done.out().len() < 200_000, "{} bytes", done.out().len());
+    assert!(done.out().contains("\nmissing: "), "{}", done.out());
+    let whole = desk.hankel("check s --format json");
+    assert!(whole.code(1).out().len() > done.out().len());
+}

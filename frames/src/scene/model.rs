@@ -92,6 +92,13 @@ impl Loader<'_> {
         let Gltf { document, mut blob } =
             Gltf::from_slice_without_validation(bytes).map_err(bad)?;
         let root = document.into_json();
+        let least = root.asset.min_version.as_deref();
+        let version = least.unwrap_or(&root.asset.version);
+        if version.split('.').next() != Some("2") {
+            return self.fail(format!(
+                "its glTF version is {version}, and only 2 can be read"
+            ));
+        }
         // The validation that comes next takes this for granted.
         for (i, mesh) in root.meshes.iter().enumerate() {
             let attributes = mesh.primitives.iter().flat_map(|p| p.attributes.values());

@@ -484,6 +484,14 @@ impl Reader<'_> {
 
     fn light(&self, l: LightText) -> Result<Light> {
         let direction = self.direction("light.direction", &l.direction)?;
+        if let (Some(shape), None) = (&l.shape, &l.radius) {
+            let allowed = "left out: a light without a `radius` is a point";
+            let name = match shape.get_ref() {
+                AreaShape::Disc => "disc",
+                AreaShape::Square => "square",
+            };
+            return self.refuse(shape.span(), "light.shape", name, allowed);
+        }
         // As an angle, or as a length.
         let widest = match l.position {
             None => Area::MAX_RADIUS,
