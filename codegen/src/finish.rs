@@ -13,8 +13,8 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, canonical, exact, libm, names, order, parts, references, refused, split, tables,
-    trim, uniform,
+    self, bounds, canonical, exact, libm, names, narrow, order, parts, references, refused, split,
+    tables, trim, uniform,
 };
 use crate::translate::reading;
 
@@ -48,10 +48,14 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     // Of what cannot be read, spirv-val says more.
     let mut module =
         spirv::load(&words, name).or_else(|unread| validate(&words, name).and(Err(unread)))?;
+    let place = Some(format!("{}:{}", kernel.file, kernel.line));
+    narrow::widen(&mut module, name).map_err(|failure| Failure {
+        construct: failure.construct.clone().or_else(|| place.clone()),
+        ..failure
+    })?;
     // What is left may be resolved by spirv-opt, unless it is invalid.
     let (has_references, left) = references::resolve(&mut module, name);
     validate(&spirv::store(&module), name).map_err(|invalid| left.unwrap_or(invalid))?;
-    let place = Some(format!("{}:{}", kernel.file, kernel.line));
     refused::check(&module, name).map_err(|failure| Failure {
         construct: failure.construct.clone().or_else(|| place.clone()),
         ..failure

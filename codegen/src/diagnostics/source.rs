@@ -420,7 +420,7 @@ fn is_own(path: &syn::Path) -> bool {
         })
 }
 
-const WIDTHS: [&str; 6] = ["u8", "i8", "u16", "i16", "u128", "i128"];
+const WIDTHS: [&str; 2] = ["u128", "i128"];
 
 impl<'ast> Visit<'ast> for Body {
     fn visit_expr_call(&mut self, call: &'ast syn::ExprCall) {
@@ -606,9 +606,9 @@ mod tests {
              fn even(n: u32) -> bool { n == 0 || odd(n - 1) }\n\
              fn odd(n: u32) -> bool { n != 0 && even(n - 1) }\n\
              fn shape(s: &dyn Shape) -> f32 { s.at(1.0) }\n\
-             fn bytes(x: u32) -> u32 { x as u8 as u32 }\n\
+             fn bytes(x: u32) -> u32 { x as u128 as u32 }\n\
              fn call(f: fn(f32) -> f32) -> f32 { f(1.0) }\n\
-             fn never(x: u8) -> u8 { never(x) }\n\
+             fn never(x: u128) -> u128 { never(x) }\n\
              #[kernel(compute)]\n\
              fn k(n: u32) -> f32 { if even(n) { TABLE[0] } else { shape(&S) + call(g) + bytes(n) as f32 } }\n\
              kernels![k];",
@@ -620,7 +620,7 @@ mod tests {
                 "2:37 `even` calls itself, and a shader has no stack to do so",
                 "3:36 `odd` calls itself, and a shader has no stack to do so",
                 "4:14 a shader has no trait objects: which function is called must be known",
-                "5:32 shaders have no `u8`: they compute with 32 bits, and some with 64",
+                "5:32 shaders have no `u128`: they compute with 32 bits, and some with 64",
                 "6:12 a shader has no function pointers: which function is called must be known",
             ]
         );

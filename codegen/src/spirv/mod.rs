@@ -8,6 +8,7 @@ pub mod exact;
 pub mod libm;
 pub(crate) mod lines;
 pub mod names;
+pub(crate) mod narrow;
 pub mod order;
 pub mod parts;
 pub(crate) mod references;

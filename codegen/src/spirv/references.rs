@@ -223,11 +223,13 @@ struct Edits {
     zeros: HashMap<Word, Word>,
 }
 
+/// What makes an id, and in the function its block and its place there.
+type Made<'a> = (&'a Instruction, Option<(usize, usize)>);
+
 struct Resolver<'a> {
     function: &'a Function,
     pointers: &'a HashSet<Word>,
-    /// What makes an id, and in the function its block and its place there.
-    made: HashMap<Word, (&'a Instruction, Option<(usize, usize)>)>,
+    made: HashMap<Word, Made<'a>>,
     sources: Vec<Source>,
     known: HashMap<(Word, Vec<u32>), usize>,
     edits: Edits,
@@ -552,9 +554,12 @@ mod tests {
         index: Word,
     }
 
+    /// What a branch chooses.
+    type Arm = dyn Fn(&mut Builder, &Given) -> Word;
+
     /// `if c { left } else { right }`, and what `after` makes of both.
     fn module(
-        arms: [&dyn Fn(&mut Builder, &Given) -> Word; 2],
+        arms: [&Arm; 2],
         of: impl Fn(&Given) -> Word,
         after: impl FnOnce(&mut Builder, &Given, Word) -> Word,
     ) -> Module {

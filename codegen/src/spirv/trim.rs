@@ -28,7 +28,10 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 15] = [
+pub const ENABLED: [Capability; 17] = [
+    // `narrow` leaves no such number.
+    Capability::Int8,
+    Capability::Int16,
     Capability::Float64,
     Capability::Int64,
     Capability::ImageQuery,

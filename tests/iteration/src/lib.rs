@@ -4,6 +4,7 @@
 #![allow(
     clippy::manual_contains,
     clippy::manual_is_multiple_of,
+    clippy::unnecessary_sort_by,
     reason = "the closures of `any` and `find` are what is tested"
 )]
 
@@ -11,8 +12,10 @@ use hankel_dsl::glam::{IVec4, UVec4, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
 
 mod idioms;
+mod integers;
 
 use idioms::*;
+use integers::*;
 
 hankel_dsl::kernels![
     walked,
@@ -44,6 +47,11 @@ hankel_dsl::kernels![
     checked,
     wide_bits,
     mirrored,
+    raised,
+    ranked,
+    answered,
+    small,
+    skipped,
 ];
 
 /// Four numbers four times: by reference in two ways, by value, and from the end.
