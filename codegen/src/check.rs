@@ -371,3 +371,31 @@ impl fmt::Display for Report {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_told_once_and_within_a_page() {
+        let changed = |file: &str, diff: String| Changed {
+            file: file.into(),
+            diff,
+        };
+        let report = Report {
+            changed: vec![
+                changed("wgsl/a.wgsl", "wgsl is a symbolic link\n".into()),
+                changed("wgsl/b.wgsl", "wgsl is a symbolic link\n".into()),
+                changed("hlsl/a.hlsl", "-line\n".repeat(MAX_LINES)),
+                changed("hlsl/b.hlsl", "+line\n".into()),
+            ],
+            ..Report::default()
+        };
+        let told = report.to_string();
+        assert_eq!(told.matches("wgsl is a symbolic link").count(), 1);
+        assert_eq!(told.matches("-line").count(), 0);
+        assert!(told.contains("changed: hlsl/a.hlsl, 400 lines of differences\n"));
+        assert!(told.contains("+line\n"));
+        assert!(told.contains("4 changed"));
+    }
+}

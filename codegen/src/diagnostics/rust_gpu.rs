@@ -57,7 +57,7 @@ fn file_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
 }
 
 /// What messages are known: words that they contain, and what to write instead.
-const KNOWN: [(&[&str], &str); 27] = [
+const KNOWN: [(&[&str], &str); 23] = [
     (
         &["cannot offset a pointer"],
         "a shader cannot walk through memory by pointer, as `windows` and `chunks` do: count an \
@@ -137,22 +137,6 @@ const KNOWN: [(&[&str], &str); 27] = [
     (
         &["VTable"],
         "a shader has no trait objects: take `impl Trait` or a type parameter, or match on an enum",
-    ),
-    (
-        &["`u8`"],
-        "shaders compute with 32 bits: write `u32`, and `& 0xff` where the width matters",
-    ),
-    (
-        &["`i8`"],
-        "shaders compute with 32 bits: write `i32`, and shifts where the width matters",
-    ),
-    (
-        &["`u16`"],
-        "shaders compute with 32 bits: write `u32`, and `& 0xffff` where the width matters",
-    ),
-    (
-        &["`i16`"],
-        "shaders compute with 32 bits: write `i32`, and shifts where the width matters",
     ),
     (
         &["128"],

@@ -27,8 +27,8 @@ struct Known {
     narrow: HashMap<Word, Narrow>,
     /// Bits and sign of all types of integers.
     integers: HashMap<Word, (u32, bool)>,
-    /// Types of truths.
-    truths: HashSet<Word>,
+    /// Types of booleans.
+    booleans: HashSet<Word>,
     /// Types of values.
     types: HashMap<Word, Word>,
 }
@@ -57,15 +57,15 @@ impl Known {
             .filter(|it| op(it) == Op::TypeInt)
             .filter_map(|it| Some((it.result_id?, (literal(it, 0)?, literal(it, 1)? == 1))))
             .collect();
-        let truths = module.types_global_values.iter();
-        let truths = truths.filter(|it| op(it) == Op::TypeBool);
+        let booleans = module.types_global_values.iter();
+        let booleans = booleans.filter(|it| op(it) == Op::TypeBool);
         let narrow = integers
             .iter()
             .filter(|(_, (bits, _))| matches!(bits, 8 | 16));
         let narrow = narrow.map(|(&id, &(bits, signed))| (id, Narrow { id, bits, signed }));
         Self {
             narrow: narrow.collect(),
-            truths: truths.filter_map(|it| it.result_id).collect(),
+            booleans: booleans.filter_map(|it| it.result_id).collect(),
             types: module
                 .all_inst_iter()
                 .filter_map(|it| Some((it.result_id?, it.result_type?)))
@@ -136,9 +136,23 @@ impl Known {
                 }
             }
         }
+        let is_cast_whole = |it: &Instruction| {
+            let from = id(it, 0).and_then(|from| self.types.get(&from));
+            let types = [from, it.result_type.as_ref()].into_iter().flatten();
+            let mut held = types.filter(|ty| holding.contains(ty));
+            op(it) == Op::Bitcast && held.any(|ty| !self.narrow.contains_key(ty))
+        };
         for function in &module.functions {
             for block in &function.blocks {
                 for (place, it) in block.instructions.iter().enumerate() {
+                    if is_cast_whole(it) {
+                        return Err(Failure {
+                            message: "a shader cannot cast a number to an array of bytes, or back, as `to_le_bytes` \
+                                      does: write shifts and masks, `(x >> 8) as u8`"
+                                .into(),
+                            ..fail(Lines::of(module).before(block, place), "")
+                        });
+                    }
                     if self.is_met(it) && !self.is_known(it) {
                         return Err(fail(
                             Lines::of(module).before(block, place),
@@ -153,11 +167,13 @@ impl Known {
 
     fn is_known(&self, it: &Instruction) -> bool {
         match op(it) {
-            // rust-gpu writes a truth in a byte like this. Of a vector or an array, the bits would be others.
+            // rust-gpu makes a byte of a boolean like this. Of a vector or an array, the bits would be others.
             Op::Bitcast => {
                 let from = id(it, 0).and_then(|from| self.types.get(&from).copied());
                 [from, it.result_type].iter().all(|ty| {
-                    ty.is_some_and(|ty| self.narrow.contains_key(&ty) || self.truths.contains(&ty))
+                    ty.is_some_and(|ty| {
+                        self.narrow.contains_key(&ty) || self.booleans.contains(&ty)
+                    })
                 })
             }
             Op::ExtInst => function(it).is_some(),
@@ -190,9 +206,11 @@ impl Known {
                 ((ty.id, signed), editor.integer(ty.id, number))
             })
             .collect();
-        let of_bits = made.or_else(|| id(it, 0).and_then(|from| self.of_value(from)));
-        let [zero, one] = [0, 1].map(|number| of_bits.map(|ty| editor.integer(ty.id, number)));
-        let (zero, one) = (zero.unwrap_or_default(), one.unwrap_or_default());
+        // What a boolean is as a number.
+        let byte = made.or_else(|| self.of_value(id(it, 0)?));
+        let of_boolean = byte
+            .filter(|_| op(it) == Op::Bitcast)
+            .map(|ty| [0, 1].map(|number| editor.integer(ty.id, number)));
         let set = editor.functions_set().unwrap_or_default();
         let mut steps = Sequence::new(editor, set);
         // The value of a number with this sign, whichever its type has.
@@ -227,17 +245,19 @@ impl Known {
         let given = id(it, 0).and_then(|given| self.types.get(&given));
         let given = given.and_then(|ty| self.integers.get(ty).copied());
         let value = *operands.first()?;
-        let is_truth = |value: Word| {
+        let is_boolean = |value: Word| {
             self.types
                 .get(&value)
-                .is_some_and(|ty| self.truths.contains(ty))
+                .is_some_and(|ty| self.booleans.contains(ty))
         };
         match (op(it), made) {
-            (Op::Bitcast, Some(ty)) if is_truth(value) => {
-                steps.then(Op::Select, ty.id, &[value, one, zero]);
+            (Op::Bitcast, Some(ty)) if is_boolean(value) => {
+                let [no, yes] = of_boolean?;
+                steps.then(Op::Select, ty.id, &[value, yes, no]);
             }
             (Op::Bitcast, None) => {
-                steps.then(Op::INotEqual, result_type, &[value, zero]);
+                let [no, _] = of_boolean?;
+                steps.then(Op::INotEqual, result_type, &[value, no]);
             }
             (Op::UConvert | Op::SConvert | Op::Bitcast, Some(ty)) => {
                 let (value, signed) = match given {
@@ -480,6 +500,24 @@ mod tests {
             .filter(|it| op(it) == Op::TypeInt);
         let widths: Vec<_> = widths.map(|it| literal(it, 0)).collect();
         assert_eq!(widths, [Some(32)]);
+    }
+
+    #[test]
+    fn a_number_is_not_cast_to_an_array_of_bytes() {
+        let mut b = Builder::new();
+        let [byte, word] = [8, 32].map(|bits| b.type_int(bits, 0));
+        let four = b.constant_bit32(word, 4);
+        let bytes = b.type_array(byte, four);
+        let ty = b.type_function(bytes, [word]);
+        b.begin_function(bytes, None, FunctionControl::NONE, ty)
+            .unwrap();
+        let number = b.function_parameter(word).unwrap();
+        b.begin_block(None).unwrap();
+        let cast = b.bitcast(bytes, None, number).unwrap();
+        b.ret_value(cast).unwrap();
+        b.end_function().unwrap();
+        let failure = widen(&mut b.module(), "k").unwrap_err();
+        assert!(failure.message.contains("`to_le_bytes`"), "{failure}");
     }
 
     #[test]
