@@ -14,7 +14,7 @@ use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
     self, bounds, canonical, exact, libm, names, narrow, order, parts, references, refused, split,
-    tables, trim, uniform,
+    tables, trim, undefined, uniform,
 };
 use crate::translate::reading;
 
@@ -92,6 +92,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     if kernel.rounding != Rounding::Free {
         exact::keep(&mut module);
     }
+    undefined::fill(&mut module);
     trim::debug(&mut module);
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);

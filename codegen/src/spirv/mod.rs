@@ -16,6 +16,7 @@ pub mod refused;
 pub mod split;
 pub(crate) mod tables;
 pub mod trim;
+pub(crate) mod undefined;
 pub mod uniform;
 
 use rspirv::binary::Assemble;

@@ -10,7 +10,11 @@ pub fn raised(#[element] x: UVec4) -> UVec4 {
         x.x.wrapping_pow(x.y & 31) ^ 3_u32.pow(x.z & 7),
         (x.y as i32).wrapping_pow(x.x & 15) as u32 ^ (x.z as i32 & 7).pow(2) as u32,
         x.z.isqrt() ^ x.w.checked_ilog2().unwrap_or(99),
-        x.w.trailing_zeros().pow(x.x & 3),
+        x.w.trailing_zeros().pow(x.x & 3)
+            ^ x.w
+                .checked_pow(x.x & 7)
+                .unwrap_or(x.w.saturating_pow(x.y & 7))
+            ^ (x.w as i32).saturating_pow(x.z & 7) as u32,
     )
 }
 
@@ -31,14 +35,17 @@ fn height(x: u32) -> Height {
     }
 }
 
-/// Tuples and enums in order.
+/// Tuples, arrays and enums in order.
 #[kernel(compute, threads(64))]
 pub fn ranked(#[element] x: UVec4) -> UVec4 {
     let (a, b) = (x.x & 1, x.z & 1);
     UVec4::new(
         u32::from((a, x.y) < (b, x.w)) + 2 * u32::from((a, x.y as f32) >= (b, x.w as f32)),
-        ((a, x.y, x.w).cmp(&(b, x.w, x.y)) as i32 + 1) as u32,
-        u32::from(Some(x.x & 3) < Some(x.y & 3)),
+        ((a, x.y, x.w).cmp(&(b, x.w, x.y)) as i32 + 1) as u32
+            + 3 * ([a, x.y].cmp(&[b, x.w]) as i32 + 1) as u32,
+        u32::from(Some(x.x & 3) < Some(x.y & 3))
+            + 2 * u32::from([a, x.y] < [b, x.w])
+            + 4 * u32::from([a, x.y] >= [b, x.w]),
         u32::from(height(x.x) < height(x.y)) + 2 * (height(x.z).max(height(x.w)) as u32),
     )
 }
