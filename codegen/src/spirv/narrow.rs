@@ -2,7 +2,8 @@
 //!
 //! `core` has them where an author sees none: the tag of an enum, what `<` of tuples returns, `Option<bool>`. A number
 //! of 8 or 16 bits is a number of 32 bits with the same value here: extended by its sign if its type has one, else by
-//! zeros. What may leave more bits behind is cut again. In memory that the host sees there is no such number.
+//! zeros. A mask, or two shifts, follow each operation whose result may have more bits. In memory that the host sees
+//! there is no such number.
 
 use std::collections::{HashMap, HashSet};
 

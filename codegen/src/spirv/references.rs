@@ -1,4 +1,4 @@
-//! References that are chosen while a kernel runs: `a.iter().max_by_key(…)`, `Some(&a[i])` that is taken apart again.
+//! References that are chosen while a kernel runs: `a.iter().find(…)`, `Some(&a[i])` that is taken apart again.
 //!
 //! rust-gpu leaves them as pointers in structures, and as pointers from one of several blocks (`OpPhi`). A shader has
 //! neither. Where all of them lead into one variable, the indices are chosen instead, and the pointer is made of them
