@@ -13,7 +13,7 @@ use crate::session::{Session, Words};
 
 pub fn run(args: &Args, quiet: bool) -> Result<Outcome> {
     let scene = Scene::read(&args.scene)?;
-    let choices = choices(&args.choose)?;
+    let choices = choices(&args.choose, scene.medium.is_some())?;
     let mesh = scene.mesh()?;
     let wanted = Wanted {
         error: args.error,
@@ -75,8 +75,8 @@ pub fn technique(name: &str) -> Result<&'static Technique> {
     })
 }
 
-/// What was chosen, and what there is of the rest.
-pub fn choices(args: &Choose) -> Result<Choices> {
+/// What was chosen, and what there is of the rest. Without a medium in a scene, nothing is scattered.
+pub fn choices(args: &Choose, has_medium: bool) -> Result<Choices> {
     let mut choices = of_maps(&args.maps);
     if !args.technique.is_empty() {
         let named: Result<Vec<_>> = args.technique.iter().map(|name| technique(name)).collect();
@@ -92,6 +92,18 @@ pub fn choices(args: &Choose) -> Result<Choices> {
     }
     if !args.steps.is_empty() {
         choices.steps = sorted(args.steps.clone());
+    }
+    let of_media = [
+        ("--scattering", args.scattering.is_empty()),
+        ("--steps", args.steps.is_empty()),
+    ];
+    for (option, is_missing) in of_media {
+        if !is_missing && !has_medium {
+            return Err(Failure::input(
+                format!("{option} is for scenes with a medium, and there is none"),
+                format!("Leave {option} out, or add a [medium] to the scene."),
+            ));
+        }
     }
     let mut seen = Vec::new();
     choices.techniques.retain(|t| is_new(&mut seen, t.name));

@@ -46,8 +46,9 @@ struct Bench<'a> {
 
 pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
     output::folder(&args.out)?;
-    let choices = choices(&args.choose)?;
     let subjects = subjects(args)?;
+    let has_medium = subjects.iter().any(|it| it.scene.medium.is_some());
+    let choices = choices(&args.choose, has_medium)?;
     let (device, shaders) = open(args.backend, quiet)?;
     let mut bench = Bench {
         device,
