@@ -224,7 +224,7 @@ fn frames_of_single_samples_are_all_in_webgl_2() {
             for (shader, said) in frame["shaders"].as_object().expect("shaders") {
                 let why = &said["unsupported"]["essl300"];
                 // Three targets of 16 bytes are more than every device draws into: it is computed.
-                let is_computed = name == "moments-10" && shader.starts_with("resolve");
+                let is_computed = name.starts_with("moments-10") && shader.starts_with("resolve");
                 assert_eq!(why.is_null(), !is_computed, "{name}: {shader}: {why}");
             }
             let expected = rendered(&desk, "scene.toml", "--image-passes fragment");

@@ -5,7 +5,8 @@ mod support;
 
 use std::fmt::Write;
 
-use hankel_codegen::translate::Ir;
+use hankel_codegen::Language;
+use hankel_codegen::translate::{Ir, Options, Written};
 
 const HEAD: &str = "OpCapability Shader
 OpMemoryModel Logical GLSL450
@@ -97,16 +98,68 @@ fn a_structure_of_gaps_is_refused() {
     }
 }
 
-#[test]
-fn what_would_take_the_stack_is_refused() {
-    // On a stack that is smaller than any thread's.
+/// So many conditions, each within the one before.
+fn conditions(levels: u32) -> String {
+    let mut text = "%bool = OpTypeBool
+%of_float = OpTypePointer Private %float
+%there = OpVariable %of_float Private %one
+%main = OpFunction %void None %call
+%begin = OpLabel
+%value = OpLoad %float %there
+"
+    .to_owned();
+    for i in 0..levels {
+        let _ = writeln!(
+            text,
+            "%test{i} = OpFOrdLessThan %bool %value %one
+OpSelectionMerge %end{i} None
+OpBranchConditional %test{i} %inner{i} %end{i}
+%inner{i} = OpLabel"
+        );
+    }
+    text.push_str("OpStore %there %one\n");
+    for i in (0..levels).rev() {
+        let _ = writeln!(text, "OpBranch %end{i}\n%end{i} = OpLabel");
+    }
+    text
+}
+
+/// Runs a test on a stack that is smaller than any thread's.
+fn on_a_small_stack(test: impl FnOnce() + Send + 'static) {
     let small = std::thread::Builder::new().stack_size(512 << 10);
-    let test = small.spawn(|| {
-        read(&sum(1500)).unwrap();
-        let error = read(&sum(20_000)).unwrap_err();
-        for words in ["`bound`", "levels deep", "variables"] {
+    small.spawn(test).unwrap().join().unwrap();
+}
+
+#[test]
+fn blocks_that_would_take_the_stack_are_refused() {
+    on_a_small_stack(|| {
+        read(&conditions(500)).unwrap();
+        let error = read(&conditions(3000)).unwrap_err();
+        for words in ["`bound`", "levels deep", "conditions"] {
             assert!(error.contains(words), "{error}");
         }
     });
-    test.unwrap().join().unwrap();
+}
+
+#[test]
+fn a_deep_expression_gets_variables_for_its_parts() {
+    on_a_small_stack(|| {
+        let kernel = support::bound();
+        let ir = read(&sum(20_000)).unwrap();
+        for language in [
+            Language::Wgsl,
+            Language::Hlsl,
+            Language::Msl,
+            Language::Glsl,
+            Language::Essl310,
+        ] {
+            let written = ir.write(language, &kernel, &Options::default()).unwrap();
+            let Written::Text(text) = written else {
+                panic!("{language} has no text: {written:?}");
+            };
+            let longest = text.source.lines().map(str::len).max().unwrap();
+            assert!(longest < 2000, "{language}: a line of {longest} characters");
+            assert!(text.source.matches("part").count() >= 199, "{language}");
+        }
+    });
 }

@@ -257,6 +257,7 @@ fn six_moments_give_the_same_light_and_shadow() {
 fn any_number_of_moments_gives_the_same_light_and_shadow() {
     for technique in ["moments-4", "moments-6", "moments-8", "moments-10"] {
         is_as_filtered_depths(technique);
+        is_as_filtered_depths(&format!("{technique}-compensated"));
     }
 }
 

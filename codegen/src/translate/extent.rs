@@ -6,11 +6,13 @@
 //! themselves for every level of an expression or a block, and a deep one would take their stack.
 //! All of that is refused here, with what is to blame.
 
-use naga::valid::ModuleInfo;
+use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
     AddressSpace, Arena, ArraySize, Block, Expression, Function, Handle, Module, Statement, Type,
     TypeInner,
 };
+
+use super::cleanup::with_types;
 
 /// Most numbers in the constants of a text: tens of megabytes of it.
 pub(crate) const MOST_NUMBERS: u64 = 4_000_000;
@@ -22,6 +24,9 @@ const MOST_PADDING: u32 = 64 << 10;
 /// Most levels of an expression within an expression or a block within a block: the writers' stack
 /// ([`crate::error::STACK`]) has 32 KiB for each.
 pub(crate) const MOST_LEVELS: u32 = 2000;
+
+/// An expression of more levels gets variables for its parts ([`split_expressions`]).
+const READABLE_LEVELS: u32 = 100;
 
 /// Refuses what would be too long or too deep.
 pub(super) fn check(module: &Module, info: &ModuleInfo) -> Result<(), String> {
@@ -68,7 +73,7 @@ pub(super) fn check(module: &Module, info: &ModuleInfo) -> Result<(), String> {
                 numbers.add(each.saturating_mul(uses), "a constant")?;
             }
         }
-        depth(function)?;
+        depth(function, info)?;
     }
     Ok(())
 }
@@ -159,24 +164,49 @@ fn constant_sizes(module: &Module, types: &[u64]) -> Vec<u64> {
     sizes
 }
 
-/// Refuses expressions and blocks that are nested too deeply.
-fn depth(function: &Function) -> Result<(), String> {
-    let mut depths: Vec<u32> = Vec::with_capacity(function.expressions.len());
+/// How many levels each expression has in the text. What the writers give a variable starts anew: what is
+/// used often or has a name.
+fn levels(function: &Function, info: &FunctionInfo) -> Vec<u32> {
+    let mut levels: Vec<u32> = Vec::with_capacity(function.expressions.len());
     for (_, expression) in function.expressions.iter() {
         let mut deepest = 0;
         for operand in operands(expression) {
+            let variable = function.named_expressions.contains_key(&operand)
+                || info[operand].ref_count >= function.expressions[operand].bake_ref_count();
             // Expressions refer to earlier ones.
-            deepest = deepest.max(depths.get(operand.index()).copied().unwrap_or(0));
+            let level = levels.get(operand.index()).copied().unwrap_or(0);
+            deepest = deepest.max(if variable { 1 } else { level });
         }
-        // What is stored in a variable starts anew: the writers name it.
-        let starts = matches!(
-            expression,
-            Expression::Load { .. } | Expression::CallResult(_) | Expression::LocalVariable(_)
-        );
-        depths.push(if starts { 1 } else { deepest + 1 });
+        levels.push(deepest + 1);
     }
+    levels
+}
+
+/// Names parts of expressions that are nested deeply: the writers give them variables.
+pub(super) fn split_expressions(module: &mut Module, info: &ModuleInfo) {
+    for (info, function) in with_types(&mut module.functions, &mut module.entry_points, info) {
+        let levels = levels(function, info);
+        for (handle, expression) in function.expressions.iter() {
+            let computes = matches!(
+                expression,
+                Expression::Binary { .. }
+                    | Expression::Unary { .. }
+                    | Expression::Math { .. }
+                    | Expression::Select { .. }
+                    | Expression::As { .. }
+            );
+            if computes && levels[handle.index()].is_multiple_of(READABLE_LEVELS) {
+                let name = function.named_expressions.entry(handle);
+                name.or_insert_with(|| "part".to_owned());
+            }
+        }
+    }
+}
+
+/// Refuses expressions and blocks that are nested too deeply.
+fn depth(function: &Function, info: &FunctionInfo) -> Result<(), String> {
     let mut open: Vec<(&Block, u32)> = vec![(&function.body, 1)];
-    let mut levels = depths.into_iter().max().unwrap_or(0);
+    let mut levels = levels(function, info).into_iter().max().unwrap_or(0);
     while let Some((block, level)) = open.pop() {
         levels = levels.max(level);
         for statement in block {
@@ -198,7 +228,7 @@ fn depth(function: &Function) -> Result<(), String> {
     if levels > MOST_LEVELS {
         return Err(format!(
             "it is nested {levels} levels deep, more than the {MOST_LEVELS} that can be written: \
-             put parts of the expression into variables"
+             nest fewer conditions and loops"
         ));
     }
     Ok(())

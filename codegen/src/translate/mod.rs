@@ -305,6 +305,7 @@ impl Ir {
         cleanup::restore_sampling(&mut module, &dropped.sampling);
         let check = || {
             let info = validate(&module, name)?;
+            extent::split_expressions(&mut module, &info);
             match extent::check(&module, &info) {
                 Ok(()) => Ok(info),
                 Err(message) => Err(Failure {

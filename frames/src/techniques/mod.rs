@@ -66,14 +66,18 @@ pub struct Map {
 }
 
 /// All of them.
-pub const ALL: [&Technique; 22] = [
+pub const ALL: [&Technique; 26] = [
     &hamburger::TECHNIQUE,
     &hausdorff::TECHNIQUE,
     &hamburger_6::TECHNIQUE,
     &moments::FOUR,
+    &moments::FOUR_COMPENSATED,
     &moments::SIX,
+    &moments::SIX_COMPENSATED,
     &moments::EIGHT,
+    &moments::EIGHT_COMPENSATED,
     &moments::TEN,
+    &moments::TEN_COMPENSATED,
     &trigonometric::TECHNIQUE,
     &vsm::TECHNIQUE,
     &esm::TECHNIQUE,

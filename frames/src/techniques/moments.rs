@@ -54,6 +54,46 @@ pub const TEN: Technique = Technique {
     ..FOUR
 };
 
+pub const FOUR_COMPENSATED: Technique = Technique {
+    name: "moments-4-compensated",
+    summary: "four moments, by the bound for any number in about twice the digits",
+    add: |graph, given| {
+        let kernels = ["resolve_plain", "shade_moments_4_compensated"];
+        add(graph, given, kernels, &["map"])
+    },
+    ..FOUR
+};
+
+pub const SIX_COMPENSATED: Technique = Technique {
+    name: "moments-6-compensated",
+    summary: "six moments, by the bound for any number in about twice the digits",
+    add: |graph, given| {
+        let kernels = ["resolve_plain_6", "shade_moments_6_compensated"];
+        add(graph, given, kernels, &["first", "second"])
+    },
+    ..SIX
+};
+
+pub const EIGHT_COMPENSATED: Technique = Technique {
+    name: "moments-8-compensated",
+    summary: "eight moments, by the bound for any number in about twice the digits",
+    add: |graph, given| {
+        let kernels = ["resolve_plain_8", "shade_moments_8_compensated"];
+        add(graph, given, kernels, &["first", "second"])
+    },
+    ..EIGHT
+};
+
+pub const TEN_COMPENSATED: Technique = Technique {
+    name: "moments-10-compensated",
+    summary: "ten moments, by the bound for any number in about twice the digits",
+    add: |graph, given| {
+        let kernels = ["resolve_plain_10", "shade_moments_10_compensated"];
+        add(graph, given, kernels, &["first", "second", "third"])
+    },
+    ..TEN
+};
+
 const fn map(bias: Bias) -> Map {
     Map {
         format: TexelFormat::Rgba32Float,

@@ -22,8 +22,8 @@
 //! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`halve_summed_6`](soft::halve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) |
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface), [`surface_with_plane`](mips::surface_with_plane) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_single_pcf`](shade::shade_single_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
-//! | with mip levels | [`shade_hamburger_mips`](shade::shade_hamburger_mips), [`shade_hausdorff_mips`](shade::shade_hausdorff_mips), [`shade_variance_mips`](shade::shade_variance_mips), [`shade_hamburger_6_mips`](six::shade_hamburger_6_mips), [`shade_trigonometric_mips`](trigonometric::shade_trigonometric_mips), [`shade_esm_mips`](exponential::shade_esm_mips), [`shade_evsm_mips`](exponential::shade_evsm_mips), [`shade_convolution_mips`](convolution::shade_convolution_mips), [`shade_convolution_8_mips`](convolution::shade_convolution_8_mips), [`shade_moments_4_mips`](moment_maps::shade_moments_4_mips), [`shade_moments_6_mips`](moment_maps::shade_moments_6_mips), [`shade_moments_8_mips`](moment_maps::shade_moments_8_mips), [`shade_moments_10_mips`](moment_maps::shade_moments_10_mips) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_single_pcf`](shade::shade_single_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_4_compensated`](moment_maps::shade_moments_4_compensated), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_6_compensated`](moment_maps::shade_moments_6_compensated), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_8_compensated`](moment_maps::shade_moments_8_compensated), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_moments_10_compensated`](moment_maps::shade_moments_10_compensated), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
+//! | with mip levels | [`shade_hamburger_mips`](shade::shade_hamburger_mips), [`shade_hausdorff_mips`](shade::shade_hausdorff_mips), [`shade_variance_mips`](shade::shade_variance_mips), [`shade_hamburger_6_mips`](six::shade_hamburger_6_mips), [`shade_trigonometric_mips`](trigonometric::shade_trigonometric_mips), [`shade_esm_mips`](exponential::shade_esm_mips), [`shade_evsm_mips`](exponential::shade_evsm_mips), [`shade_convolution_mips`](convolution::shade_convolution_mips), [`shade_convolution_8_mips`](convolution::shade_convolution_8_mips), [`shade_moments_4_mips`](moment_maps::shade_moments_4_mips), [`shade_moments_4_compensated_mips`](moment_maps::shade_moments_4_compensated_mips), [`shade_moments_6_mips`](moment_maps::shade_moments_6_mips), [`shade_moments_6_compensated_mips`](moment_maps::shade_moments_6_compensated_mips), [`shade_moments_8_mips`](moment_maps::shade_moments_8_mips), [`shade_moments_8_compensated_mips`](moment_maps::shade_moments_8_compensated_mips), [`shade_moments_10_mips`](moment_maps::shade_moments_10_mips), [`shade_moments_10_compensated_mips`](moment_maps::shade_moments_10_compensated_mips) |
 //! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march), [`scatter_march_spot`](scattering::scatter_march_spot) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
@@ -128,9 +128,13 @@ hankel_dsl::kernels![
     convolution::shade_convolution,
     convolution::shade_convolution_8,
     moment_maps::shade_moments_4,
+    moment_maps::shade_moments_4_compensated,
     moment_maps::shade_moments_6,
+    moment_maps::shade_moments_6_compensated,
     moment_maps::shade_moments_8,
+    moment_maps::shade_moments_8_compensated,
     moment_maps::shade_moments_10,
+    moment_maps::shade_moments_10_compensated,
     packed::shade_packed_10,
     packed::shade_packed_16,
     shade::shade_hamburger_mips,
@@ -143,9 +147,13 @@ hankel_dsl::kernels![
     convolution::shade_convolution_mips,
     convolution::shade_convolution_8_mips,
     moment_maps::shade_moments_4_mips,
+    moment_maps::shade_moments_4_compensated_mips,
     moment_maps::shade_moments_6_mips,
+    moment_maps::shade_moments_6_compensated_mips,
     moment_maps::shade_moments_8_mips,
+    moment_maps::shade_moments_8_compensated_mips,
     moment_maps::shade_moments_10_mips,
+    moment_maps::shade_moments_10_compensated_mips,
     soft::resolve_summed,
     soft::resolve_summed_6,
     soft::halve_summed,

@@ -7,7 +7,7 @@ use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
 use hankel_dsl::{Sampler, Texture2d, Texture2dMultisampled, kernel};
-use hankel_moments::{MAX_MOMENTS, bias_target, bound, mix_bias};
+use hankel_moments::{MAX_MOMENTS, bias_target, bound, bound_compensated, mix_bias};
 
 use crate::resolve::{Depths, resolves};
 use crate::shade::Light;
@@ -89,23 +89,35 @@ resolves! {
 /// [`bias_target`].
 #[inline(always)]
 fn shadow<const N: usize>(light: &Light, m: [f32; MAX_MOMENTS], z: f32) -> f32 {
-    let m = mix_bias::<f32, N>(m, bias_target::<f32, N>(), light.moment_bias);
-    bound::<f32, N>(m, 2.0 * z - 1.0).lower
+    bound::<f32, N>(biased::<N>(light, m), 2.0 * z - 1.0).lower
+}
+
+/// [`shadow`] with what is ill-conditioned in about twice the digits.
+#[inline(always)]
+fn shadow_compensated<const N: usize>(light: &Light, m: [f32; MAX_MOMENTS], z: f32) -> f32 {
+    bound_compensated::<f32, N>(biased::<N>(light, m), 2.0 * z - 1.0).lower
 }
 
 #[inline(always)]
-fn shadow_4(light: &Light, map: Vec4, z: f32) -> f32 {
+fn biased<const N: usize>(light: &Light, m: [f32; MAX_MOMENTS]) -> [f32; MAX_MOMENTS] {
+    mix_bias::<f32, N>(m, bias_target::<f32, N>(), light.moment_bias)
+}
+
+/// Moments 0 to 4 from a texel.
+#[inline(always)]
+fn moments_4(map: Vec4) -> [f32; MAX_MOMENTS] {
     let mut m = [0.0; MAX_MOMENTS];
     m[0] = 1.0;
     m[1] = map.x;
     m[2] = map.y;
     m[3] = map.z;
     m[4] = map.w;
-    shadow::<2>(light, m, z)
+    m
 }
 
+/// Moments 0 to 8 from the texels of odd and even ones.
 #[inline(always)]
-fn moments(odd: Vec4, even: Vec4) -> [f32; MAX_MOMENTS] {
+fn moments_8(odd: Vec4, even: Vec4) -> [f32; MAX_MOMENTS] {
     let mut m = [0.0; MAX_MOMENTS];
     m[0] = 1.0;
     m[1] = odd.x;
@@ -119,30 +131,66 @@ fn moments(odd: Vec4, even: Vec4) -> [f32; MAX_MOMENTS] {
     m
 }
 
+/// Moments 0 to 10.
 #[inline(always)]
-fn shadow_6(light: &Light, odd: Vec4, even: Vec4, z: f32) -> f32 {
-    shadow::<3>(light, moments(odd, even), z)
-}
-
-#[inline(always)]
-fn shadow_8(light: &Light, odd: Vec4, even: Vec4, z: f32) -> f32 {
-    shadow::<4>(light, moments(odd, even), z)
-}
-
-#[inline(always)]
-fn shadow_10(light: &Light, odd: Vec4, even: Vec4, last: Vec4, z: f32) -> f32 {
-    let mut m = moments(odd, even);
+fn moments_10(odd: Vec4, even: Vec4, last: Vec4) -> [f32; MAX_MOMENTS] {
+    let mut m = moments_8(odd, even);
     m[9] = last.x;
     m[10] = last.y;
-    shadow::<5>(light, m, z)
+    m
 }
 
-shading! {
+/// Shading by a bound of the moments in a texel of each texture: plain and compensated, without and with mip levels.
+macro_rules! shadings {
+    (
+        $n:literal, $moments:ident($($map:ident),*), inputs($inputs:ident);
+        $of:ident:
+        $(#[$doc:meta])* $shade:ident,
+        $(#[$mips_doc:meta])* $mips:ident;
+        $compensated:ident:
+        $(#[$shade_compensated_doc:meta])* $shade_compensated:ident,
+        $(#[$mips_compensated_doc:meta])* $mips_compensated:ident;
+        $($how:tt)*
+    ) => {
+        #[inline(always)]
+        fn $of(light: &Light, $($map: Vec4,)* z: f32) -> f32 {
+            shadow::<$n>(light, $moments($($map),*), z)
+        }
+
+        #[inline(always)]
+        fn $compensated(light: &Light, $($map: Vec4,)* z: f32) -> f32 {
+            shadow_compensated::<$n>(light, $moments($($map),*), z)
+        }
+
+        shading! {
+            $(#[$doc])* $shade,
+            $(#[$mips_doc])* $mips,
+            $of($($map),*), inputs($inputs), uniforms(), constants(),
+            $($how)*
+        }
+
+        shading! {
+            $(#[$shade_compensated_doc])* $shade_compensated,
+            $(#[$mips_compensated_doc])* $mips_compensated,
+            $compensated($($map),*), inputs($inputs), uniforms(), constants(),
+            $($how)*
+        }
+    };
+}
+
+shadings! {
+    2, moments_4(map), inputs(moments_4);
+    shadow_4:
     /// Shading with the least shadow that four moments allow.
     shade_moments_4,
     /// Shading with the least shadow that four moments allow, with mip levels.
-    shade_moments_4_mips,
-    shadow_4(map), inputs(moments_4), uniforms(), constants(),
+    shade_moments_4_mips;
+    shadow_4_compensated:
+    /// Shading with the least shadow that four moments allow, with what is ill-conditioned in about twice the digits.
+    shade_moments_4_compensated,
+    /// Shading with the least shadow that four moments allow, with what is ill-conditioned in about twice the digits,
+    /// and with mip levels.
+    shade_moments_4_compensated_mips;
     pinned, parity(
         ulp = 0,
         absolute = 2e-3,
@@ -150,12 +198,19 @@ shading! {
     )
 }
 
-shading! {
+shadings! {
+    3, moments_8(first, second), inputs(moments_6);
+    shadow_6:
     /// Shading with the least shadow that six moments allow.
     shade_moments_6,
     /// Shading with the least shadow that six moments allow, with mip levels.
-    shade_moments_6_mips,
-    shadow_6(first, second), inputs(moments_6), uniforms(), constants(),
+    shade_moments_6_mips;
+    shadow_6_compensated:
+    /// Shading with the least shadow that six moments allow, with what is ill-conditioned in about twice the digits.
+    shade_moments_6_compensated,
+    /// Shading with the least shadow that six moments allow, with what is ill-conditioned in about twice the digits,
+    /// and with mip levels.
+    shade_moments_6_compensated_mips;
     pinned, parity(
         ulp = 0,
         absolute = 1.7e-3,
@@ -163,12 +218,19 @@ shading! {
     )
 }
 
-shading! {
+shadings! {
+    4, moments_8(first, second), inputs(moments_8);
+    shadow_8:
     /// Shading with the least shadow that eight moments allow.
     shade_moments_8,
     /// Shading with the least shadow that eight moments allow, with mip levels.
-    shade_moments_8_mips,
-    shadow_8(first, second), inputs(moments_8), uniforms(), constants(),
+    shade_moments_8_mips;
+    shadow_8_compensated:
+    /// Shading with the least shadow that eight moments allow, with what is ill-conditioned in about twice the digits.
+    shade_moments_8_compensated,
+    /// Shading with the least shadow that eight moments allow, with what is ill-conditioned in about twice the digits,
+    /// and with mip levels.
+    shade_moments_8_compensated_mips;
     pinned, parity(
         ulp = 0,
         absolute = 8e-4,
@@ -176,12 +238,19 @@ shading! {
     )
 }
 
-shading! {
+shadings! {
+    5, moments_10(first, second, third), inputs(moments_10);
+    shadow_10:
     /// Shading with the least shadow that ten moments allow.
     shade_moments_10,
     /// Shading with the least shadow that ten moments allow, with mip levels.
-    shade_moments_10_mips,
-    shadow_10(first, second, third), inputs(moments_10), uniforms(), constants(),
+    shade_moments_10_mips;
+    shadow_10_compensated:
+    /// Shading with the least shadow that ten moments allow, with what is ill-conditioned in about twice the digits.
+    shade_moments_10_compensated,
+    /// Shading with the least shadow that ten moments allow, with what is ill-conditioned in about twice the digits,
+    /// and with mip levels.
+    shade_moments_10_compensated_mips;
     pinned, parity(
         ulp = 0,
         absolute = 5e-4,

@@ -42,4 +42,4 @@ pub use rounding::{ROUNDED, name_results, name_roundings};
 pub use sampling::restore_sampling;
 pub use shapes::{constant_indices, drop_last_return};
 pub use values::{name_phis, name_values};
-pub(crate) use walk::{each_statement, each_within};
+pub(crate) use walk::{each_statement, each_within, with_types};
