@@ -118,20 +118,17 @@ fn lanes_and_threads_change_no_bit() {
         .collect();
     let mut reference = vec![Row { a: 0.0, b: 0.0 }; rows.len()];
     run_root(&rows, &mut reference, Mode::REFERENCE).unwrap();
-    for lanes in [false, true] {
-        for parallel in [false, true] {
-            let mut out = vec![Row { a: 0.0, b: 0.0 }; rows.len()];
-            run_root(
-                &rows,
-                &mut out,
-                Mode {
-                    lanes,
-                    parallel,
-                    ..Mode::REFERENCE
-                },
-            )
-            .unwrap();
-            assert_eq!(bytes(&out), bytes(&reference));
+    // Fewer than any group of lanes, one more than a group of most, several chunks.
+    for count in [3, 33, rows.len()] {
+        for (lanes, parallel) in [(false, false), (false, true), (true, false), (true, true)] {
+            let mut out = vec![Row { a: 0.0, b: 0.0 }; count];
+            let mode = Mode {
+                lanes,
+                parallel,
+                ..Mode::REFERENCE
+            };
+            run_root(&rows[..count], &mut out, mode).unwrap();
+            assert_eq!(bytes(&out), bytes(&reference[..count]));
         }
     }
     assert_eq!(reference[0].a, 1.7_f32.sqrt());

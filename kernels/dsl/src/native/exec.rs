@@ -19,6 +19,7 @@ use super::describe::{self, TexelAccess, TexelFormat, TextureKind};
 use super::fragment;
 use super::lanes::{self, Scalar, on_level};
 use super::layout::Lane;
+use super::pairs::Pair;
 use super::sanitize::{self, Access, Space};
 use crate::math::Elementary;
 use crate::{Real, Texel};
@@ -667,12 +668,14 @@ pub trait LaneBody: Sync {
 pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Result<(), CallError> {
     let level = if mode.lanes { lanes::level() } else { None };
     for_elements(mode, out, &|start, chunk| {
-        let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), 0);
-        scalar_chunk(start + done, &mut chunk[done..], body);
+        let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), false);
+        if !done {
+            scalar_chunk(start, chunk, body);
+        }
     })
 }
 
-/// What lanes leave over, or everything. One copy for all instruction sets: compiling a kernel's
+/// What is too short for lanes, or everything. One copy for all instruction sets: compiling a kernel's
 /// body is what a build of kernels spends its time on.
 #[inline(never)]
 fn scalar_chunk<B: LaneBody>(start: usize, chunk: &mut [B::Out], body: &B) {
@@ -681,23 +684,32 @@ fn scalar_chunk<B: LaneBody>(start: usize, chunk: &mut [B::Out], body: &B) {
     }
 }
 
-/// Fills as much of `chunk` as whole groups of lanes do; gives how much that is.
+/// The lanes that a kernel's body runs on.
+type Group<B, S> = Pair<<<B as LaneBody>::Scalar as Scalar>::Lanes<S>>;
+
+/// Fills `chunk` by groups of lanes. Not where it is shorter than one group; it says so.
 #[inline(always)]
 fn lane_chunk<S: Simd, B: LaneBody>(
     _simd: S,
     start: usize,
     chunk: &mut [B::Out],
     body: &B,
-) -> usize {
-    let lanes = <B::Scalar as Scalar>::Lanes::<S>::LANES;
+) -> bool {
+    let lanes = Group::<B, S>::LANES;
+    let Some(last) = chunk.len().checked_sub(lanes) else {
+        return false;
+    };
     // Once, not for each group: the compiler cannot know that storing a result leaves them alone.
-    let uniforms = body.uniforms::<<B::Scalar as Scalar>::Lanes<S>>();
+    let uniforms = body.uniforms::<Group<B, S>>();
     let mut done = 0;
-    for group in chunk.chunks_exact_mut(lanes) {
-        body.many::<<B::Scalar as Scalar>::Lanes<S>>(&uniforms, start + done, group);
-        done += lanes;
+    while done < chunk.len() {
+        // The last group begins early enough to be whole: some results are computed twice.
+        let first = done.min(last);
+        let group = &mut chunk[first..first + lanes];
+        body.many::<Group<B, S>>(&uniforms, start + first, group);
+        done = first + lanes;
     }
-    done
+    true
 }
 
 /// All channels of a texel, as a texture stores them.

@@ -496,6 +496,7 @@ pub(crate) mod tests {
     use fearless_simd::dispatch;
 
     use super::*;
+    use crate::native::pairs::Pair;
 
     /// Numbers of `bits` bits whose exponents go from `low` to `high`: powers of two, their
     /// neighbours, few bits, all bits, random bits, both signs; and both zeros.
@@ -566,6 +567,8 @@ pub(crate) mod tests {
             fn both<S: Simd>(_: S, single: &(Vec<f32>, Vec<f32>), double: &(Vec<f64>, Vec<f64>)) {
                 agree::<F32s<S>>(&single.0, &single.1, |x| x.to_bits().into());
                 agree::<F64s<S>>(&double.0, &double.1, f64::to_bits);
+                agree::<Pair<F32s<S>>>(&single.0, &single.1, |x| x.to_bits().into());
+                agree::<Pair<F64s<S>>>(&double.0, &double.1, f64::to_bits);
             }
             dispatch!(level, simd => both(simd, &single, &double));
         }
@@ -606,6 +609,8 @@ pub(crate) mod tests {
             fn both<S: Simd>(_: S, single: &[f32], double: &[f64]) {
                 smaller_and_larger::<F32s<S>>(single, |x| x.to_bits().into());
                 smaller_and_larger::<F64s<S>>(double, f64::to_bits);
+                smaller_and_larger::<Pair<F32s<S>>>(single, |x| x.to_bits().into());
+                smaller_and_larger::<Pair<F64s<S>>>(double, f64::to_bits);
             }
             dispatch!(level, simd => both(simd, &single, &double));
         }

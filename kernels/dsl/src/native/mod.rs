@@ -12,6 +12,7 @@ pub mod inputs;
 #[doc(hidden)]
 pub mod lanes;
 pub mod layout;
+mod pairs;
 pub mod plugin;
 pub(crate) mod sampling;
 pub mod sanitize;
