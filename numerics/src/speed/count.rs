@@ -2,6 +2,7 @@
 //! come from. Counted is what the results depend on, as a compiler would leave it: nothing that no
 //! result needs, nothing twice, and no arithmetic with constants alone.
 
+use std::array;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
@@ -225,28 +226,38 @@ fn traced(f: impl FnOnce()) -> Operations {
     operations
 }
 
-/// A number that remembers what it comes from, on the thread where it was made. Its operations are calls: kernels are
+/// Rows that run together: as many as lanes of AVX-512 take at once in `f32`. A loop goes on until the last of
+/// them is done, and its operations are done for all.
+pub const TOGETHER: usize = 32;
+
+/// Lanes that remember what they come from, on the thread where they were made. Their operations are calls: kernels are
 /// inlined wholly, and with operations of this size in them were half of this crate's code.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<P> {
-    /// The value.
-    pub value: P,
+    /// The values.
+    pub values: [P; TOGETHER],
     number: u32,
 }
 
 /// The result of comparing such numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct CountedMask {
-    value: bool,
+    values: [bool; TOGETHER],
     number: u32,
 }
 
 impl<P: Format> Counted<P> {
-    /// A number from outside.
+    /// A number from outside, the same in all lanes.
     #[must_use]
     pub fn input(value: P) -> Self {
+        Self::inputs([value; TOGETHER])
+    }
+
+    /// A number from outside for each lane.
+    #[must_use]
+    pub fn inputs(values: [P; TOGETHER]) -> Self {
         Self {
-            value,
+            values,
             number: input(),
         }
     }
@@ -255,21 +266,31 @@ impl<P: Format> Counted<P> {
     fn fixed(value: P) -> Self {
         let kind = Kind::Constant(value.widen().to_bits());
         Self {
-            value,
+            values: [value; TOGETHER],
             number: node(kind, &[], || kind),
         }
     }
 
-    #[inline(never)]
-    fn of(value: P, kind: Kind, operands: &[u32]) -> Self {
-        let number = node(kind, operands, || Kind::Constant(value.widen().to_bits()));
-        Self { value, number }
+    fn each(self, f: impl Fn(P) -> P) -> [P; TOGETHER] {
+        self.values.map(f)
     }
 
-    fn compared(value: bool, kind: Kind, operands: &[u32]) -> CountedMask {
+    fn with<T>(self, o: Self, f: impl Fn(P, P) -> T) -> [T; TOGETHER] {
+        array::from_fn(|i| f(self.values[i], o.values[i]))
+    }
+
+    #[inline(never)]
+    fn of(values: [P; TOGETHER], kind: Kind, operands: &[u32]) -> Self {
+        // Where all operands are constants, all lanes are alike.
+        let constant = || Kind::Constant(values[0].widen().to_bits());
+        let number = node(kind, operands, constant);
+        Self { values, number }
+    }
+
+    fn compared(values: [bool; TOGETHER], kind: Kind, operands: &[u32]) -> CountedMask {
         CountedMask {
-            value,
-            number: node(kind, operands, || Kind::Truth(value)),
+            values,
+            number: node(kind, operands, || Kind::Truth(values[0])),
         }
     }
 
@@ -278,33 +299,47 @@ impl<P: Format> Counted<P> {
     }
 }
 
+impl CountedMask {
+    fn with(self, o: Self, f: impl Fn(bool, bool) -> bool) -> [bool; TOGETHER] {
+        array::from_fn(|i| f(self.values[i], o.values[i]))
+    }
+}
+
 impl BitAnd for CountedMask {
     type Output = Self;
     fn bitand(self, o: Self) -> Self {
-        Counted::<f32>::compared(self.value & o.value, Kind::And, &[self.number, o.number])
+        Counted::<f32>::compared(
+            self.with(o, |a, b| a & b),
+            Kind::And,
+            &[self.number, o.number],
+        )
     }
 }
 
 impl BitOr for CountedMask {
     type Output = Self;
     fn bitor(self, o: Self) -> Self {
-        Counted::<f32>::compared(self.value | o.value, Kind::Or, &[self.number, o.number])
+        Counted::<f32>::compared(
+            self.with(o, |a, b| a | b),
+            Kind::Or,
+            &[self.number, o.number],
+        )
     }
 }
 
 impl Not for CountedMask {
     type Output = Self;
     fn not(self) -> Self {
-        Counted::<f32>::compared(!self.value, Kind::Not, &[self.number])
+        Counted::<f32>::compared(self.values.map(|a| !a), Kind::Not, &[self.number])
     }
 }
 
 impl Mask for CountedMask {
     fn any(self) -> bool {
-        self.value
+        self.values.contains(&true)
     }
     fn all(self) -> bool {
-        self.value
+        !self.values.contains(&false)
     }
 }
 
@@ -312,7 +347,11 @@ impl<P: Format> Add for Counted<P> {
     type Output = Self;
     #[inline(never)]
     fn add(self, o: Self) -> Self {
-        Self::of(self.value + o.value, Kind::Sum, &[self.number, o.number])
+        Self::of(
+            self.with(o, |a, b| a + b),
+            Kind::Sum,
+            &[self.number, o.number],
+        )
     }
 }
 
@@ -324,7 +363,7 @@ impl<P: Format> Sub for Counted<P> {
             return self;
         }
         Self::of(
-            self.value - o.value,
+            self.with(o, |a, b| a - b),
             Kind::Difference,
             &[self.number, o.number],
         )
@@ -342,7 +381,7 @@ impl<P: Format> Mul for Counted<P> {
             return self;
         }
         Self::of(
-            self.value * o.value,
+            self.with(o, |a, b| a * b),
             Kind::Product,
             &[self.number, o.number],
         )
@@ -360,7 +399,7 @@ impl<P: Format> Div for Counted<P> {
                 self * Self::fixed(P::round(1.0 / c))
             }
             _ => Self::of(
-                self.value / o.value,
+                self.with(o, |a, b| a / b),
                 Kind::Quotient,
                 &[self.number, o.number],
             ),
@@ -372,7 +411,7 @@ impl<P: Format> Neg for Counted<P> {
     type Output = Self;
     #[inline(never)]
     fn neg(self) -> Self {
-        Self::of(-self.value, Kind::Negative, &[self.number])
+        Self::of(self.each(|x| -x), Kind::Negative, &[self.number])
     }
 }
 
@@ -402,20 +441,20 @@ impl<P: Format> Real for Counted<P> {
     }
     #[inline(never)]
     fn sqrt(self) -> Self {
-        Self::of(self.value.sqrt(), Kind::Root, &[self.number])
+        Self::of(self.each(P::sqrt), Kind::Root, &[self.number])
     }
     #[inline(never)]
     fn abs(self) -> Self {
-        Self::of(self.value.abs(), Kind::Magnitude, &[self.number])
+        Self::of(self.each(P::abs), Kind::Magnitude, &[self.number])
     }
     #[inline(never)]
     fn floor(self) -> Self {
-        Self::of(self.value.floor(), Kind::Floor, &[self.number])
+        Self::of(self.each(P::floor), Kind::Floor, &[self.number])
     }
     #[inline(never)]
     fn min(self, o: Self) -> Self {
         Self::of(
-            self.value.min(o.value),
+            self.with(o, |a, b| a.min(b)),
             Kind::Least,
             &[self.number, o.number],
         )
@@ -423,19 +462,23 @@ impl<P: Format> Real for Counted<P> {
     #[inline(never)]
     fn max(self, o: Self) -> Self {
         Self::of(
-            self.value.max(o.value),
+            self.with(o, |a, b| a.max(b)),
             Kind::Greatest,
             &[self.number, o.number],
         )
     }
     #[inline(never)]
     fn lt(self, o: Self) -> CountedMask {
-        Self::compared(self.value.lt(o.value), Kind::Less, &[self.number, o.number])
+        Self::compared(
+            self.with(o, |a, b| a.lt(b)),
+            Kind::Less,
+            &[self.number, o.number],
+        )
     }
     #[inline(never)]
     fn le(self, o: Self) -> CountedMask {
         Self::compared(
-            self.value.le(o.value),
+            self.with(o, |a, b| a.le(b)),
             Kind::AtMost,
             &[self.number, o.number],
         )
@@ -443,20 +486,20 @@ impl<P: Format> Real for Counted<P> {
     #[inline(never)]
     fn eq(self, o: Self) -> CountedMask {
         Self::compared(
-            self.value.eq(o.value),
+            self.with(o, |a, b| a.eq(b)),
             Kind::Equal,
             &[self.number, o.number],
         )
     }
     #[inline(never)]
     fn select(mask: CountedMask, a: Self, b: Self) -> Self {
-        let chosen = if mask.value { a } else { b };
         let is_known = GRAPH.with_borrow(|graph| graph.is_constant(mask.number));
         if is_known || a.number == b.number {
-            return chosen;
+            return if mask.values[0] { a } else { b };
         }
+        let choose = |i: usize| if mask.values[i] { a } else { b }.values[i];
         Self::of(
-            chosen.value,
+            array::from_fn(choose),
             Kind::Select,
             &[mask.number, a.number, b.number],
         )
@@ -471,50 +514,58 @@ impl<P: Format> Real for Counted<P> {
     #[inline(never)]
     fn two_product(self, o: Self) -> (Self, Self) {
         let product = self * o;
-        let error = self.value.two_product(o.value).1;
+        let error = self.with(o, |a, b| a.two_product(b).1);
         let operands = [self.number, o.number, product.number];
         (product, Self::of(error, Kind::Fused, &operands))
     }
 }
 
-/// One lane: what makes a row of plain numbers into one of such numbers, and back.
+/// What makes rows of plain numbers into one of such numbers, and back.
 impl<P: Format> Lane for Counted<P> {
     type Scalar = P;
-    const LANES: usize = 1;
+    const LANES: usize = TOGETHER;
     fn splat(value: P) -> Self {
         Self::input(value)
     }
-    fn column(table: &[P], _: usize, at: usize) -> Self {
-        Self::input(table[at])
+    fn column(table: &[P], width: usize, at: usize) -> Self {
+        Self::inputs(array::from_fn(|row| table[row * width + at]))
     }
-    fn put_column(table: &mut [P], _: usize, at: usize, last: &[Self; 4]) {
-        table[at] = last[3].value;
+    fn put_column(table: &mut [P], width: usize, at: usize, last: &[Self; 4]) {
+        for (row, value) in last[3].values.into_iter().enumerate() {
+            table[row * width + at] = value;
+        }
         GRAPH.with_borrow_mut(|graph| graph.outputs.push(last[3].number));
     }
 }
 
-/// Mean operations for a row in `f32`; `None` for a function that is no kernel for bounds. Every
-/// precision does the same.
+/// Mean operations for a row in `f32`, where as many rows as [`TOGETHER`] run together, or where each runs `alone`:
+/// the difference is what lanes compute while they wait for others. Rows that fill no group are left out. `None`
+/// for a function that is no kernel for bounds. In `f64`, loops for roots take more turns than are counted here.
 #[must_use]
-pub fn per_row(function: &str, n: usize, rows: &[Row<f32>]) -> Option<Operations> {
+pub fn per_row(function: &str, n: usize, rows: &[Row<f32>], alone: bool) -> Option<Operations> {
+    let size = if alone { 1 } else { TOGETHER };
     macro_rules! kernel {
         ($($kernel:ident $order:literal $Row:ident -> $Out:ident { $($m:ident $k:literal),* } $($d_bound:ident)?;)*) => {
             match function {
                 $(stringify!($kernel) if n == $order => rows
-                    .iter()
-                    .map(|row| {
-                        let plain = kernels::$Row {
-                            $($m: row.m[$k],)*
-                            eta: row.eta,
-                            $($d_bound: 1.0_f32,)?
+                    .chunks_exact(size)
+                    .map(|rows| {
+                        let plain = |i: usize| {
+                            let row = &rows[i % size];
+                            kernels::$Row {
+                                $($m: row.m[$k],)*
+                                eta: row.eta,
+                                $($d_bound: 1.0_f32,)?
+                            }
                         };
                         traced(|| {
                             let settings = Splat::<f32>::splat::<Counted<f32>>(
                                 kernels::BoundSettings { overestimation: 0.0_f32, bias: 0.0 },
                             );
-                            let row = Lanewise::<f32>::load::<Counted<f32>>(&[plain]);
+                            let plain: [_; TOGETHER] = array::from_fn(plain);
+                            let row = Lanewise::<f32>::load::<Counted<f32>>(&plain);
                             let out = kernels::$kernel(&settings, row);
-                            let mut plain: [kernels::$Out<f32>; 1] = bytemuck::Zeroable::zeroed();
+                            let mut plain: [kernels::$Out<f32>; TOGETHER] = bytemuck::Zeroable::zeroed();
                             Lanewise::<f32>::store::<Counted<f32>>(&out, &mut plain);
                         })
                     })
@@ -546,6 +597,6 @@ pub fn per_row(function: &str, n: usize, rows: &[Row<f32>]) -> Option<Operations
         moment_bound_adjoint_compensated_n2 2 AdjointRow2 -> Derivative2 { m0 0, m1 1, m2 2, m3 3, m4 4 } d_bound;
         moment_bound_adjoint_compensated_n3 3 AdjointRow3 -> Derivative3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 } d_bound;
     };
-    let count = rows.len().max(1) as f64;
+    let count = (rows.len() / size).max(1) as f64;
     Some(sum.zip(sum, |a, _| a / count))
 }

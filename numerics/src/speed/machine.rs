@@ -11,6 +11,7 @@ use hankel_dsl::native::layout::Lane;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::count::Operations;
 use crate::families::{Format, Precision};
 
 /// A machine's limits.
@@ -61,6 +62,16 @@ pub struct Peak {
     pub divisions: f64,
     /// Square roots, on one thread.
     pub roots: f64,
+}
+
+impl Peak {
+    /// How long these operations take on one thread at least: quotients and roots at their own rates.
+    #[must_use]
+    pub fn seconds(&self, operations: &Operations) -> f64 {
+        operations.simple() / self.simple
+            + operations.quotients / self.divisions
+            + operations.roots / self.roots
+    }
 }
 
 impl Limits {

@@ -258,8 +258,10 @@ pub struct Work {
     pub precision: Precision,
     /// Bytes read and written.
     pub bytes: usize,
-    /// Operations.
+    /// Operations as rows run together in lanes.
     pub operations: Operations,
+    /// Operations of a row that runs alone.
+    pub needed: Operations,
 }
 
 /// All that was measured.
@@ -533,8 +535,8 @@ fn rows_of<T: Format>(family: &str, n: usize, seed: u64, count: usize) -> Vec<Ro
     })
 }
 
-/// Rows that operations are counted on: a kernel without early exits does the same for each.
-const COUNTED_ROWS: usize = 64;
+/// Rows that operations are counted on. How often loops for roots turn depends on the row.
+const COUNTED_ROWS: usize = 16 * count::TOGETHER;
 
 fn work_of<T: Format>(solver: Solver, function: &str, n: usize, bytes: usize) -> Option<Work> {
     let rows = rows_of::<f32>(SPEED_FAMILY, n, 0, COUNTED_ROWS);
@@ -543,7 +545,8 @@ fn work_of<T: Format>(solver: Solver, function: &str, n: usize, bytes: usize) ->
         n,
         precision: T::PRECISION,
         bytes,
-        operations: count::per_row(function, n, &rows)?,
+        operations: count::per_row(function, n, &rows, false)?,
+        needed: count::per_row(function, n, &rows, true)?,
     })
 }
 

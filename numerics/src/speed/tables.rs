@@ -2,6 +2,7 @@
 
 use hankel_dsl::native::lanes::levels;
 
+use super::count::TOGETHER;
 use super::errors::ERROR_FAMILIES;
 use super::{ErrorOf, Solver, Speed, Timing, Work};
 use crate::families::Precision;
@@ -236,11 +237,8 @@ impl Speed {
     #[must_use]
     pub fn least_possible(&self, work: &Work) -> Option<(f64, f64)> {
         let peak = self.limits.peak(&self.level, work.precision)?;
-        let o = &work.operations;
-        let arithmetic =
-            o.simple() / peak.simple + o.quotients / peak.divisions + o.roots / peak.roots;
         let memory = work.bytes as f64 / self.limits.bandwidth[0].best();
-        Some((memory * 1e9, arithmetic * 1e9))
+        Some((memory * 1e9, peak.seconds(&work.operations) * 1e9))
     }
 
     fn against_limits(&self) -> Table {
@@ -249,8 +247,10 @@ impl Speed {
             format!(
                 "How near kernels come to the machine's limits, on one thread with {}: bytes over \
                  bandwidth, and operations over peaks (quotients and roots over their own). \
-                 Operations are those of the kernel's source that a result depends on; `reached` is the greater limit's \
-                 share of the time measured.",
+                 Operations are those of the kernel's source that a result depends on, as {TOGETHER} \
+                 rows run together: a loop goes on until the last is done; `needed` is the arithmetic of \
+                 rows that run alone, as a share of that. `reached` is the greater limit's share of the \
+                 time measured. All is counted in f32: in f64, loops for roots take more turns.",
                 self.level
             ),
             [
@@ -266,6 +266,7 @@ impl Speed {
                 Column::fixed("comparisons", 0),
                 Column::fixed("selections", 0),
                 Column::fixed("others", 0),
+                Column::percent("needed", 0),
                 Column::fixed("memory", 2).of("ns"),
                 Column::fixed("arithmetic", 2).of("ns"),
                 Column::fixed("measured", 2).of("ns"),
@@ -283,6 +284,8 @@ impl Speed {
             let flops = measured
                 .zip(peak)
                 .map(|(ns, peak)| work.operations.flops() / (ns * 1e-9) / peak.simple);
+            let needed =
+                peak.map(|peak| peak.seconds(&work.needed) / peak.seconds(&work.operations));
             let o = &work.operations;
             table.push([
                 work.solver.name().into(),
@@ -297,6 +300,7 @@ impl Speed {
                 o.comparisons.into(),
                 o.selections.into(),
                 o.others.into(),
+                needed.into(),
                 memory.into(),
                 arithmetic.into(),
                 measured.into(),
