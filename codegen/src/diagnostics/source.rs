@@ -16,7 +16,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use proc_macro2::Span;
+use proc_macro2::{Delimiter, Span, TokenStream, TokenTree};
 use syn::punctuated::Punctuated;
 use syn::visit::Visit;
 
@@ -61,6 +61,8 @@ struct Crate {
     statics: BTreeMap<String, (usize, Span)>,
     /// Names that `kernels![…]` lists; none if it was not found.
     listed: Option<BTreeSet<String>>,
+    /// Items that a macro makes iterate, as far as their tokens tell.
+    iterated_in_macros: bool,
 }
 
 /// Looks through the crate whose Cargo.toml lies in `folder`. A file that cannot be read or parsed is
@@ -195,7 +197,10 @@ impl Crate {
 
     /// Names that several functions have count here, too: what is compiled otherwise computes the same.
     fn arrays(&self) -> Arrays {
-        let mut arrays = Arrays::default();
+        let mut arrays = Arrays {
+            iterated: self.iterated_in_macros,
+            passed_as_slices: false,
+        };
         for function in self
             .reached(true)
             .iter()
@@ -358,6 +363,7 @@ impl<'ast> Visit<'ast> for Items<'_> {
             .last()
             .is_some_and(|it| it.ident == "kernels");
         if !is_list {
+            self.all.iterated_in_macros |= iterates(&item.tokens);
             return;
         }
         let paths = item.parse_body_with(Punctuated::<syn::Path, syn::Token![,]>::parse_terminated);
@@ -395,6 +401,33 @@ const METHODS: [&str; 14] = [
     "contains",
     "copy_from_slice",
 ];
+
+/// Whether the tokens of a macro iterate: they call one of [`METHODS`], or loop over what is no range.
+fn iterates(tokens: &TokenStream) -> bool {
+    let tokens: Vec<TokenTree> = tokens.clone().into_iter().collect();
+    let is_group = |at: usize, delimiter| match tokens.get(at) {
+        Some(TokenTree::Group(it)) => it.delimiter() == delimiter,
+        _ => false,
+    };
+    let follows_point = |at: usize| match tokens[..at].last() {
+        Some(TokenTree::Punct(it)) => it.as_char() == '.',
+        _ => false,
+    };
+    tokens.iter().enumerate().any(|(i, token)| match token {
+        TokenTree::Group(group) => iterates(&group.stream()),
+        TokenTree::Ident(name) if name == "in" => {
+            let body = (i..tokens.len()).find(|at| is_group(*at, Delimiter::Brace));
+            let over =
+                body.map(|body| tokens[i + 1..body].iter().cloned().collect::<TokenStream>());
+            over.is_some_and(|over| !over.to_string().contains(".."))
+        }
+        TokenTree::Ident(name) => {
+            let is_method = METHODS.iter().any(|it| name == it);
+            is_method && follows_point(i) && is_group(i + 1, Delimiter::Parenthesis)
+        }
+        _ => false,
+    })
+}
 
 /// Whether an expression is a range, perhaps from its end or in steps: loops over these need nothing.
 fn is_range(expression: &syn::Expr) -> bool {
@@ -450,6 +483,10 @@ impl<'ast> Visit<'ast> for Body {
             ));
         }
         syn::visit::visit_type_path(self, ty);
+    }
+
+    fn visit_macro(&mut self, item: &'ast syn::Macro) {
+        self.arrays.iterated |= iterates(&item.tokens);
     }
 
     fn visit_expr_for_loop(&mut self, repeat: &'ast syn::ExprForLoop) {
@@ -552,6 +589,7 @@ mod tests {
             "for i in (0..4).rev().step_by(2) { b += a[i]; }",
             "for i in 0..=n { b += a[i].min(c).max(d); }",
             "let b = o.map(|x| x + 1).unwrap_or(table.get(i)); a == b",
+            "unroll!(k in 0..2, { for i in 0..4 { b += a[i]; } });",
         ];
         for body in none {
             assert_eq!(arrays(body), (false, false), "{body}");
@@ -565,6 +603,8 @@ mod tests {
             "a.swap(0, 1);",
             "if (3..=9).contains(&n) {}",
             "for x in &a[1..] {}",
+            "unroll!(k in 0..2, { b += a.iter().sum::<f32>(); });",
+            "unroll!(k in 0..2, { for x in a { b += x; } });",
         ];
         for body in iterated {
             assert_eq!(arrays(body), (true, false), "{body}");
@@ -577,6 +617,9 @@ mod tests {
              #[kernel] fn k(a: A) -> f32 { a.at() }\nkernels![k];",
         );
         assert!(through_a_method.arrays.iterated);
+        let of_a_macro = "macro_rules! sums { ($($name:ident)*) => {$(\n\
+             #[kernel] fn $name(a: [f32; 4]) -> f32 { a.iter().sum() } kernels![$name];)*} }\nsums!(k);";
+        assert!(found(of_a_macro).arrays.iterated);
     }
 
     #[test]

@@ -34,6 +34,16 @@ pub fn sorted(#[element] x: UVec4) -> UVec4 {
     UVec4::from_array(numbers)
 }
 
+/// Whether small numbers are in order: upwards, downwards and without repetition, by their last bits.
+#[kernel(compute, threads(64))]
+pub fn in_order(#[element] x: UVec4) -> u32 {
+    let numbers = (x & 3).to_array();
+    let up = numbers.is_sorted();
+    let down = numbers.is_sorted_by(|a, b| a > b);
+    let by_bits = numbers.is_sorted_by_key(|number| number & 1);
+    u32::from(up) | u32::from(down) << 1 | u32::from(by_bits) << 2
+}
+
 /// Where a number stands among those in order.
 #[kernel(compute, threads(64))]
 pub fn placed(#[element] x: u32) -> u32 {

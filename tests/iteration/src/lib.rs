@@ -39,6 +39,7 @@ hankel_dsl::kernels![
     attempts,
     linked,
     sorted,
+    in_order,
     placed,
     chosen,
     numbered_pairs,

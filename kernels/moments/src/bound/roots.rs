@@ -74,45 +74,76 @@ fn newton<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R, low: R, high: R) -> 
     (v - p / slope).clamp(low, high)
 }
 
-/// Laguerre's steps in one direction, 1 or -1, within limits, until they are so short that another would
-/// change nothing, or rounding has taken them past the root: before it, the polynomial has the sign that is given, 1 or
-/// -1.
-///
-/// Each lane stops on its own, so that its result does not depend on its neighbours.
-#[inline(always)]
-fn approach<R: Real, const DEGREE: usize>(
-    e: &Monic<R>,
+/// A way to a root, within limits.
+#[derive(Clone, Copy)]
+struct Way<R> {
     from: R,
+    /// 1 or -1.
     direction: R,
+    /// The polynomial's sign before the root: 1 or -1.
     sign: R,
     low: R,
     high: R,
-) -> R {
-    let most = if const { R::IS_WIDE } {
-        STEPS_WIDE
-    } else {
-        STEPS
-    };
-    let zero: R = lit!(0.0);
+}
+
+/// One of Laguerre's steps along a way, and whether another follows it: not where the step is so short that another would
+/// change nothing, nor where rounding has taken the last one past the root.
+#[inline(always)]
+fn step<R: Real, const DEGREE: usize>(
+    e: &Monic<R>,
+    way: Way<R>,
+    v: R,
+    goes_on: R::Mask,
+) -> (R, R::Mask) {
     // The next step would be cubic in this one.
     let short: R = if const { R::IS_WIDE } {
         lit!(1e-9)
     } else {
         R::epsilon()
     };
-    let mut v = from;
-    let mut goes_on = zero.le(zero);
-    let mut i = 0;
-    while i < most {
-        if goes_on.any() {
-            let (value, length) = laguerre::<R, DEGREE>(e, v);
-            goes_on = goes_on & (value * sign).gt(zero);
-            v = R::select(goes_on, (v + direction * length).clamp(low, high), v);
-            goes_on = goes_on & length.gt(v.abs() * short);
+    let (value, length) = laguerre::<R, DEGREE>(e, v);
+    let goes_on = goes_on & (value * way.sign).gt(lit!(0.0));
+    let next = (v + way.direction * length).clamp(way.low, way.high);
+    let v = R::select(goes_on, next, v);
+    (v, goes_on & length.gt(v.abs() * short))
+}
+
+/// Functions that go along as many ways. The steps of one way wait for each other, so several are gone side by side: a
+/// processor computes the steps of one while it waits for those of another.
+///
+/// Each lane stops on its own, so that its result does not depend on its neighbours.
+macro_rules! approach {
+    ($($(#[$doc:meta])* $name:ident -> $Roots:ty: $($way:ident $v:ident $goes_on:ident),*;)*) => {$(
+        $(#[$doc])*
+        #[inline(always)]
+        fn $name<R: Real, const DEGREE: usize>(e: &Monic<R>, $($way: Way<R>),*) -> $Roots {
+            let most = if const { R::IS_WIDE } { STEPS_WIDE } else { STEPS };
+            let zero: R = lit!(0.0);
+            $(
+                let mut $v = $way.from;
+                let mut $goes_on = zero.le(zero);
+            )*
+            let mut i = 0;
+            while i < most {
+                $(
+                    if $goes_on.any() {
+                        ($v, $goes_on) = step::<R, DEGREE>(e, $way, $v, $goes_on);
+                    }
+                )*
+                i += 1;
+            }
+            [$($v),*]
         }
-        i += 1;
-    }
-    v
+    )*};
+}
+
+approach! {
+    /// To one root.
+    approach -> [R; 1]: way v goes_on;
+    /// To two roots.
+    approach_two -> [R; 2]: down low goes_down, up high goes_up;
+    /// To three roots.
+    approach_three -> [R; 3]: down low goes_down, up middle goes_up, last high goes_on;
 }
 
 /// The least root, from the left: Laguerre's step from minus infinity, and then steps that never
@@ -129,7 +160,14 @@ fn from_outside<R: Real, const DEGREE: usize>(e: &Monic<R>) -> R {
     } else {
         -one
     };
-    approach::<R, DEGREE>(e, v, one, sign, v, one)
+    let way = Way {
+        from: v,
+        direction: one,
+        sign,
+        low: v,
+        high: one,
+    };
+    approach::<R, DEGREE>(e, way)[0]
 }
 
 /// The least root of a quadratic, if it is negative; else 0.
@@ -179,10 +217,19 @@ fn around<R: Real, const DEGREE: usize>(e: &Monic<R>, between: R) -> (R, R) {
     } else {
         one
     };
-    (
-        approach::<R, DEGREE>(e, between, -one, sign, -one, zero),
-        approach::<R, DEGREE>(e, between, one, sign, -one, zero),
-    )
+    let up = Way {
+        from: between,
+        direction: one,
+        sign,
+        low: -one,
+        high: zero,
+    };
+    let down = Way {
+        direction: -one,
+        ..up
+    };
+    let [first, second] = approach_two::<R, DEGREE>(e, down, up);
+    (first, second)
 }
 
 /// The three least roots of a polynomial of degree 6, where they are negative; else 0.
@@ -201,11 +248,24 @@ pub(crate) fn least_three<R: Real>(e: &Monic<R>) -> (R, R, R) {
     });
     let between = from_outside::<R, 4>(&second).clamp(-one, zero);
     let (first, second) = around::<R, 5>(&derivative, between);
-    (
-        approach::<R, 6>(e, first, -one, -one, -one, zero),
-        approach::<R, 6>(e, first, one, -one, -one, zero),
-        approach::<R, 6>(e, second, one, one, -one, zero),
-    )
+    let up = Way {
+        from: first,
+        direction: one,
+        sign: -one,
+        low: -one,
+        high: zero,
+    };
+    let down = Way {
+        direction: -one,
+        ..up
+    };
+    let last = Way {
+        from: second,
+        sign: one,
+        ..up
+    };
+    let [first, second, third] = approach_three::<R, 6>(e, down, up, last);
+    (first, second, third)
 }
 
 /// All roots in ascending order: those of each derivative bracket those of the one before
@@ -248,7 +308,14 @@ fn of_derivative<R: Real, const DEGREE: usize, const D: usize>(
         } else {
             one
         };
-        let v = approach::<R, D>(&derivative, from, direction, sign, -one, one);
+        let way = Way {
+            from,
+            direction,
+            sign,
+            low: -one,
+            high: one,
+        };
+        let [v] = approach::<R, D>(&derivative, way);
         roots[i] = newton::<R, D>(&derivative, v, low, high);
     });
     roots
