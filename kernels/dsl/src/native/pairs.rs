@@ -113,7 +113,7 @@ macro_rules! halves {
     (@call $self:ident, $method:ident, $other:ident) => { $self.with($other, |x, y| x.$method(y)) };
 }
 
-/// A pair of pairs as a pair of numbers.
+/// The first results of both halves, and the second ones.
 #[inline(always)]
 fn turned<L>(halves: Pair<(L, L)>) -> (Pair<L>, Pair<L>) {
     let Pair((a, b), (c, d)) = halves;
