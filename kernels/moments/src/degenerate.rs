@@ -115,12 +115,8 @@ pub fn degenerate_6<R: Real>(m: Moments6<R>) -> Degenerate6<R> {
     let z3 = high + up;
     let z2 = (a0 - z1 + a1 - z3 + a2).clamp(low, high);
 
-    let weight = |p1: R, p2: R| {
-        let scale = (p1 * p1 + c1) * c2;
-        c1 * c2 / (scale + p2 * p2)
-    };
-    let w1 = weight(from_low + down, (reach + down) * down);
-    let w3 = weight(from_high + up, (reach + up) * up).min(one - w1);
+    let w1 = weight(c1, c2, from_low + down, (reach + down) * down);
+    let w3 = weight(c1, c2, from_high + up, (reach + up) * up).min(one - w1);
     let unit = |z: R| within(z, -one, one);
     let z1 = unit(z1);
     let z2 = unit(z2).max(z1);
@@ -135,6 +131,13 @@ pub fn degenerate_6<R: Real>(m: Moments6<R>) -> Degenerate6<R> {
         },
         excess: c1 * c2 * c3,
     }
+}
+
+/// The weight of a point where the orthogonal polynomials of degree 1 and 2 are `p1` and `p2`.
+#[inline(always)]
+fn weight<R: Real>(c1: R, c2: R, p1: R, p2: R) -> R {
+    let scale = (p1 * p1 + c1) * c2;
+    c1 * c2 / (scale + p2 * p2)
 }
 
 impl<R: Real> ThreePoints<R> {

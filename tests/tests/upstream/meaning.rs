@@ -123,6 +123,18 @@ fn naga_reads_unordered_comparisons_as_ordered() {
 }
 
 #[test]
+fn naga_shifts_without_the_sign() {
+    let wgsl = to_wgsl(&read_by_naga("naga-shift-sign"));
+    assert!(
+        wgsl.contains(" >> ") && !wgsl.contains("i32"),
+        "mended: drop the conversion before the shifts in codegen/src/spirv/narrow.rs\n{wgsl}"
+    );
+    // The driver knows what it means.
+    let spirv = assembled("naga-shift-sign");
+    assert_eq!(word(On::Lavapipe, &spirv, 0x8000_0000), 0xf800_0000);
+}
+
+#[test]
 fn naga_evaluates_centroids_at_the_center() {
     let wgsl = to_wgsl(&read_by_naga("naga-centroid"));
     assert!(

@@ -11,20 +11,8 @@ use crate::{Mask, Real};
 #[derive(Clone, Copy)]
 pub struct Pair<T>(T, T);
 
-impl<T: Copy> Pair<T> {
-    #[inline(always)]
-    fn both(value: T) -> Self {
-        Self(value, value)
-    }
-    #[inline(always)]
-    fn each<U>(self, f: impl Fn(T) -> U) -> Pair<U> {
-        Pair(f(self.0), f(self.1))
-    }
-    #[inline(always)]
-    fn with<O, U>(self, other: Pair<O>, f: impl Fn(T, O) -> U) -> Pair<U> {
-        Pair(f(self.0, other.0), f(self.1, other.1))
-    }
-}
+// No closures, nor functions as arguments: what is not inlined into the code of an instruction set is compiled for the
+// baseline processor.
 
 macro_rules! operators {
     ($($operator:ident $method:ident $assign:ident $assign_method:ident,)*) => {$(
@@ -32,7 +20,7 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn $method(self, o: Self) -> Self {
-                self.with(o, $operator::$method)
+                Self($operator::$method(self.0, o.0), $operator::$method(self.1, o.1))
             }
         }
         impl<L: Real> $assign for Pair<L> {
@@ -54,7 +42,7 @@ impl<L: Real> Div for Pair<L> {
     type Output = Self;
     #[inline(always)]
     fn div(self, o: Self) -> Self {
-        self.with(o, Div::div)
+        Self(self.0 / o.0, self.1 / o.1)
     }
 }
 
@@ -62,7 +50,7 @@ impl<L: Real> Neg for Pair<L> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.each(Neg::neg)
+        Self(-self.0, -self.1)
     }
 }
 
@@ -70,7 +58,7 @@ impl<M: Mask> BitAnd for Pair<M> {
     type Output = Self;
     #[inline(always)]
     fn bitand(self, o: Self) -> Self {
-        self.with(o, BitAnd::bitand)
+        Self(self.0 & o.0, self.1 & o.1)
     }
 }
 
@@ -78,7 +66,7 @@ impl<M: Mask> BitOr for Pair<M> {
     type Output = Self;
     #[inline(always)]
     fn bitor(self, o: Self) -> Self {
-        self.with(o, BitOr::bitor)
+        Self(self.0 | o.0, self.1 | o.1)
     }
 }
 
@@ -86,7 +74,7 @@ impl<M: Mask> Not for Pair<M> {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
-        self.each(Not::not)
+        Self(!self.0, !self.1)
     }
 }
 
@@ -101,23 +89,16 @@ impl<M: Mask> Mask for Pair<M> {
     }
 }
 
-/// Methods of a trait that are those of both halves.
+/// Functions that are those of both halves.
 macro_rules! halves {
-    ($($method:ident($($other:ident),*) -> $result:ty;)*) => {$(
+    ($($method:ident($($other:ident),*) -> $Result:ident;)*) => {$(
         #[inline(always)]
-        fn $method(self $(, $other: Self)*) -> $result {
-            halves!(@call self, $method $(, $other)*)
+        fn $method(self $(, $other: Self)*) -> halves!(@result $Result) {
+            Pair(self.0.$method($($other.0),*), self.1.$method($($other.1),*))
         }
     )*};
-    (@call $self:ident, $method:ident) => { $self.each(|x| x.$method()) };
-    (@call $self:ident, $method:ident, $other:ident) => { $self.with($other, |x, y| x.$method(y)) };
-}
-
-/// The first results of both halves, and the second ones.
-#[inline(always)]
-fn turned<L>(halves: Pair<(L, L)>) -> (Pair<L>, Pair<L>) {
-    let Pair((a, b), (c, d)) = halves;
-    (Pair(a, c), Pair(b, d))
+    (@result Number) => { Self };
+    (@result Mask) => { Self::Mask };
 }
 
 impl<L: Real> Real for Pair<L> {
@@ -126,21 +107,21 @@ impl<L: Real> Real for Pair<L> {
 
     #[inline(always)]
     fn literal<const BITS: u64>() -> Self {
-        Self::both(L::literal::<BITS>())
+        Self(L::literal::<BITS>(), L::literal::<BITS>())
     }
     #[inline(always)]
     fn epsilon() -> Self {
-        Self::both(L::epsilon())
+        Self(L::epsilon(), L::epsilon())
     }
     halves! {
-        sqrt() -> Self;
-        abs() -> Self;
-        floor() -> Self;
-        min(o) -> Self;
-        max(o) -> Self;
-        lt(o) -> Self::Mask;
-        le(o) -> Self::Mask;
-        eq(o) -> Self::Mask;
+        sqrt() -> Number;
+        abs() -> Number;
+        floor() -> Number;
+        min(o) -> Number;
+        max(o) -> Number;
+        lt(o) -> Mask;
+        le(o) -> Mask;
+        eq(o) -> Mask;
     }
     #[inline(always)]
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
@@ -148,11 +129,13 @@ impl<L: Real> Real for Pair<L> {
     }
     #[inline(always)]
     fn two_sum(self, o: Self) -> (Self, Self) {
-        turned(self.with(o, L::two_sum))
+        let ((a, a_error), (b, b_error)) = (self.0.two_sum(o.0), self.1.two_sum(o.1));
+        (Self(a, b), Self(a_error, b_error))
     }
     #[inline(always)]
     fn two_product(self, o: Self) -> (Self, Self) {
-        turned(self.with(o, L::two_product))
+        let ((a, a_error), (b, b_error)) = (self.0.two_product(o.0), self.1.two_product(o.1));
+        (Self(a, b), Self(a_error, b_error))
     }
 }
 
@@ -162,7 +145,7 @@ impl<L: Lane> Lane for Pair<L> {
 
     #[inline(always)]
     fn splat(value: L::Scalar) -> Self {
-        Self::both(L::splat(value))
+        Self(L::splat(value), L::splat(value))
     }
     #[inline(always)]
     fn column(table: &[L::Scalar], width: usize, at: usize) -> Self {
@@ -172,35 +155,42 @@ impl<L: Lane> Lane for Pair<L> {
     #[inline(always)]
     fn put_column(table: &mut [L::Scalar], width: usize, at: usize, last: &[Self; 4]) {
         let (first, second) = table.split_at_mut(L::LANES * width);
-        L::put_column(first, width, at, &last.map(|pair| pair.0));
-        L::put_column(second, width, at, &last.map(|pair| pair.1));
+        let [a, b, c, d] = *last;
+        L::put_column(first, width, at, &[a.0, b.0, c.0, d.0]);
+        L::put_column(second, width, at, &[a.1, b.1, c.1, d.1]);
     }
 }
 
 impl<L: Elementary> Elementary for Pair<L> {
     #[inline(always)]
     fn largest() -> Self {
-        Self::both(L::largest())
+        Self(L::largest(), L::largest())
     }
     halves! {
-        guard() -> Self;
-        upper() -> Self;
-        power_of_two() -> Self;
-        copy_sign(sign) -> Self;
-        flip_sign(sign) -> Self;
-        reciprocal_seed() -> Self;
-        inverse_root_seed() -> Self;
-        odd_sum(o) -> Self;
-        not_a_number() -> Self;
-        unbounded() -> Self;
+        guard() -> Number;
+        upper() -> Number;
+        power_of_two() -> Number;
+        copy_sign(sign) -> Number;
+        flip_sign(sign) -> Number;
+        reciprocal_seed() -> Number;
+        inverse_root_seed() -> Number;
+        odd_sum(o) -> Number;
+        not_a_number() -> Number;
+        unbounded() -> Number;
     }
     #[inline(always)]
     fn decompose(self) -> (Self, Self) {
-        turned(self.each(L::decompose))
+        let ((e, m), (e_second, m_second)) = (self.0.decompose(), self.1.decompose());
+        (Self(e, e_second), Self(m, m_second))
     }
     #[inline(always)]
     fn reduce_large(self) -> (Self, Self, Self) {
-        let Pair((q, high, low), (q2, high2, low2)) = self.each(L::reduce_large);
-        (Pair(q, q2), Pair(high, high2), Pair(low, low2))
+        let (q, high, low) = self.0.reduce_large();
+        let (q_second, high_second, low_second) = self.1.reduce_large();
+        (
+            Self(q, q_second),
+            Self(high, high_second),
+            Self(low, low_second),
+        )
     }
 }

@@ -573,6 +573,17 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: 
     ]
 }
 
+/// `at + (v - v3) (slope + (v - v2) bend)` by powers of v.
+#[inline(always)]
+fn parabola<R: Real, A: Arithmetic<R>>(v2: A, v3: A, at: A, slope: A, bend: A) -> [A; 3] {
+    let linear = slope.minus(bend.times(v2));
+    [
+        at.minus(v3.times(linear)),
+        linear.minus(bend.times(v3)),
+        bend,
+    ]
+}
+
 /// [`single`] for three roots, of which `rest`, of degree N - 3, has none: `u` times a polynomial of degree 5.
 ///
 /// In the reciprocal it is `l² + (v - v_1)(v - v_2)(v - v_3) t`, where the parabola `l` meets `s` and the
@@ -687,16 +698,8 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
         .plus(s23.times(s11223))
         .plus(s123.times(s1123))
         .scaled(two);
-    let parabola = |at: A, slope: A, bend: A| {
-        let linear = slope.minus(bend.times(v2));
-        [
-            at.minus(v3.times(linear)),
-            linear.minus(bend.times(v3)),
-            bend,
-        ]
-    };
-    let l = parabola(s3, s23, s123);
-    let t = parabola(t3, t23, t123);
+    let l = parabola(v2, v3, s3, s23, s123);
+    let t = parabola(v2, v3, t3, t23, t123);
     let e1 = v1.plus(v2).plus(v3);
     let e2 = v1.times(v2).plus(v1.plus(v2).times(v3));
     let e3 = v1.times(v2).times(v3);
