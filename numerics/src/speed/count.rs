@@ -540,7 +540,7 @@ impl<P: Format> Lane for Counted<P> {
 
 /// Mean operations for a row in `f32`, where as many rows as [`TOGETHER`] run together, or where each runs `alone`:
 /// the difference is what lanes compute while they wait for others. Rows that fill no group are left out. `None`
-/// for a function that is no kernel for bounds. In `f64`, loops for roots take more turns than are counted here.
+/// for a function that is no kernel for bounds. In `f64`, loops for roots may take more turns than are counted here.
 #[must_use]
 pub fn per_row(function: &str, n: usize, rows: &[Row<f32>], alone: bool) -> Option<Operations> {
     let size = if alone { 1 } else { TOGETHER };

@@ -250,7 +250,7 @@ impl Speed {
                  Operations are those of the kernel's source that a result depends on, as {TOGETHER} \
                  rows run together: a loop goes on until the last is done; `needed` is the arithmetic of \
                  rows that run alone, as a share of that. `reached` is the greater limit's share of the \
-                 time measured. All is counted in f32: in f64, loops for roots take more turns.",
+                 time measured. All is counted in f32: in f64, loops for roots may take more turns.",
                 self.level
             ),
             [
