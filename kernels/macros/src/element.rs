@@ -151,28 +151,14 @@ fn one(
             });
             let lanewise = all_lanes.then(|| {
                 quote! {
-                    impl layout::Lanewise<#scalar> for #this {
+                    // SAFETY: `repr(C)`, and every field is so laid out.
+                    unsafe impl layout::Lanewise<#scalar> for #this {
                         type Over<L: ::hankel_dsl::Real> = #name<L>;
-                        #[inline(always)]
-                        fn gather<L: layout::Lane<Scalar = #scalar>>(
-                            rows: layout::Rows<'_, #scalar>,
-                            at: usize,
-                        ) -> #name<L> {
-                            #name {
-                                #(#names: <#types as layout::Lanewise<#scalar>>::gather(
-                                    rows,
-                                    at + core::mem::offset_of!(#this, #names) / size_of::<#scalar>(),
-                                ),)*
-                            }
-                        }
-                        #[inline(always)]
-                        fn scatter<L: layout::Lane<Scalar = #scalar>>(
-                            over: &#name<L>,
-                            columns: &mut layout::Columns<'_, L>,
-                        ) {
-                            #(<#types as layout::Lanewise<#scalar>>::scatter(&over.#names, columns);)*
-                        }
                     }
+                    const _: () = {
+                        const fn lanewise<T: layout::Lanewise<#scalar>>() {}
+                        #(lanewise::<#types>();)*
+                    };
                 }
             });
             quote! {

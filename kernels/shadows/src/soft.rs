@@ -266,7 +266,7 @@ fn far_4() -> Quantized4<f32> {
     quantize_symmetric_4(Moments4::of_depth(1.0))
 }
 
-/// The same of six.
+/// Six moments of the far end.
 #[inline(always)]
 fn far_6() -> Quantized6<f32> {
     quantize_symmetric_6(Moments6::of_depth(1.0))
@@ -471,7 +471,7 @@ pub fn resolve_summed(
     }
 }
 
-/// The same of six moments.
+/// Mean of a texel's six moments, as [`resolve_summed`] has it of four.
 #[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved_6)]
 pub fn resolve_summed_6(
     #[index] at: UVec2,
@@ -573,7 +573,7 @@ impl Table<'_> {
     }
 }
 
-/// The same of six.
+/// [`Table`] of six moments.
 struct Table6<'a> {
     entries: Buffer<'a, Fixed6>,
     pyramid: &'a Pyramid,

@@ -5,8 +5,10 @@
 use std::array;
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::mem::MaybeUninit;
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
+use hankel_dsl::bytemuck::{Pod, cast_slice, cast_slice_mut};
 use hankel_dsl::native::layout::{Lane, Lanewise, Splat};
 use hankel_dsl::{Mask, Real};
 use hankel_shadows::moment_bounds as kernels;
@@ -527,14 +529,21 @@ impl<P: Format> Lane for Counted<P> {
     fn splat(value: P) -> Self {
         Self::input(value)
     }
-    fn column(table: &[P], width: usize, at: usize) -> Self {
-        Self::inputs(array::from_fn(|row| table[row * width + at]))
-    }
-    fn put_column(table: &mut [P], width: usize, at: usize, last: &[Self; 4]) {
-        for (row, value) in last[3].values.into_iter().enumerate() {
-            table[row * width + at] = value;
+    fn columns<T: Pod>(rows: &[T], columns: &mut [MaybeUninit<Self>]) {
+        let table: &[P] = cast_slice(rows);
+        let width = columns.len();
+        for (at, column) in columns.iter_mut().enumerate() {
+            column.write(Self::inputs(array::from_fn(|row| table[row * width + at])));
         }
-        GRAPH.with_borrow_mut(|graph| graph.outputs.push(last[3].number));
+    }
+    fn put_columns<T: Pod>(columns: &[Self], rows: &mut [T]) {
+        let table: &mut [P] = cast_slice_mut(rows);
+        for (at, column) in columns.iter().enumerate() {
+            for (row, value) in column.values.into_iter().enumerate() {
+                table[row * columns.len() + at] = value;
+            }
+            GRAPH.with_borrow_mut(|graph| graph.outputs.push(column.number));
+        }
     }
 }
 

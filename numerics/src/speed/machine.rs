@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use fearless_simd::{Level, Simd, dispatch};
-use hankel_dsl::Real;
-use hankel_dsl::native::lanes::{Scalar, level, levels};
+use hankel_dsl::math::Elementary;
+use hankel_dsl::native::lanes::{Scalar, Work, level, levels, on_lanes};
 use hankel_dsl::native::layout::Lane;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -185,21 +185,31 @@ enum Operation {
     Root,
 }
 
-/// Chains of operations that do not wait for each other: of products and of sums this many each.
-/// With two constants they fill sixteen registers, the fewest of any instruction set here; the
-/// operations of one chain follow each other after 7 to 14 others, more than any has latency.
-const CHAINS: usize = 7;
+/// Chains of operations that do not wait for each other: of products and of sums this many each, and each on the two
+/// registers of a group of lanes. With two constants they fill sixteen registers, the fewest of any instruction set here;
+/// the operations of one chain follow each other after 5 to 11 others, more than any has latency.
+const CHAINS: usize = 3;
 
 fn peak<T: Format + Scalar>(name: &str, level: Level, seconds: f64) -> Peak {
     let start: [T; 2 * CHAINS] = std::array::from_fn(|i| T::round(1.0 + i as f64 / 64.0));
-    let lanes = dispatch!(level, simd => lanes_of::<_, T>(simd));
-    let run = |operation: Operation, rounds: u32| dispatch!(level, simd => chains::<_, T>(simd, operation, &start, rounds));
+    let run = |operation: Operation, rounds: u32| {
+        let chains = Chains {
+            operation,
+            start: &start,
+            rounds,
+        };
+        // `levels` has no other than those with lanes.
+        on_lanes(level, chains).unwrap_or_default()
+    };
+    let lanes = run(Operation::Simple, 0);
     let rate = |operation: Operation| {
         let per_round = match operation {
             Operation::Simple => 2 * CHAINS,
             Operation::Divide | Operation::Root => CHAINS,
         };
-        let rounds = rounds_for(seconds / 8.0, |rounds| run(operation, rounds));
+        let rounds = rounds_for(seconds / 8.0, |rounds| {
+            run(operation, rounds);
+        });
         // The best of eight: whatever else runs on this machine only takes from it.
         let least = (0..8)
             .map(|_| {
@@ -225,7 +235,7 @@ fn peak<T: Format + Scalar>(name: &str, level: Level, seconds: f64) -> Peak {
     Peak {
         level: name.into(),
         precision: T::PRECISION,
-        lanes,
+        lanes: lanes / 2,
         simple,
         simple_all: operations * f64::from(rounds) / all,
         divisions: rate(Operation::Divide).0,
@@ -247,49 +257,57 @@ fn rounds_for(seconds: f64, run: impl Fn(u32)) -> u32 {
     }
 }
 
-#[inline(always)]
-fn lanes_of<S: Simd, T: Scalar>(_simd: S) -> usize {
-    T::Lanes::<S>::LANES
+/// Rounds of operations; gives the lanes of each.
+struct Chains<'a, T> {
+    operation: Operation,
+    start: &'a [T; 2 * CHAINS],
+    rounds: u32,
 }
 
-#[inline(always)]
-fn chains<S: Simd, T: Scalar + Format>(
-    _simd: S,
-    operation: Operation,
-    start: &[T; 2 * CHAINS],
-    rounds: u32,
-) {
-    let constant = |x: f64| <T::Lanes<S> as Lane>::splat(black_box(T::round(x)));
-    // What the compiler does not know to be 1 and 0.
-    let (one, zero) = (constant(1.0), constant(0.0));
-    let mut x: [T::Lanes<S>; 2 * CHAINS] = *black_box(&start.map(<T::Lanes<S> as Lane>::splat));
-    match operation {
-        Operation::Simple => {
-            for _ in 0..rounds {
-                for k in 0..CHAINS {
-                    x[k] *= one;
-                    x[CHAINS + k] += zero;
+impl<T: Scalar + Format> Work for Chains<'_, T> {
+    type Scalar = T;
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<L: Lane<Scalar = T> + Elementary>(self) -> usize {
+        // What the compiler does not know to be 1 and 0.
+        let (one, zero) = (
+            L::splat(black_box(T::round(1.0))),
+            L::splat(black_box(T::round(0.0))),
+        );
+        let mut x = [one; 2 * CHAINS];
+        for (x, start) in x.iter_mut().zip(black_box(self.start)) {
+            *x = L::splat(*start);
+        }
+        match self.operation {
+            Operation::Simple => {
+                for _ in 0..self.rounds {
+                    for k in 0..CHAINS {
+                        x[k] *= one;
+                        x[CHAINS + k] += zero;
+                    }
+                }
+            }
+            Operation::Divide => {
+                for _ in 0..self.rounds {
+                    for x in x.iter_mut().take(CHAINS) {
+                        *x = *x / one;
+                    }
+                }
+            }
+            Operation::Root => {
+                for _ in 0..self.rounds {
+                    for x in x.iter_mut().take(CHAINS) {
+                        *x = x.sqrt();
+                    }
                 }
             }
         }
-        Operation::Divide => {
-            for _ in 0..rounds {
-                for x in x.iter_mut().take(CHAINS) {
-                    *x = *x / one;
-                }
-            }
+        let mut sum = x[0];
+        for x in &x[1..] {
+            sum += *x;
         }
-        Operation::Root => {
-            for _ in 0..rounds {
-                for x in x.iter_mut().take(CHAINS) {
-                    *x = x.sqrt();
-                }
-            }
-        }
+        black_box(sum);
+        L::LANES
     }
-    let mut sum = x[0];
-    for x in &x[1..] {
-        sum += *x;
-    }
-    black_box(sum);
 }

@@ -10,16 +10,14 @@ use std::string::{String, ToString};
 use std::{format, vec};
 
 use bytemuck::Pod;
-use fearless_simd::Simd;
 use glam::{IVec4, UVec2, UVec3, UVec4, Vec4};
 use rayon::prelude::*;
 
 use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef, texture_bytes};
 use super::describe::{self, TexelAccess, TexelFormat, TextureKind};
 use super::fragment;
-use super::lanes::{self, Scalar, on_level};
+use super::lanes::{self, Scalar, Work, on_lanes};
 use super::layout::Lane;
-use super::pairs::Pair;
 use super::sanitize::{self, Access, Space};
 use crate::math::Elementary;
 use crate::{Real, Texel};
@@ -668,8 +666,8 @@ pub trait LaneBody: Sync {
 pub fn map1_lanes<B: LaneBody>(mode: Mode, out: &mut [B::Out], body: &B) -> Result<(), CallError> {
     let level = if mode.lanes { lanes::level() } else { None };
     for_elements(mode, out, &|start, chunk| {
-        let done = on_level!(level, simd => lane_chunk(simd, start, chunk, body), false);
-        if !done {
+        let done = level.and_then(|level| on_lanes(level, LaneChunk { start, chunk, body }));
+        if done != Some(true) {
             scalar_chunk(start, chunk, body);
         }
     })
@@ -684,32 +682,35 @@ fn scalar_chunk<B: LaneBody>(start: usize, chunk: &mut [B::Out], body: &B) {
     }
 }
 
-/// The lanes that a kernel's body runs on.
-type Group<B, S> = Pair<<<B as LaneBody>::Scalar as Scalar>::Lanes<S>>;
-
-/// Fills `chunk` by groups of lanes. Not where it is shorter than one group; it says so.
-#[inline(always)]
-fn lane_chunk<S: Simd, B: LaneBody>(
-    _simd: S,
+/// A chunk that groups of lanes fill. Not where it is shorter than one group; it says so.
+struct LaneChunk<'a, B: LaneBody> {
     start: usize,
-    chunk: &mut [B::Out],
-    body: &B,
-) -> bool {
-    let lanes = Group::<B, S>::LANES;
-    let Some(last) = chunk.len().checked_sub(lanes) else {
-        return false;
-    };
-    // Once, not for each group: the compiler cannot know that storing a result leaves them alone.
-    let uniforms = body.uniforms::<Group<B, S>>();
-    let mut done = 0;
-    while done < chunk.len() {
-        // The last group begins early enough to be whole: some results are computed twice.
-        let first = done.min(last);
-        let group = &mut chunk[first..first + lanes];
-        body.many::<Group<B, S>>(&uniforms, start + first, group);
-        done = first + lanes;
+    chunk: &'a mut [B::Out],
+    body: &'a B,
+}
+
+impl<B: LaneBody> Work for LaneChunk<'_, B> {
+    type Scalar = B::Scalar;
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lane<Scalar = B::Scalar> + Elementary>(self) -> bool {
+        let Self { start, chunk, body } = self;
+        let Some(last) = chunk.len().checked_sub(L::LANES) else {
+            return false;
+        };
+        // Once, not for each group: the compiler cannot know that storing a result leaves them alone.
+        let uniforms = body.uniforms::<L>();
+        let mut done = 0;
+        while done < chunk.len() {
+            // The last group begins early enough to be whole: some results are computed twice.
+            let first = done.min(last);
+            let group = &mut chunk[first..first + L::LANES];
+            body.many::<L>(&uniforms, start + first, group);
+            done = first + L::LANES;
+        }
+        true
     }
-    true
 }
 
 /// All channels of a texel, as a texture stores them.

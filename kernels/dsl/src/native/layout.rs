@@ -1,6 +1,8 @@
 //! Layout of values in buffers, checked against the shader's rules (std430) and described.
 //! `#[derive(Element)]` implements what is here for structures.
 
+use core::mem::MaybeUninit;
+use core::slice;
 use std::boxed::Box;
 use std::string::String;
 use std::{format, vec};
@@ -163,74 +165,52 @@ pub trait Lane: Real {
     const LANES: usize;
     /// Every lane holds `value`.
     fn splat(value: Self::Scalar) -> Self;
-    /// Column `at` of `table`, which lies in memory row by row, one row of `width` for each lane.
-    /// Which lane has which row is the same for all columns of all tables.
-    fn column(table: &[Self::Scalar], width: usize, at: usize) -> Self;
-    /// Called for `at` = 0, 1, ... `width` - 1 in turn: fills `table` with the columns, of which
-    /// `last` has those up to `at`, as many as fit, the newest at its end. What earlier calls
-    /// have not stored yet, the last one does.
-    fn put_column(table: &mut [Self::Scalar], width: usize, at: usize, last: &[Self; 4]);
+    /// The columns of `rows`, one row for each lane, whose columns are its scalars. Which lane has which row is the same
+    /// for all tables. `columns` has as many as a row has scalars, and is filled.
+    fn columns<T: Pod>(rows: &[T], columns: &mut [MaybeUninit<Self>]);
+    /// And back.
+    fn put_columns<T: Pod>(columns: &[Self], rows: &mut [T]);
 }
 
 /// A value over scalars of type `S` that has a counterpart over lanes of `S`.
+///
+/// # Safety
+///
+/// The value is laid out as an array of `S`, and the counterpart as an array of lanes with as many elements.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be spread over SIMD lanes",
     note = "every field of an element or an output of a kernel that is generic over `Real` must be the generic type, or a structure of it"
 )]
-pub trait Lanewise<S: Real + Pod>: Pod {
+pub unsafe trait Lanewise<S: Real + Pod>: Pod {
     /// The counterpart.
     type Over<L: Real>;
-    /// Each lane holds the value that starts in its row of `rows` at column `at`.
-    fn gather<L: Lane<Scalar = S>>(rows: Rows<'_, S>, at: usize) -> Self::Over<L>;
-    /// Puts the scalars, over lanes, into `columns`.
-    fn scatter<L: Lane<Scalar = S>>(over: &Self::Over<L>, columns: &mut Columns<'_, L>);
 
     /// Each lane holds one of `rows`, as many as there are lanes. Which one, is up to `L`.
     #[inline(always)]
     fn load<L: Lane<Scalar = S>>(rows: &[Self]) -> Self::Over<L> {
-        let width = const { size_of::<Self>() / size_of::<S>() };
-        let words = &bytemuck::cast_slice(rows)[..L::LANES * width];
-        Self::gather(Rows { words, width }, 0)
+        let mut over = MaybeUninit::<Self::Over<L>>::uninit();
+        let count = const { scalars::<Self, L, Self::Over<L>>() };
+        // SAFETY: the counterpart is an array of so many lanes.
+        let columns = unsafe { slice::from_raw_parts_mut(over.as_mut_ptr().cast(), count) };
+        L::columns(&rows[..L::LANES], columns);
+        // SAFETY: all of them were filled.
+        unsafe { over.assume_init() }
     }
     /// Each of `rows` becomes what its lane holds: the one of that row in [`Lanewise::load`].
     #[inline(always)]
     fn store<L: Lane<Scalar = S>>(over: &Self::Over<L>, rows: &mut [Self]) {
-        let width = const { size_of::<Self>() / size_of::<S>() };
-        Self::scatter(
-            over,
-            &mut Columns {
-                words: &mut bytemuck::cast_slice_mut(rows)[..L::LANES * width],
-                width,
-                at: 0,
-                last: [crate::lit!(0.0); 4],
-            },
-        );
+        let count = const { scalars::<Self, L, Self::Over<L>>() };
+        // SAFETY: the counterpart is an array of so many lanes.
+        let columns = unsafe { slice::from_raw_parts(core::ptr::from_ref(over).cast(), count) };
+        L::put_columns(columns, &mut rows[..L::LANES]);
     }
 }
 
-/// Values of a structure of scalars, each value's scalars a row.
-#[derive(Clone, Copy)]
-pub struct Rows<'a, S> {
-    words: &'a [S],
-    width: usize,
-}
-
-/// Columns that become rows of memory.
-pub struct Columns<'a, L: Lane> {
-    words: &'a mut [L::Scalar],
-    width: usize,
-    at: usize,
-    last: [L; 4],
-}
-
-impl<L: Lane> Columns<'_, L> {
-    #[inline(always)]
-    fn push(&mut self, column: L) {
-        let [_, b, c, d] = self.last;
-        self.last = [b, c, d, column];
-        L::put_column(self.words, self.width, self.at, &self.last);
-        self.at += 1;
-    }
+/// How many scalars a value has.
+const fn scalars<T, L: Lane, Over>() -> usize {
+    let count = size_of::<T>() / size_of::<L::Scalar>();
+    assert!(size_of::<Over>() == count * size_of::<L>());
+    count
 }
 
 /// A value that is the same for all lanes.
@@ -241,18 +221,19 @@ pub trait Splat<S: Real>: Copy {
     fn splat<L: Lane<Scalar = S>>(self) -> Self::Over<L>;
 }
 
+// SAFETY: arrays of arrays.
+unsafe impl<S: Real + Pod, T: Lanewise<S>, const N: usize> Lanewise<S> for [T; N]
+where
+    Self: Pod,
+{
+    type Over<L: Real> = [T::Over<L>; N];
+}
+
 macro_rules! scalar {
     ($($float:ty),*) => {$(
-        impl Lanewise<$float> for $float {
+        // SAFETY: one scalar, one lane.
+        unsafe impl Lanewise<$float> for $float {
             type Over<L: Real> = L;
-            #[inline(always)]
-            fn gather<L: Lane<Scalar = $float>>(rows: Rows<'_, $float>, at: usize) -> L {
-                L::column(rows.words, rows.width, at)
-            }
-            #[inline(always)]
-            fn scatter<L: Lane<Scalar = $float>>(over: &L, columns: &mut Columns<'_, L>) {
-                columns.push(*over);
-            }
         }
         impl Splat<$float> for $float {
             type Over<L: Real> = L;

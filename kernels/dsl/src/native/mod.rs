@@ -12,14 +12,12 @@ pub mod inputs;
 #[doc(hidden)]
 pub mod lanes;
 pub mod layout;
-mod pairs;
 pub mod plugin;
 pub(crate) mod sampling;
 pub mod sanitize;
 #[doc(hidden)]
 pub mod subgroup;
 pub mod texel;
-mod transpose;
 #[doc(hidden)]
 pub mod workgroup;
 

@@ -464,7 +464,7 @@ fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fi
     let share = power.times(per_value).within(zero, one);
     let at_root = v.times(share.times(share));
     let twice = v.times(slope.times(per_value)).scaled(lit!(2.0));
-    let tilt = twice.minus(A::of(whole::<R>(2 * N - 1)));
+    let tilt = twice.minus(A::of(whole!(R, 2 * N - 1)));
     let constant = at_root.times(A::of(one).minus(tilt));
     let linear = at_root.times(v.times(tilt));
     let mut factor = [A::of(zero); MAX + 1];

@@ -91,7 +91,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
             let (is, was) = (y[k + 1].ge(zero), y[k].ge(zero));
             below += R::select((is & was) | !(is | was), one, zero);
         });
-        let count: R = whole(N);
+        let count: R = whole!(R, N);
         let turned = below.gt(count * lit!(0.5));
         let sign = R::select(turned, -one, one);
         unroll!(k in 0..N, max 7, {

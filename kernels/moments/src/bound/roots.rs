@@ -16,25 +16,27 @@ pub(crate) type Monic<R> = [R; MAX + 1];
 const STEPS: u32 = 18;
 const STEPS_WIDE: u32 = 40;
 
-/// Small whole numbers, which compilers fold into constants.
-#[inline(always)]
-pub(crate) fn whole<R: Real>(k: usize) -> R {
-    match k {
-        0 => lit!(0.0),
-        1 => lit!(1.0),
-        2 => lit!(2.0),
-        3 => lit!(3.0),
-        4 => lit!(4.0),
-        5 => lit!(5.0),
-        6 => lit!(6.0),
-        7 => lit!(7.0),
-        8 => lit!(8.0),
-        9 => lit!(9.0),
-        10 => lit!(10.0),
-        11 => lit!(11.0),
-        _ => lit!(12.0),
-    }
+/// A whole number up to 12 as an `$R`: `$k` is a constant. Without branches, which a compiler would have to remove at each
+/// place.
+macro_rules! whole {
+    // Code that is never reached has differences below 0.
+    ($R:ty, $k:tt - $less:tt) => {
+        whole!($R, usize::saturating_sub($k, $less))
+    };
+    ($R:ty, $k:expr) => {
+        whole!(@of $R, $k, 1 1.0, 2 2.0, 3 3.0, 4 4.0, 5 5.0, 6 6.0, 7 7.0, 8 8.0, 9 9.0, 10 10.0, 11 11.0, 12 12.0)
+    };
+    (@of $R:ty, $k:expr, $($value:literal $number:literal),*) => {{
+        let mut number: $R = lit!(0.0);
+        $(
+            if const { $k == $value } {
+                number = lit!($number);
+            }
+        )*
+        number
+    }};
 }
+pub(crate) use whole;
 
 /// Value, first derivative and half the second derivative.
 #[inline(always)]
@@ -58,10 +60,10 @@ fn value<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R, R) {
 fn laguerre<R: Real, const DEGREE: usize>(e: &Monic<R>, v: R) -> (R, R) {
     let (p, d, h) = value::<R, DEGREE>(e, v);
     let zero: R = lit!(0.0);
-    let less = whole::<R>(DEGREE - 1);
+    let less = whole!(R, DEGREE - 1);
     let least: R = lit!(1e-30);
-    let square = less * (less * (d * d) - whole::<R>(2 * DEGREE) * (p * h));
-    let length = whole::<R>(DEGREE) * p.abs() / (d.abs() + square.max(zero).sqrt()).max(least);
+    let square = less * (less * (d * d) - whole!(R, 2 * DEGREE) * (p * h));
+    let length = whole!(R, DEGREE) * p.abs() / (d.abs() + square.max(zero).sqrt()).max(least);
     (p, length)
 }
 
@@ -108,8 +110,8 @@ fn step<R: Real, const DEGREE: usize>(
     (v, goes_on & length.gt(v.abs() * short))
 }
 
-/// Functions that go along as many ways. The steps of one way wait for each other, so several are gone side by side: a
-/// processor computes the steps of one while it waits for those of another.
+/// Laguerre's steps towards one, two or three roots in one loop. The steps towards one root wait for each other: a processor
+/// computes those towards another meanwhile.
 ///
 /// Each lane stops on its own, so that its result does not depend on its neighbours.
 macro_rules! approach {
@@ -152,9 +154,9 @@ approach! {
 fn from_outside<R: Real, const DEGREE: usize>(e: &Monic<R>) -> R {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
-    let less = whole::<R>(DEGREE - 1);
-    let square = less * (less * (e[1] * e[1]) - whole::<R>(2 * DEGREE) * e[2]);
-    let v = -(e[1] + square.max(zero).sqrt()) * (one / whole::<R>(DEGREE));
+    let less = whole!(R, DEGREE - 1);
+    let square = less * (less * (e[1] * e[1]) - whole!(R, 2 * DEGREE) * e[2]);
+    let v = -(e[1] + square.max(zero).sqrt()) * (one / whole!(R, DEGREE));
     let sign = if const { DEGREE.is_multiple_of(2) } {
         one
     } else {
@@ -200,7 +202,7 @@ pub(crate) fn least_two<R: Real, const DEGREE: usize, const REDUCED: usize>(
     let zero: R = lit!(0.0);
     let mut derivative = *e;
     unroll!(i in 1..(REDUCED + 1), max 7, {
-        derivative[i] = e[i] * (whole::<R>(DEGREE - i) / whole::<R>(DEGREE));
+        derivative[i] = e[i] * (whole!(R, DEGREE - i) / whole!(R, DEGREE));
     });
     let between = from_outside::<R, REDUCED>(&derivative).clamp(-one, zero);
     around::<R, DEGREE>(e, between)
@@ -243,8 +245,8 @@ pub(crate) fn least_three<R: Real>(e: &Monic<R>) -> (R, R, R) {
     // Each from one product: of two constants in a row, compilers may make one that rounds otherwise.
     let (mut derivative, mut second) = (*e, *e);
     unroll!(i in 1..6, max 7, {
-        derivative[i] = e[i] * (whole::<R>(6 - i) / whole::<R>(6));
-        second[i] = e[i] * (whole::<R>(6 - i) * whole::<R>(5 - i) / lit!(30.0));
+        derivative[i] = e[i] * (whole!(R, 6 - i) / whole!(R, 6));
+        second[i] = e[i] * (whole!(R, 6 - i) * whole!(R, 5 - i) / lit!(30.0));
     });
     let between = from_outside::<R, 4>(&second).clamp(-one, zero);
     let (first, second) = around::<R, 5>(&derivative, between);
@@ -328,7 +330,7 @@ fn derivative<R: Real, const DEGREE: usize, const D: usize>(e: &Monic<R>) -> Mon
     unroll!(i in 1..(D + 1), max 7, {
         let mut ratio: R = lit!(1.0);
         unroll!(j in 0..i, max 7, {
-            ratio *= whole::<R>(D - j) / whole::<R>(DEGREE - j);
+            ratio *= whole!(R, D - j) / whole!(R, DEGREE - j);
         });
         derivative[i] = e[i] * ratio;
     });

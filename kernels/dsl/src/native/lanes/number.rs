@@ -1,0 +1,382 @@
+//! Numbers of two registers. The operations of a kernel depend on each other, and a processor waits some cycles for the
+//! result of each; those of the second register fill the time.
+//!
+//! A product and a sum are never fused, so that a lane's result is the scalar result bit for bit.
+
+use core::mem::MaybeUninit;
+use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
+
+use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
+
+use super::Scalar;
+use super::register::Register;
+use super::transpose::{self, Table};
+use crate::math::Elementary;
+use crate::native::layout::Lane;
+use crate::{Mask, Real};
+
+// No closures over lanes, nor functions as arguments: what is not inlined into the code of an instruction set is compiled
+// for the baseline processor.
+
+/// A type for each register, not one that is generic over registers: rustc inlines the operations of registers into those
+/// of concrete types, once, where LLVM would do it at each place that uses them.
+macro_rules! lanes {
+    ($(#[$doc:meta])* $name:ident, $mask_name:ident: two of $register:ty) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        pub struct $name($register, $register);
+
+        /// A truth value for each lane.
+        #[derive(Clone, Copy)]
+        pub struct $mask_name(<$register as Register>::Mask, <$register as Register>::Mask);
+
+        const _: () = {
+            type R = $register;
+            type Number = <R as Register>::Number;
+            lanes!(@all $name, $mask_name, 2: 0 1);
+        };
+    };
+    // By register: `$i` are their fields, `$registers` is how many there are.
+    (@all $name:ident, $mask_name:ident, $registers:literal: $($i:tt)+) => {
+        lanes!(@operator $name Add add AddAssign add_assign: $($i)+);
+        lanes!(@operator $name Sub sub SubAssign sub_assign: $($i)+);
+        lanes!(@operator $name Mul mul MulAssign mul_assign: $($i)+);
+
+        impl Div for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, o: Self) -> Self {
+                Self($(R::div(self.$i, o.$i)),+)
+            }
+        }
+
+        impl Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self($(R::neg(self.$i)),+)
+            }
+        }
+
+        impl BitAnd for $mask_name {
+            type Output = Self;
+            #[inline(always)]
+            fn bitand(self, o: Self) -> Self {
+                Self($(R::both(self.$i, o.$i)),+)
+            }
+        }
+
+        impl BitOr for $mask_name {
+            type Output = Self;
+            #[inline(always)]
+            fn bitor(self, o: Self) -> Self {
+                Self($(R::either(self.$i, o.$i)),+)
+            }
+        }
+
+        impl Not for $mask_name {
+            type Output = Self;
+            #[inline(always)]
+            fn not(self) -> Self {
+                Self($(R::not(self.$i)),+)
+            }
+        }
+
+        impl Mask for $mask_name {
+            #[inline(always)]
+            fn any(self) -> bool {
+                false $(| R::any(self.$i))+
+            }
+            #[inline(always)]
+            fn all(self) -> bool {
+                true $(& R::all(self.$i))+
+            }
+        }
+
+        impl $name {
+            /// A function of scalars of each lane, for what has no instruction.
+            #[inline(always)]
+            fn each<const N: usize>(
+                self,
+                function: impl Fn(Number) -> [Number; N],
+            ) -> [Self; N] {
+                /// Lanes of the widest register.
+                const MOST: usize = 16;
+                let mut numbers = [[Number::zeroed(); MOST]; $registers];
+                $(R::store(self.$i, &mut numbers[$i], 0);)+
+                let mut results = [[[Number::zeroed(); MOST]; $registers]; N];
+                for (i, register) in numbers.iter().enumerate() {
+                    for (k, number) in register[..R::LANES].iter().enumerate() {
+                        let values = function(*number);
+                        for (result, value) in results.iter_mut().zip(values) {
+                            result[i][k] = value;
+                        }
+                    }
+                }
+                let mut all = [self; N];
+                for (lanes, result) in all.iter_mut().zip(&results) {
+                    *lanes = Self($(R::load(&result[$i], 0)),+);
+                }
+                all
+            }
+        }
+
+        impl Real for $name {
+            type Mask = $mask_name;
+            const IS_WIDE: bool = Number::IS_WIDE;
+
+            #[inline(always)]
+            fn literal<const BITS: u64>() -> Self {
+                Self($(lanes!(@each $i R::literal::<BITS>())),+)
+            }
+            #[inline(always)]
+            fn epsilon() -> Self {
+                Self::splat(Number::epsilon())
+            }
+            lanes!(@function sqrt = sqrt(): $($i)+);
+            lanes!(@function abs = abs(): $($i)+);
+            lanes!(@function floor = floor(): $($i)+);
+            lanes!(@function min = min(o): $($i)+);
+            lanes!(@function max = max(o): $($i)+);
+            lanes!(@comparison $mask_name lt: $($i)+);
+            lanes!(@comparison $mask_name le: $($i)+);
+            lanes!(@comparison $mask_name eq: $($i)+);
+            #[inline(always)]
+            fn select(mask: $mask_name, a: Self, b: Self) -> Self {
+                Self($(R::select(mask.$i, a.$i, b.$i)),+)
+            }
+            #[inline(always)]
+            fn two_sum(self, o: Self) -> (Self, Self) {
+                let both = [$(R::two_sum(self.$i, o.$i)),+];
+                (Self($(both[$i].0),+), Self($(both[$i].1),+))
+            }
+            #[inline(always)]
+            fn two_product(self, o: Self) -> (Self, Self) {
+                let both = [$(R::two_product(self.$i, o.$i)),+];
+                (Self($(both[$i].0),+), Self($(both[$i].1),+))
+            }
+        }
+
+        impl Lane for $name {
+            type Scalar = Number;
+            const LANES: usize = $registers * R::LANES;
+
+            #[inline(always)]
+            fn splat(value: Number) -> Self {
+                let all = R::splat(value);
+                Self($(lanes!(@each $i all)),+)
+            }
+            #[inline(always)]
+            fn columns<T: Pod>(rows: &[T], columns: &mut [MaybeUninit<Self>]) {
+                let (width, step) = (Table::<R, T>::WIDTH, Table::<R, T>::STEP);
+                let table = cast_slice(rows);
+                let rows = R::LANES * width;
+                let mut at = 0;
+                while at < width {
+                    // The last ones may overlap others.
+                    let from = at.min(width - step);
+                    let some = [$(transpose::columns::<R, T>(&table[$i * rows..], from)),+];
+                    columns[from].write(Self($(some[$i][0]),+));
+                    if const { Table::<R, T>::STEP > 1 } {
+                        columns[from + 1].write(Self($(some[$i][1]),+));
+                    }
+                    if const { Table::<R, T>::STEP > 2 } {
+                        columns[from + 2].write(Self($(some[$i][2]),+));
+                    }
+                    if const { Table::<R, T>::STEP > 3 } {
+                        columns[from + 3].write(Self($(some[$i][3]),+));
+                    }
+                    at += step;
+                }
+            }
+            #[inline(always)]
+            fn put_columns<T: Pod>(columns: &[Self], rows: &mut [T]) {
+                let (width, step) = (Table::<R, T>::WIDTH, Table::<R, T>::STEP);
+                let table = cast_slice_mut(rows);
+                let rows = R::LANES * width;
+                let mut at = 0;
+                while at < width {
+                    let from = at.min(width - step);
+                    let a = columns[from];
+                    let (mut b, mut c, mut d) = (a, a, a);
+                    if const { Table::<R, T>::STEP > 1 } {
+                        b = columns[from + 1];
+                    }
+                    if const { Table::<R, T>::STEP > 2 } {
+                        c = columns[from + 2];
+                    }
+                    if const { Table::<R, T>::STEP > 3 } {
+                        d = columns[from + 3];
+                    }
+                    $(transpose::put_columns::<R, T>(
+                        [a.$i, b.$i, c.$i, d.$i],
+                        &mut table[$i * rows..],
+                        from,
+                    );)+
+                    at += step;
+                }
+            }
+        }
+
+        impl Elementary for $name {
+            #[inline(always)]
+            fn largest() -> Self {
+                Self::splat(Number::largest())
+            }
+            #[inline(always)]
+            fn guard(self) -> Self {
+                self
+            }
+            #[inline(always)]
+            fn upper(self) -> Self {
+                if const { Number::IS_WIDE } {
+                    // 53 bits are cut into 26, a sign and 26: the upper half must be rounded (Veltkamp).
+                    let scaled = self * crate::lit!(134_217_729.0);
+                    return scaled - (scaled - self);
+                }
+                let mask = R::bits::<0xffff_f000>();
+                Self($(R::and(self.$i, mask)),+)
+            }
+            #[inline(always)]
+            fn decompose(self) -> (Self, Self) {
+                let root = R::splat(Number::ROOT);
+                let fraction = R::splat(Number::FRACTION);
+                let from_root = Self($(R::sub_bits(self.$i, root)),+);
+                (
+                    Self($(R::exponent(from_root.$i)),+),
+                    Self($(R::add_bits(R::and(from_root.$i, fraction), root)),+),
+                )
+            }
+            lanes!(@function power_of_two = power(): $($i)+);
+            #[inline(always)]
+            fn copy_sign(self, sign: Self) -> Self {
+                self.abs().flip_sign(sign)
+            }
+            #[inline(always)]
+            fn flip_sign(self, sign: Self) -> Self {
+                let mask = R::splat(Number::SIGN);
+                Self($(R::xor(self.$i, R::and(sign.$i, mask))),+)
+            }
+            #[inline(always)]
+            fn reciprocal_seed(self) -> Self {
+                if const { Number::IS_WIDE } {
+                    // From `f32`, as on devices without integers of 64 bits.
+                    let [seed] = self.each(|x| [x.reciprocal_seed()]);
+                    return seed;
+                }
+                let start = R::bits::<0x7ef3_11c7>();
+                Self($(R::sub_bits(start, self.$i)),+)
+            }
+            #[inline(always)]
+            fn inverse_root_seed(self) -> Self {
+                if const { Number::IS_WIDE } {
+                    let [seed] = self.each(|x| [x.inverse_root_seed()]);
+                    return seed;
+                }
+                let start = R::bits::<0x5f37_5a86>();
+                Self($(R::sub_bits(start, R::half_bits(self.$i))),+)
+            }
+            #[inline(always)]
+            fn reduce_large(self) -> (Self, Self, Self) {
+                let [q, high, low] = self.each(|x| {
+                    // A lane that is no large number is not asked for.
+                    let largest = Number::largest();
+                    let is_large = x.gt(crate::lit!(3200.0)) & x.le(largest);
+                    let (q, high, low) = Number::select(is_large, x, largest).reduce_large();
+                    [q, high, low]
+                });
+                (q, high, low)
+            }
+            #[inline(always)]
+            fn odd_sum(self, other: Self) -> Self {
+                let (sum, error) = self.two_sum(other);
+                let zero = crate::lit!(0.0);
+                let (low, negative) = (error.lt(zero), sum.lt(zero));
+                let away = (low & negative) | (!low & !negative);
+                let one = R::splat(Number::LAST_BIT);
+                let before = Self($(R::sub_bits(sum.$i, one)),+);
+                let odd = Self::select(away, sum, before);
+                let odd = Self($(R::or(odd.$i, one)),+);
+                Self::select(error.eq(zero), sum, odd)
+            }
+            #[inline(always)]
+            fn not_a_number(self) -> Self {
+                let bits = R::splat(Number::NAN);
+                Self($(R::or(self.$i, bits)),+)
+            }
+            #[inline(always)]
+            fn unbounded(self) -> Self {
+                let bits = R::splat(Number::INFINITY);
+                Self($(R::or(self.$i, bits)),+)
+            }
+        }
+    };
+    (@each $i:tt $value:expr) => { $value };
+    (@operator $name:ident $operator:ident $method:ident $assign:ident $assign_method:ident: $($i:tt)+) => {
+        impl $operator for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, o: Self) -> Self {
+                Self($(R::$method(self.$i, o.$i)),+)
+            }
+        }
+        impl $assign for $name {
+            #[inline(always)]
+            fn $assign_method(&mut self, o: Self) {
+                *self = Self($(R::$method(self.$i, o.$i)),+);
+            }
+        }
+    };
+    (@function $method:ident = $function:ident($($o:ident)?): $($i:tt)+) => {
+        lanes!(@function_of $method $function ($($o)?) $($i)+);
+    };
+    (@function_of $method:ident $function:ident () $($i:tt)+) => {
+        #[inline(always)]
+        fn $method(self) -> Self {
+            Self($(R::$function(self.$i)),+)
+        }
+    };
+    (@function_of $method:ident $function:ident ($o:ident) $($i:tt)+) => {
+        #[inline(always)]
+        fn $method(self, $o: Self) -> Self {
+            Self($(R::$function(self.$i, $o.$i)),+)
+        }
+    };
+    (@comparison $mask_name:ident $method:ident: $($i:tt)+) => {
+        #[inline(always)]
+        fn $method(self, o: Self) -> $mask_name {
+            $mask_name($(R::$method(self.$i, o.$i)),+)
+        }
+    };
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+lanes! {
+    /// AVX2's `f32`.
+    F32x16, Mask32x16: two of super::x86::F32x8
+}
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+lanes! {
+    /// AVX2's `f64`.
+    F64x8, Mask64x8: two of super::x86::F64x4
+}
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+lanes! {
+    /// AVX-512's `f32`.
+    F32x32, Mask32x32: two of super::x86::F32x16
+}
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+lanes! {
+    /// AVX-512's `f64`.
+    F64x16, Mask64x16: two of super::x86::F64x8
+}
+#[cfg(target_arch = "aarch64")]
+lanes! {
+    /// NEON's `f32`.
+    F32x8, Mask32x8: two of super::neon::F32x4
+}
+#[cfg(target_arch = "aarch64")]
+lanes! {
+    /// NEON's `f64`.
+    F64x4, Mask64x4: two of super::neon::F64x2
+}
