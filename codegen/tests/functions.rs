@@ -81,7 +81,7 @@ both! {
     fn swapped<const N: usize>(mut x: [f32; N], first: &mut f32) -> [f32; N] {
         let kept = x[0];
         x[0] = x[N - 1];
-        x[N - 1] = kept;
+        x[usize::saturating_sub(N, 1)] = kept;
         *first += x[0];
         x
     }
@@ -175,7 +175,7 @@ both! {
         let whole = to_i32(Real::clamp(x, -100.0, 100.0));
         let low = (word & 0xff) << 3 | word >> 29;
         let mixed = word.wrapping_mul(747_796_405).wrapping_add(whole as u32) ^ x.to_bits();
-        UVec2::new(low | mixed & 0xf0f0, if whole < 3 { mixed } else { low })
+        UVec2::new(low | mixed & 0xf0f0, if whole < 3 { mixed } else { u32::max(low, 9) })
     }
 
     /// Names that languages reserve.

@@ -2090,10 +2090,13 @@ impl<'a> Evaluator<'a> {
         if names.len() >= 2 {
             let head = &p.path.segments[names.len() - 2];
             let head_name = names[names.len() - 2].as_str();
-            let is_real = frame.generics.get(head_name) == Some(&Generic::Real)
-                || matches!(head_name, "f32" | "Real" | "f64" | "Mask")
+            let is_number = frame.generics.get(head_name) == Some(&Generic::Real)
+                || matches!(
+                    head_name,
+                    "f32" | "Real" | "f64" | "Mask" | "i32" | "u32" | "usize"
+                )
                 || head_name == "Self" && frame.own.as_deref() == Some("f32");
-            if is_real && names.len() == 2 {
+            if is_number && names.len() == 2 {
                 return self.number_function(frame, head_name, &name, given.as_deref(), args, span);
             }
             if let Some((scalar, size)) = vector_name(head_name) {
@@ -2364,7 +2367,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Functions of number types: `R::select`, `f64::from_bits`, `Real::max`.
+    /// Functions of number types: `R::select`, `f64::from_bits`, `Real::max`, `usize::saturating_sub`.
     fn number_function(
         &mut self,
         frame: &Frame,
