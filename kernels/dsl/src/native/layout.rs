@@ -179,7 +179,7 @@ pub trait Lane: Real {
 /// The value is laid out as an array of `S`, and the counterpart as an array of lanes with as many elements.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be spread over SIMD lanes",
-    note = "every field of an element or an output of a kernel that is generic over `Real` must be the generic type, or a structure of it"
+    note = "every field of an element or an output of a kernel that is generic over `Real` must be the generic type, an array of it, or a structure of it"
 )]
 pub unsafe trait Lanewise<S: Real + Pod>: Pod {
     /// The counterpart.

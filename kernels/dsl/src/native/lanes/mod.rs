@@ -1,4 +1,4 @@
-//! SIMD lanes as a [`Real`], of whichever instruction set the processor turns out to have.
+//! SIMD lanes as a [`Real`](crate::Real), of whichever instruction set the processor turns out to have.
 
 use std::sync::OnceLock;
 use std::vec::Vec;
