@@ -523,7 +523,8 @@ impl<P: Format> Real for Counted<P> {
 }
 
 /// What makes rows of plain numbers into one of such numbers, and back.
-impl<P: Format> Lane for Counted<P> {
+// SAFETY: `columns` writes every column.
+unsafe impl<P: Format> Lane for Counted<P> {
     type Scalar = P;
     const LANES: usize = TOGETHER;
     fn splat(value: P) -> Self {

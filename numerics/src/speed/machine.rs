@@ -235,6 +235,7 @@ fn peak<T: Format + Scalar>(name: &str, level: Level, seconds: f64) -> Peak {
     Peak {
         level: name.into(),
         precision: T::PRECISION,
+        // A group of lanes is two registers.
         lanes: lanes / 2,
         simple,
         simple_all: operations * f64::from(rounds) / all,

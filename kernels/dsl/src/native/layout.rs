@@ -158,7 +158,11 @@ impl HasPrecision for f64 {
 }
 
 /// Several values of a scalar type at once; see [`super::lanes`].
-pub trait Lane: Real {
+///
+/// # Safety
+///
+/// [`Lane::columns`] fills all columns.
+pub unsafe trait Lane: Real {
     /// What one lane holds.
     type Scalar: Real + Pod;
     /// Number of lanes.
@@ -166,7 +170,7 @@ pub trait Lane: Real {
     /// Every lane holds `value`.
     fn splat(value: Self::Scalar) -> Self;
     /// The columns of `rows`, one row for each lane, whose columns are its scalars. Which lane has which row is the same
-    /// for all tables. `columns` has as many as a row has scalars, and is filled.
+    /// for all tables. `columns` has as many as a row has scalars.
     fn columns<T: Pod>(rows: &[T], columns: &mut [MaybeUninit<Self>]);
     /// And back.
     fn put_columns<T: Pod>(columns: &[Self], rows: &mut [T]);
@@ -193,7 +197,7 @@ pub unsafe trait Lanewise<S: Real + Pod>: Pod {
         // SAFETY: the counterpart is an array of so many lanes.
         let columns = unsafe { slice::from_raw_parts_mut(over.as_mut_ptr().cast(), count) };
         L::columns(&rows[..L::LANES], columns);
-        // SAFETY: all of them were filled.
+        // SAFETY: `Lane::columns` filled all of them.
         unsafe { over.assume_init() }
     }
     /// Each of `rows` becomes what its lane holds: the one of that row in [`Lanewise::load`].
@@ -206,7 +210,7 @@ pub unsafe trait Lanewise<S: Real + Pod>: Pod {
     }
 }
 
-/// How many scalars a value has.
+/// How many scalars a value of `T` has, and so how many lanes `Over`, its counterpart.
 const fn scalars<T, L: Lane, Over>() -> usize {
     let count = size_of::<T>() / size_of::<L::Scalar>();
     assert!(size_of::<Over>() == count * size_of::<L>());
@@ -221,7 +225,7 @@ pub trait Splat<S: Real>: Copy {
     fn splat<L: Lane<Scalar = S>>(self) -> Self::Over<L>;
 }
 
-// SAFETY: arrays of arrays.
+// SAFETY: an array of such values is laid out as theirs, one after another.
 unsafe impl<S: Real + Pod, T: Lanewise<S>, const N: usize> Lanewise<S> for [T; N]
 where
     Self: Pod,

@@ -70,7 +70,7 @@ pub fn level_name() -> &'static str {
         .map_or(SCALAR, |(name, _)| name)
 }
 
-/// A scalar that has lanes.
+/// A scalar that has lanes. Only [`on_lanes`] may use the types of lanes: their operations need the instruction set.
 pub trait Scalar: Elementary + Pod {
     /// Lanes of AVX2.
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -119,8 +119,8 @@ macro_rules! scalar {
     };
 }
 
-scalar!(f32, F32x16, F32x32, F32x8; root: 0x3f35_04f3, fraction: 0x007f_ffff, sign: 0x8000_0000);
-scalar!(f64, F64x8, F64x16, F64x4;
+scalar!(f32, Avx2F32, Avx512F32, NeonF32; root: 0x3f35_04f3, fraction: 0x007f_ffff, sign: 0x8000_0000);
+scalar!(f64, Avx2F64, Avx512F64, NeonF64;
     root: 0x3fe6_a09e_667f_3bcd, fraction: 0x000f_ffff_ffff_ffff, sign: 0x8000_0000_0000_0000);
 
 /// What is done with lanes.

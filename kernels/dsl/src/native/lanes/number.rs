@@ -36,7 +36,7 @@ macro_rules! lanes {
             lanes!(@all $name, $mask_name, 2: 0 1);
         };
     };
-    // By register: `$i` are their fields, `$registers` is how many there are.
+    // `$registers` is how many registers there are, `$i` are the fields that hold them.
     (@all $name:ident, $mask_name:ident, $registers:literal: $($i:tt)+) => {
         lanes!(@operator $name Add add AddAssign add_assign: $($i)+);
         lanes!(@operator $name Sub sub SubAssign sub_assign: $($i)+);
@@ -157,7 +157,8 @@ macro_rules! lanes {
             }
         }
 
-        impl Lane for $name {
+        // SAFETY: the loop over `at` fills every column.
+        unsafe impl Lane for $name {
             type Scalar = Number;
             const LANES: usize = $registers * R::LANES;
 
@@ -353,30 +354,30 @@ macro_rules! lanes {
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX2's `f32`.
-    F32x16, Mask32x16: two of super::x86::F32x8
+    Avx2F32, Avx2F32Mask: two of super::x86::F32x8
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX2's `f64`.
-    F64x8, Mask64x8: two of super::x86::F64x4
+    Avx2F64, Avx2F64Mask: two of super::x86::F64x4
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f32`.
-    F32x32, Mask32x32: two of super::x86::F32x16
+    Avx512F32, Avx512F32Mask: two of super::x86::F32x16
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f64`.
-    F64x16, Mask64x16: two of super::x86::F64x8
+    Avx512F64, Avx512F64Mask: two of super::x86::F64x8
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
     /// NEON's `f32`.
-    F32x8, Mask32x8: two of super::neon::F32x4
+    NeonF32, NeonF32Mask: two of super::neon::F32x4
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
     /// NEON's `f64`.
-    F64x4, Mask64x4: two of super::neon::F64x2
+    NeonF64, NeonF64Mask: two of super::neon::F64x2
 }
