@@ -2,6 +2,8 @@
 //! that is. These tests compile to SPIR-V: without rust-gpu's compiler they are skipped, and say
 //! so; with `HANKEL_REQUIRE_COMPILER`, which CI sets where it has one, they fail instead.
 
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -307,4 +309,77 @@ fn a_new_crate_is_built_and_checked() {
     let text = fs::read_to_string(&path).expect("it was made");
     fs::write(&path, text.replace("lit!(3.0)", "lit!(3.5)")).expect("it can be written");
     desk.hankel(check).code(1);
+}
+
+const TWO_KERNELS: &str = r#"
+#![no_std]
+use hankel_dsl::{Element, kernel};
+
+/// A number.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Number {
+    /// The number.
+    pub x: f32,
+}
+
+fn doubled(x: f32) -> f32 {
+    x * 2.0
+}
+
+/// Doubles a number.
+#[kernel(compute, threads(64))]
+pub fn double(#[element] number: Number) -> Number {
+    Number { x: doubled(number.x) }
+}
+
+/// Halves a number.
+#[kernel(compute, threads(64))]
+pub fn halve(#[element] number: Number) -> Number {
+    Number { x: number.x * 0.5 }
+}
+
+hankel_dsl::kernels![double, halve];
+"#;
+
+#[test]
+fn an_edit_links_again_what_it_reaches_and_nothing_else() {
+    if !has_compiler() {
+        return;
+    }
+    let desk = new_crate();
+    // A name that no other test has: modules are kept by it.
+    for file in ["my-kernels/Cargo.toml", "my-kernels/Cargo.lock"] {
+        let text = fs::read_to_string(desk.path(file)).expect("it was made");
+        let text = text.replacen("name = \"my-kernels\"", "name = \"two-kernels\"", 1);
+        desk.write(file, &text);
+    }
+    let kept = root().join("target/hankel/spirv/linked/two_kernels");
+    if kept.exists() {
+        fs::remove_dir_all(&kept).expect("it can be removed");
+    }
+    let built = |text: &str| -> (BTreeSet<OsString>, Vec<u8>) {
+        desk.write("my-kernels/src/lib.rs", text);
+        desk.hankel("build --manifest-path Cargo.toml --target spirv --out out")
+            .code(0);
+        let entries = fs::read_dir(&kept).expect("modules are kept");
+        let names = entries.map(|it| it.expect("it can be read").file_name());
+        let read = |name: String| fs::read(desk.path(&name)).expect("it was built");
+        let texts = ["double", "halve"].map(|it| read(format!("my-kernels/out/spirv/{it}.spv")));
+        (names.collect(), texts.concat())
+    };
+    let (first, _) = built(TWO_KERNELS);
+    assert_eq!(first.len(), 2);
+    let moved = TWO_KERNELS.replace("fn doubled", "// A line more.\nfn doubled");
+    assert_eq!(built(&moved).0, first, "lines do not count");
+    let edited = moved.replace("x * 2.0", "x + x");
+    let (second, modules) = built(&edited);
+    assert_eq!(second.len(), 2);
+    assert_eq!(second.intersection(&first).count(), 1, "`halve` has stayed");
+    // From nothing, the same modules.
+    fs::remove_dir_all(&kept).expect("it can be removed");
+    built(&TWO_KERNELS.replace("0.5", "0.25"));
+    fs::remove_dir_all(&kept).expect("it can be removed");
+    let (third, again) = built(&edited);
+    assert_eq!((third, again), (second, modules));
 }

@@ -1,4 +1,4 @@
-//! From a kernel crate to raw SPIR-V: one module of all entry points, divided into one for each.
+//! From a kernel crate to raw SPIR-V, a module for each entry point: [`crate::link`].
 //!
 //! This runs cargo as `spirv-builder` does, with the same flags, and takes rust-gpu's types for
 //! the target's description and for the result from the crate that spirv-builder takes them from.
@@ -6,32 +6,41 @@
 //! prints, and reports a failure without what the compiler said.
 
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
+use hankel_dsl::native::describe::Kernel;
 use hankel_system::overlooked::LastBuild;
 use hankel_system::process::Program;
 use rspirv::spirv::Capability;
-use rustc_codegen_spirv_types::{CompileResult, ModuleResult, SpirvTarget, TargetSpecVersion};
+use rustc_codegen_spirv_types::{SpirvTarget, TargetSpec, TargetSpecVersion};
 use semver::Version;
 use serde::Deserialize;
 
 use crate::diagnostics::source::Arrays;
 use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
+use crate::finished::finish_all;
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
 use crate::library;
-use crate::spirv::{self, divide, trim};
+use crate::link::{self, LIST, Linked, Unlinked};
+use crate::spirv::trim;
 
 /// What the modules are compiled for.
-const TARGET: &str = "spirv-unknown-vulkan1.2";
+pub(crate) const TARGET: &str = "spirv-unknown-vulkan1.2";
+
+/// What rustc makes of the crate itself: a library for which rust-gpu links its modules.
+pub(crate) const CRATE_TYPE: &str = "dylib";
 
 /// The folder for rust-gpu's artefacts, within cargo's target folder.
 pub const TARGET_SUBFOLDER: &str = "hankel/spirv";
+
+/// The folder for linked modules that are kept from one build to the next, within cargo's target folder.
+pub const LINKED_SUBFOLDER: &str = "hankel/spirv/linked";
 
 /// A rust-gpu compiler; `hankel_toolchain::Toolchain` has the same fields.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,7 +55,7 @@ pub struct Compiler {
 
 impl Compiler {
     /// A command of this toolchain, with nothing of an outer cargo's or rustup's environment.
-    fn command(&self, program: &str) -> Command {
+    pub(crate) fn command(&self, program: &str) -> Command {
         let mut command = match &self.bin {
             Some(bin) => {
                 Command::new(bin.join(format!("{program}{}", std::env::consts::EXE_SUFFIX)))
@@ -72,6 +81,13 @@ impl Compiler {
         }
         command.stdin(Stdio::null());
         command
+    }
+
+    /// The files that it consists of, as far as they are known.
+    pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let rustc = self.bin.as_ref().map(|bin| bin.join("rustc"));
+        let rustc = rustc.map(|it| it.with_extension(std::env::consts::EXE_EXTENSION));
+        rustc.into_iter().chain([self.backend.clone()])
     }
 
     /// What `rustc --version` prints.
@@ -131,16 +147,40 @@ fn leaks(name: &str) -> bool {
 /// What came of a kernel crate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compiled {
-    /// Raw SPIR-V by entry point.
-    pub modules: BTreeMap<String, Vec<u8>>,
+    /// Raw SPIR-V.
+    pub linked: Linked,
     /// What it was made from.
     pub inputs: Inputs,
     /// What the compiler's `rustc --version` prints.
     pub compiler: String,
 }
 
+impl Compiled {
+    /// Finishes the modules of `kernels`: [`finish_all`].
+    ///
+    /// # Errors
+    ///
+    /// As for that.
+    pub fn finish(
+        &self,
+        kernels: &[Kernel],
+        kept: Option<&Path>,
+    ) -> Result<BTreeMap<String, Vec<u8>>> {
+        let finished = finish_all(&self.linked.modules, kernels, kept);
+        let failures = match &finished {
+            Err(Error::Kernel(failure)) => std::slice::from_ref(failure),
+            Err(Error::Kernels(failures)) => failures,
+            _ => &[],
+        };
+        for failure in failures {
+            self.linked.forget(&failure.kernel);
+        }
+        finished
+    }
+}
+
 /// How often a crate is compiled whose files change meanwhile.
-const MOST_ATTEMPTS: u32 = 4;
+const MOST_ATTEMPTS: u32 = 5;
 
 /// File systems tell the time of a change in steps; the kernel's clock for it lags a little.
 const CLOCK_STEP: Duration = Duration::from_millis(50);
@@ -203,9 +243,9 @@ pub fn compile(
     if !found.diagnostics.is_empty() {
         return Err(Error::Source(found.diagnostics));
     }
-    let target_dir = std::path::absolute(target_dir)
-        .during("resolve", target_dir)?
-        .join(TARGET_SUBFOLDER);
+    let target_dir = std::path::absolute(target_dir).during("resolve", target_dir)?;
+    let linked_dir = target_dir.join(LINKED_SUBFOLDER);
+    let target_dir = target_dir.join(TARGET_SUBFOLDER);
     let mut flags = wanted.flags();
     flags.extend(of_arrays(found.arrays).map(Into::into));
     let build = std::iter::once(manifest.as_os_str()).chain(flags.iter().map(OsStr::new));
@@ -216,26 +256,60 @@ pub fn compile(
     let sysroot = PathBuf::from(sysroot);
     let library = library::patched(&sysroot, &target_dir)?;
     let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
+    let spec = target_spec(&version, &target_dir)?;
+    let flags_of_all = flags_of_all(compiler);
+    let mut separately = Separately::of(&target_dir, &version);
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
-        let mut cargo = cargo(compiler, &version, &manifest, folder, &target_dir)?;
+        let mut cargo = cargo(compiler, &spec, &flags_of_all, &manifest, &target_dir);
         // cargo has no other word for where the library's sources are.
         cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", &library);
-        cargo.arg("--").args(&flags);
+        cargo.arg("--").args(&flags).args(separately.flag());
         let messages = run(cargo, &manifest, wanted.names(), progress)?;
-        let artefact = last_artefact(&messages).ok_or_else(|| Error::Manifest {
+        let artefact = last_artefact(&messages, &target_dir).ok_or_else(|| Error::Manifest {
             path: manifest.clone(),
             problem: "cargo made no SPIR-V of it: its [lib] needs crate-type = [\"lib\", \"dylib\"] and a kernel".into(),
         })?;
-        if !artefact.belongs_to(&manifest)? {
+        if !artefact.belongs_to(&manifest, separately.is_on)? {
             continue;
         }
-        let modules = read_modules(&manifest, &artefact.file, wanted.names())?;
+        let linked = if separately.is_on {
+            let unlinked = Unlinked {
+                compiler,
+                version: &version,
+                flags: &rustc_flags(&spec, &flags_of_all),
+                target_dir: &target_dir,
+                linked_dir: &linked_dir,
+                messages: &messages,
+                list: &artefact.file,
+                is_part: matches!(wanted, Wanted::Only(_)),
+            };
+            let Some(linked) = unlinked.link() else {
+                separately.is_on = false;
+                continue;
+            };
+            linked
+        } else {
+            separately.does_not_work();
+            link::read_list(&artefact.file)?.into()
+        };
+        let missing = wanted.names().iter();
+        if let Some(missing) = missing
+            .copied()
+            .find(|it| !linked.modules.contains_key(*it))
+        {
+            return Err(Error::NoEntryPoint {
+                manifest,
+                kernel: missing.into(),
+                found: linked.modules.into_keys().collect(),
+            });
+        }
         let names = gather(&Build {
             folder,
             own: &own,
             messages: &messages,
+            made: &artefact.file,
         })?;
         let inputs = Inputs::take(folder, &names)?;
         // A file that changed while cargo ran may have been read before or after that. If nothing
@@ -245,7 +319,7 @@ pub fn compile(
             let read = inputs.files.keys().chain(inputs.folders.keys());
             last.record(read.map(|name| folder.join(name)), &messages, &own, start)?;
             return Ok(Compiled {
-                modules,
+                linked,
                 inputs,
                 compiler: version,
             });
@@ -323,16 +397,51 @@ fn run(
     Ok(messages)
 }
 
-fn cargo(
-    compiler: &Compiler,
-    said: &str,
-    manifest: &Path,
-    folder: &Path,
-    target_dir: &Path,
-) -> Result<Command> {
-    let version = parse_version(said).ok_or_else(|| Error::Run {
+/// How long a compiler counts as one that cannot link what it has not compiled just now: the cause may have been another
+/// one, like a full disk.
+const NOTED_FOR: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Whether linking is a step of its own: [`Unlinked`]. Where this compiler cannot do that, or what it would link is wrong,
+/// it compiles and links at once.
+struct Separately {
+    is_on: bool,
+    is_noted: bool,
+    /// Holds the version of a compiler that links nothing by itself.
+    file: PathBuf,
+    version: String,
+}
+
+impl Separately {
+    fn of(target_dir: &Path, version: &str) -> Self {
+        let file = target_dir.join("links-at-once");
+        let age = std::fs::metadata(&file).and_then(|it| it.modified());
+        let age = age.map_or(Duration::MAX, |it| it.elapsed().unwrap_or_default());
+        let is_noted =
+            age < NOTED_FOR && std::fs::read_to_string(&file).is_ok_and(|it| it == version);
+        Self {
+            is_on: !is_noted,
+            is_noted,
+            file,
+            version: version.into(),
+        }
+    }
+
+    fn flag(&self) -> Option<&'static str> {
+        self.is_on.then_some("-Zno-link")
+    }
+
+    /// What was not linked by itself was linked at once. Where this cannot be noted, the next build tries both again.
+    fn does_not_work(&self) {
+        if !self.is_noted {
+            let _ = std::fs::write(&self.file, &self.version);
+        }
+    }
+}
+
+fn target_spec(version: &str, target_dir: &Path) -> Result<TargetSpec> {
+    let number = parse_version(version).ok_or_else(|| Error::Run {
         program: "rustc".into(),
-        source: std::io::Error::other(format!("its version is no version: {said}")),
+        source: std::io::Error::other(format!("its version is no version: {version}")),
     })?;
     let target = SpirvTarget::parse(TARGET).map_err(|error| Error::Option {
         option: "SPIR-V target",
@@ -340,26 +449,16 @@ fn cargo(
         expected: "one that rust-gpu knows",
     })?;
     let specs = target_dir.join("target-specs");
-    let spec = TargetSpecVersion::target_arg(version, &target, &specs).during("write", &specs)?;
-    let mut cargo = compiler.command("cargo");
-    cargo.current_dir(folder);
-    cargo.args([
-        "rustc",
-        "--lib",
-        "--crate-type=dylib",
-        "--profile=release",
-        "--message-format=json",
-        "-Zbuild-std=core",
-        "-Zbuild-std-features=compiler-builtins-mem",
-        "--manifest-path",
-    ]);
-    cargo.arg(manifest).arg("--target-dir").arg(target_dir);
-    spec.append_to_cmd(&mut cargo);
+    TargetSpecVersion::target_arg(number, &target, &specs).during("write", &specs)
+}
+
+/// rustc's flags for all crates.
+fn flags_of_all(compiler: &Compiler) -> Vec<String> {
     let capabilities: Vec<String> = trim::ENABLED
         .iter()
         .map(|capability: &Capability| format!("+{capability:?}"))
         .collect();
-    let flags = [
+    vec![
         format!("-Zcodegen-backend={}", compiler.backend.display()),
         // A new backend compiles everything anew.
         "-Zbinary-dep-depinfo".into(),
@@ -372,14 +471,47 @@ fn cargo(
         "-Zinline-mir=off".into(),
         "-Zmir-enable-passes=-GVN".into(),
         "-Zshare-generics=off".into(),
+        // No shader tells the line of a panic. With lines, all below an edited one would be linked again.
+        "-Zlocation-detail=none".into(),
         // Its optimiser makes one constant of two in a row, which rounds otherwise than the source
         // (tests/upstream/rust-gpu-merged-constants). `finish` runs it, with arithmetic held, and validates: references
         // that are chosen have yet to be made valid.
         "-Cllvm-args=--module-output=single --spirv-metadata=name-variables --no-spirv-opt --no-spirv-val".into(),
         format!("-Ctarget-feature={}", capabilities.join(",")),
-    ];
+    ]
+}
+
+/// The flags of rustc where no cargo adds the target's.
+fn rustc_flags(spec: &TargetSpec, flags_of_all: &[String]) -> Vec<OsString> {
+    let target = [OsString::from("--target"), spec.target.clone()];
+    let flags = flags_of_all.iter().map(OsString::from);
+    target.into_iter().chain(flags).collect()
+}
+
+fn cargo(
+    compiler: &Compiler,
+    spec: &TargetSpec,
+    flags_of_all: &[String],
+    manifest: &Path,
+    target_dir: &Path,
+) -> Command {
+    let mut cargo = compiler.command("cargo");
+    cargo.current_dir(manifest.parent().unwrap_or(Path::new(".")));
+    cargo.args([
+        "rustc",
+        "--lib",
+        "--crate-type",
+        CRATE_TYPE,
+        "--profile=release",
+        "--message-format=json",
+        "-Zbuild-std=core",
+        "-Zbuild-std-features=compiler-builtins-mem",
+        "--manifest-path",
+    ]);
+    cargo.arg(manifest).arg("--target-dir").arg(target_dir);
+    spec.append_to_cmd(&mut cargo);
     cargo
-        .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"))
+        .env("CARGO_ENCODED_RUSTFLAGS", flags_of_all.join("\x1f"))
         // cargo remembers what rustc says about itself, but the backend has a say too.
         .env("CARGO_CACHE_RUSTC_INFO", "0")
         // Whatever the crate's own workspace says: one profile, the same bytes everywhere.
@@ -393,7 +525,7 @@ fn cargo(
         .env("CARGO_INCREMENTAL", "1")
         .env("CARGO_TERM_COLOR", "never")
         .env("CARGO_TERM_PROGRESS_WHEN", "never");
-    Ok(cargo)
+    cargo
 }
 
 /// The number in `rustc 1.98.0-nightly (…)`.
@@ -470,19 +602,24 @@ impl Artefact {
     /// Whether it was made of the crate at `manifest`. Two crates of one name that share a target
     /// folder have one place for it, and cargo calls it fresh for both. What was made of the other
     /// one is removed, so that cargo makes it again.
-    fn belongs_to(&self, manifest: &Path) -> Result<bool> {
+    fn belongs_to(&self, manifest: &Path, is_unlinked: bool) -> Result<bool> {
         let owner = self.file.with_extension("hankel-owner");
-        let made = std::fs::metadata(&self.file)
+        let name = self.file.file_name().unwrap_or_default();
+        let folder = self.file.parent().unwrap_or(Path::new("."));
+        let artefact = folder.join("deps").join(name);
+        if is_unlinked && !self.fresh {
+            // rustc has not written it, and cargo compiles again what is not there.
+            std::fs::write(&artefact, "").during("write", &artefact)?;
+        }
+        let made = std::fs::metadata(&artefact)
             .and_then(|data| data.modified())
-            .during("read", &self.file)?;
+            .during("read", &artefact)?;
         let ours = format!("{}\n{made:?}\n", manifest.display());
         if std::fs::read_to_string(&owner).is_ok_and(|it| it == ours) {
             return Ok(true);
         }
         if self.fresh {
-            let name = self.file.file_name().unwrap_or_default();
-            let folder = self.file.parent().unwrap_or(Path::new("."));
-            for file in [self.file.clone(), folder.join("deps").join(name)] {
+            for file in [self.file.clone(), artefact] {
                 match std::fs::remove_file(&file) {
                     Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                         return Err(error).during("remove", &file);
@@ -497,60 +634,38 @@ impl Artefact {
     }
 }
 
-fn last_artefact(messages: &str) -> Option<Artefact> {
+/// The artefact of the crate itself. cargo does not name the file where rustc has not written it.
+fn last_artefact(messages: &str, target_dir: &Path) -> Option<Artefact> {
     #[derive(Deserialize)]
     struct Message {
         reason: String,
-        #[serde(default)]
-        filenames: Vec<PathBuf>,
+        target: Option<Target>,
         #[serde(default)]
         fresh: bool,
     }
+    #[derive(Deserialize)]
+    struct Target {
+        name: String,
+        crate_types: Vec<String>,
+    }
+    let messages = messages.lines().filter(|line| line.starts_with('{'));
     messages
-        .lines()
         .filter_map(|line| serde_json::from_str::<Message>(line).ok())
         .filter(|message| message.reason == "compiler-artifact")
-        .flat_map(|message| {
-            message.filenames.into_iter().map(move |file| Artefact {
-                file,
-                fresh: message.fresh,
-            })
+        .filter_map(|message| {
+            let target = message.target?;
+            let name = target.name.replace('-', "_");
+            let file = target_dir.join(TARGET).join("release");
+            target
+                .crate_types
+                .iter()
+                .any(|it| it == CRATE_TYPE)
+                .then(|| Artefact {
+                    file: file.join(format!("{name}{LIST}")),
+                    fresh: message.fresh,
+                })
         })
-        .rfind(|artefact| artefact.file.to_string_lossy().ends_with(".spv.json"))
-}
-
-/// The raw modules of a crate's entry points.
-fn read_modules(
-    manifest: &Path,
-    artefact: &Path,
-    kernels: &[&str],
-) -> Result<BTreeMap<String, Vec<u8>>> {
-    let json = std::fs::read(artefact).during("read", artefact)?;
-    let result: CompileResult = serde_json::from_slice(&json).map_err(|error| Error::Bundle {
-        path: artefact.to_owned(),
-        problem: format!("rust-gpu wrote no list of modules: {error}"),
-    })?;
-    let ModuleResult::SingleModule(file) = result.module else {
-        return Err(Error::Bundle {
-            path: artefact.to_owned(),
-            problem: "rust-gpu wrote a module for each entry point".into(),
-        });
-    };
-    let bytes = std::fs::read(&file).during("read", &file)?;
-    let crate_name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let module = spirv::load(&spirv::words(&bytes, &crate_name)?, &crate_name)?;
-    let modules = divide::entry_points(&module);
-    if let Some(missing) = kernels.iter().find(|name| !modules.contains_key(**name)) {
-        return Err(Error::NoEntryPoint {
-            manifest: manifest.to_owned(),
-            kernel: (*missing).into(),
-            found: modules.into_keys().collect(),
-        });
-    }
-    Ok(modules
-        .into_iter()
-        .map(|(name, module)| (name, spirv::bytes(&spirv::store(&module))))
-        .collect())
+        .last()
 }
 
 #[cfg(test)]
@@ -627,10 +742,23 @@ mod tests {
 
     #[test]
     fn the_last_artefact_counts() {
-        let messages = "{\"reason\":\"compiler-artifact\",\"filenames\":[\"a.rlib\"]}\nnoise\n\
-            {\"reason\":\"compiler-artifact\",\"filenames\":[\"b.spv.json\"],\"fresh\":true}\n{\"reason\":\"build-finished\"}";
-        let found = last_artefact(messages).unwrap();
-        assert_eq!((found.file, found.fresh), ("b.spv.json".into(), true));
-        assert_eq!(last_artefact("{}"), None);
+        let artifact = |name: &str, of: &str, fresh: bool| {
+            format!(
+                "{{\"reason\":\"compiler-artifact\",\"fresh\":{fresh},\
+                 \"target\":{{\"name\":\"{name}\",\"crate_types\":[\"{of}\"]}}}}\n"
+            )
+        };
+        let messages = [
+            artifact("glam", "lib", true),
+            "noise\n".into(),
+            artifact("a-b", "dylib", true),
+            artifact("c", "proc-macro", false),
+            "{\"reason\":\"build-finished\"}".into(),
+        ];
+        let folder = Path::new("/target");
+        let found = last_artefact(&messages.concat(), folder).unwrap();
+        let file = folder.join(TARGET).join("release/a_b.spv.json");
+        assert_eq!((found.file, found.fresh), (file, true));
+        assert_eq!(last_artefact("{}", folder), None);
     }
 }

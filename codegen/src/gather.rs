@@ -42,6 +42,8 @@ pub(crate) struct Build<'a> {
     pub own: &'a [PathBuf],
     /// What cargo wrote to the standard output, as JSON.
     pub messages: &'a str,
+    /// The file of the crate itself. cargo does not name it where rustc has not written it.
+    pub made: &'a Path,
 }
 
 /// Everything that a build read.
@@ -54,7 +56,12 @@ pub(crate) fn gather(build: &Build<'_>) -> Result<Names> {
     let mut scripts = Vec::new();
     for line in build.messages.lines().filter(|line| line.starts_with('{')) {
         match serde_json::from_str(line) {
-            Ok(Message::CompilerArtifact(artifact)) => artifacts.push(artifact),
+            Ok(Message::CompilerArtifact(mut artifact)) => {
+                if artifact.filenames.is_empty() {
+                    artifact.filenames.push(build.made.to_owned());
+                }
+                artifacts.push(artifact);
+            }
             Ok(Message::BuildScriptExecuted(script)) => scripts.push(script),
             Ok(Message::Other) => {}
             Err(error) => {

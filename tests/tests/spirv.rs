@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use hankel_codegen::compile::{Compiler, Wanted, compile};
+use hankel_codegen::compile::{Compiler, LINKED_SUBFOLDER, Wanted, compile};
 use hankel_codegen::finished::finish_all;
 use hankel_dsl::native::describe::Kernel;
 use hankel_tests::{Crate, root};
@@ -47,13 +47,18 @@ fn committed_spirv_follows_from_its_sources() {
         let kernels: Vec<_> = one.entries.iter().map(|e| e.kernel.clone()).collect();
         let names: Vec<&str> = kernels.iter().map(|k| k.name.as_str()).collect();
         let target = root().join("target");
+        let linked = target.join(LINKED_SUBFOLDER);
         let compile = |wanted| {
+            // No module is taken from an earlier build, nor from the one before.
+            if linked.exists() {
+                fs::remove_dir_all(&linked).unwrap();
+            }
             compile(&one.manifest, &compiler, &target, wanted, &mut |_| {})
                 .unwrap_or_else(|e| panic!("{e}"))
         };
         // A build of some kernels gives what a build of all gives.
         let some: Vec<&str> = names.iter().step_by(30).copied().collect();
-        let alone = compile(Wanted::Only(&some)).modules;
+        let alone = compile(Wanted::Only(&some)).linked.modules;
         assert_eq!(alone.keys().collect::<Vec<_>>(), {
             let mut some = some.iter().collect::<Vec<_>>();
             some.sort();
@@ -63,7 +68,9 @@ fn committed_spirv_follows_from_its_sources() {
         let is_alone = |kernel: &&Kernel| some.contains(&kernel.name.as_str());
         let alone_kernels: Vec<Kernel> = kernels.iter().filter(is_alone).cloned().collect();
         let alone = finish_all(&alone, &alone_kernels, None).unwrap_or_else(|e| panic!("{e}"));
-        let fresh = finish_all(&compiled.modules, &kernels, None).unwrap_or_else(|e| panic!("{e}"));
+        let fresh = compiled
+            .finish(&kernels, None)
+            .unwrap_or_else(|e| panic!("{e}"));
         for (name, bytes) in &fresh {
             assert_eq!(
                 Some(bytes),

@@ -5,6 +5,7 @@ pub(crate) mod canonical;
 pub(crate) mod divide;
 pub(crate) mod edit;
 pub mod exact;
+pub(crate) mod fingerprint;
 pub mod libm;
 pub(crate) mod lines;
 pub mod names;
@@ -147,8 +148,25 @@ pub(crate) fn global(module: &Module, wanted: Word) -> Option<&Instruction> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// What naga makes of WGSL, with names.
+    pub(crate) fn of_wgsl(text: &str) -> Module {
+        let parsed = naga::front::wgsl::parse_str(text).unwrap();
+        let info = naga::valid::Validator::new(
+            naga::valid::ValidationFlags::all(),
+            naga::valid::Capabilities::all(),
+        )
+        .validate(&parsed)
+        .unwrap();
+        let options = naga::back::spv::Options {
+            flags: naga::back::spv::WriterFlags::DEBUG,
+            ..Default::default()
+        };
+        let words = naga::back::spv::write_vec(&parsed, &info, &options, None).unwrap();
+        load(&words, "test").unwrap()
+    }
 
     #[test]
     fn both_byte_orders_are_read() {

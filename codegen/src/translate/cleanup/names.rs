@@ -1,5 +1,6 @@
 //! Names for what has none: results, and what is loaded.
 
+use naga::valid::FunctionInfo;
 use naga::{Expression, FunctionResult, Handle, ImageQuery, Module, Type, TypeInner};
 
 /// Names the structure that a vertex or fragment stage with several outputs returns.
@@ -28,37 +29,21 @@ pub fn name_result(module: &mut Module, name: &str, members: &[String]) {
     module.types.replace(ty, named);
 }
 
-/// Names loaded values after the member, structure or texture that they come from.
+/// Names loaded values after the member, structure, variable or texture that they come from.
 pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
     if module.entry_points.len() != 1 {
         return;
     }
     let function = &module.entry_points[0].function;
-    let types = info.get_entry_point(0);
-    let pointee = |pointer: Handle<Expression>| match *types[pointer].ty.inner_with(&module.types) {
-        TypeInner::Pointer { base, .. } => Some(&module.types[base]),
-        _ => None,
+    let from = Pointers {
+        module,
+        function,
+        types: info.get_entry_point(0),
     };
     let mut names = Vec::new();
     for (handle, expression) in function.expressions.iter() {
         let name = match *expression {
-            Expression::Load { pointer } => match function.expressions[pointer] {
-                Expression::AccessIndex { base, index } => match pointee(base) {
-                    Some(Type {
-                        inner: TypeInner::Struct { members, .. },
-                        ..
-                    }) => members[index as usize].name.clone(),
-                    _ => None,
-                },
-                Expression::Access { .. } => match pointee(pointer) {
-                    Some(Type {
-                        name: Some(name),
-                        inner: TypeInner::Struct { .. },
-                    }) => Some(snake_case(name)),
-                    _ => None,
-                },
-                _ => None,
-            },
+            Expression::Load { pointer } => from.name(pointer),
             Expression::ImageLoad { image, .. } | Expression::ImageSample { image, .. } => {
                 texture_name(module, function, image).map(|name| format!("{name}_texel"))
             }
@@ -74,6 +59,50 @@ pub fn name_loads(module: &mut Module, info: &naga::valid::ModuleInfo) {
         .function
         .named_expressions
         .extend(names);
+}
+
+/// Pointers into global variables.
+struct Pointers<'a> {
+    module: &'a Module,
+    function: &'a naga::Function,
+    types: &'a FunctionInfo,
+}
+
+impl Pointers<'_> {
+    /// What a value that is loaded from there is called.
+    fn name(&self, pointer: Handle<Expression>) -> Option<String> {
+        match self.function.expressions[pointer] {
+            Expression::GlobalVariable(global) => self.module.global_variables[global].name.clone(),
+            Expression::AccessIndex { base, index } => match &self.pointee(base)?.inner {
+                TypeInner::Struct { members, .. } => members[index as usize].name.clone(),
+                TypeInner::Vector { .. } => {
+                    let component = b"xyzw".get(index as usize)?;
+                    Some(format!("{}_{}", self.name(base)?, char::from(*component)))
+                }
+                _ => self.element(pointer, base),
+            },
+            Expression::Access { base, .. } => self.element(pointer, base),
+            _ => None,
+        }
+    }
+
+    /// An element is called after its structure, else after its array.
+    fn element(&self, pointer: Handle<Expression>, base: Handle<Expression>) -> Option<String> {
+        match self.pointee(pointer) {
+            Some(Type {
+                name: Some(name),
+                inner: TypeInner::Struct { .. },
+            }) => Some(snake_case(name)),
+            _ => self.name(base).map(|name| format!("{name}_element")),
+        }
+    }
+
+    fn pointee(&self, pointer: Handle<Expression>) -> Option<&Type> {
+        match *self.types[pointer].ty.inner_with(&self.module.types) {
+            TypeInner::Pointer { base, .. } => Some(&self.module.types[base]),
+            _ => None,
+        }
+    }
 }
 
 fn texture_name(

@@ -27,6 +27,7 @@ macro_rules! whole {
         whole!(@of $R, $k, 1 1.0, 2 2.0, 3 3.0, 4 4.0, 5 5.0, 6 6.0, 7 7.0, 8 8.0, 9 9.0, 10 10.0, 11 11.0, 12 12.0)
     };
     (@of $R:ty, $k:expr, $($value:literal $number:literal),*) => {{
+        const { assert!($k <= 12, "whole! goes up to 12") };
         let mut number: $R = lit!(0.0);
         $(
             if const { $k == $value } {
