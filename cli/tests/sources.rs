@@ -311,7 +311,7 @@ fn a_new_crate_is_built_and_checked() {
     desk.hankel(check).code(1);
 }
 
-const TWO_KERNELS: &str = r#"
+const EIGHT_KERNELS: &str = r#"
 #![no_std]
 use hankel_dsl::{Element, kernel};
 
@@ -333,13 +333,18 @@ pub fn double(#[element] number: Number) -> Number {
     Number { x: doubled(number.x) }
 }
 
-/// Halves a number.
-#[kernel(compute, threads(64))]
-pub fn halve(#[element] number: Number) -> Number {
-    Number { x: number.x * 0.5 }
+macro_rules! more {
+    ($($name:ident $by:literal)*) => {$(
+        /// Multiplies a number.
+        #[kernel(compute, threads(64))]
+        pub fn $name(#[element] number: Number) -> Number {
+            Number { x: number.x * $by }
+        }
+    )*};
 }
+more! { halve 0.5 third 0.3 fourth 0.25 fifth 0.2 sixth 0.16 seventh 0.14 eighth 0.125 }
 
-hankel_dsl::kernels![double, halve];
+hankel_dsl::kernels![double, halve, third, fourth, fifth, sixth, seventh, eighth];
 "#;
 
 #[test]
@@ -351,10 +356,10 @@ fn an_edit_links_again_what_it_reaches_and_nothing_else() {
     // A name that no other test has: modules are kept by it.
     for file in ["my-kernels/Cargo.toml", "my-kernels/Cargo.lock"] {
         let text = fs::read_to_string(desk.path(file)).expect("it was made");
-        let text = text.replacen("name = \"my-kernels\"", "name = \"two-kernels\"", 1);
+        let text = text.replacen("name = \"my-kernels\"", "name = \"eight-kernels\"", 1);
         desk.write(file, &text);
     }
-    let kept = root().join("target/hankel/spirv/linked/two_kernels");
+    let kept = root().join("target/hankel/spirv/linked/eight_kernels");
     if kept.exists() {
         fs::remove_dir_all(&kept).expect("it can be removed");
     }
@@ -368,17 +373,21 @@ fn an_edit_links_again_what_it_reaches_and_nothing_else() {
         let texts = ["double", "halve"].map(|it| read(format!("my-kernels/out/spirv/{it}.spv")));
         (names.collect(), texts.concat())
     };
-    let (first, _) = built(TWO_KERNELS);
-    assert_eq!(first.len(), 2);
-    let moved = TWO_KERNELS.replace("fn doubled", "// A line more.\nfn doubled");
+    let (first, _) = built(EIGHT_KERNELS);
+    assert_eq!(first.len(), 8);
+    let moved = EIGHT_KERNELS.replace("fn doubled", "// A line more.\nfn doubled");
     assert_eq!(built(&moved).0, first, "lines do not count");
     let edited = moved.replace("x * 2.0", "x + x");
     let (second, modules) = built(&edited);
-    assert_eq!(second.len(), 2);
-    assert_eq!(second.intersection(&first).count(), 1, "`halve` has stayed");
+    assert_eq!(second.len(), 8);
+    assert_eq!(
+        second.intersection(&first).count(),
+        7,
+        "all but `double` have stayed"
+    );
     // From nothing, the same modules.
     fs::remove_dir_all(&kept).expect("it can be removed");
-    built(&TWO_KERNELS.replace("0.5", "0.25"));
+    built(&EIGHT_KERNELS.replace("halve 0.5", "halve 0.75"));
     fs::remove_dir_all(&kept).expect("it can be removed");
     let (third, again) = built(&edited);
     assert_eq!((third, again), (second, modules));

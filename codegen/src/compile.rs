@@ -258,7 +258,7 @@ pub fn compile(
     let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
     let spec = target_spec(&version, &target_dir)?;
     let flags_of_all = flags_of_all(compiler);
-    let mut separately = Separately::of(&target_dir, &version);
+    let mut separately = Separately::of(&target_dir, &version, wanted.names().len());
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -401,10 +401,15 @@ fn run(
 /// one, like a full disk.
 const NOTED_FOR: Duration = Duration::from_secs(24 * 60 * 60);
 
+/// The most entry points that are linked at once in any case: to look at what each reaches, and to start the linker by
+/// itself, takes as long as linking about as many.
+const MOST_AT_ONCE: usize = 6;
+
 /// Whether linking is a step of its own: [`Unlinked`]. Where this compiler cannot do that, or what it would link is wrong,
 /// it compiles and links at once.
 struct Separately {
     is_on: bool,
+    /// Whether there is nothing to learn about the compiler.
     is_noted: bool,
     /// Holds the version of a compiler that links nothing by itself.
     file: PathBuf,
@@ -412,15 +417,16 @@ struct Separately {
 }
 
 impl Separately {
-    fn of(target_dir: &Path, version: &str) -> Self {
+    /// For a crate of so many entry points.
+    fn of(target_dir: &Path, version: &str, entry_points: usize) -> Self {
         let file = target_dir.join("links-at-once");
         let age = std::fs::metadata(&file).and_then(|it| it.modified());
         let age = age.map_or(Duration::MAX, |it| it.elapsed().unwrap_or_default());
         let is_noted =
             age < NOTED_FOR && std::fs::read_to_string(&file).is_ok_and(|it| it == version);
         Self {
-            is_on: !is_noted,
-            is_noted,
+            is_on: !is_noted && entry_points > MOST_AT_ONCE,
+            is_noted: is_noted || entry_points <= MOST_AT_ONCE,
             file,
             version: version.into(),
         }
