@@ -1,4 +1,4 @@
-//! From a kernel crate to raw SPIR-V, a module for each entry point: [`crate::link`].
+//! From a kernel crate to raw SPIR-V, a module for each entry point: `link.rs`.
 //!
 //! This runs cargo as `spirv-builder` does, with the same flags, and takes rust-gpu's types for
 //! the target's description and for the result from the crate that spirv-builder takes them from.
@@ -671,7 +671,7 @@ fn last_artefact(messages: &str, target_dir: &Path) -> Option<Artefact> {
                     fresh: message.fresh,
                 })
         })
-        .last()
+        .next_back()
 }
 
 #[cfg(test)]

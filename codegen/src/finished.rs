@@ -1,4 +1,4 @@
-//! Finished modules, kept from one build to the next ([`crate::kept`]). An edit changes few of a crate's modules, and
+//! Finished modules, kept from one build to the next (`kept.rs`). An edit changes few of a crate's modules, and
 //! optimising all of them again would take longer than everything else.
 
 use std::collections::BTreeMap;
