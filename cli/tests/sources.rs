@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
+use hankel_codegen::compile::LINKED_SUBFOLDER;
 use tempfile::TempDir;
 
 fn root() -> &'static Path {
@@ -347,19 +348,71 @@ more! { halve 0.5 third 0.3 fourth 0.25 fifth 0.2 sixth 0.16 seventh 0.14 eighth
 hankel_dsl::kernels![double, halve, third, fourth, fifth, sixth, seventh, eighth];
 "#;
 
+/// Gives the crate a name that no other test has: modules are kept by it.
+fn rename(desk: &Desk, name: &str) {
+    for file in ["my-kernels/Cargo.toml", "my-kernels/Cargo.lock"] {
+        let text = fs::read_to_string(desk.path(file)).expect("it was made");
+        let new = format!("name = \"{name}\"");
+        desk.write(file, &text.replacen("name = \"my-kernels\"", &new, 1));
+    }
+}
+
+#[test]
+fn errors_name_todays_line_whatever_is_kept() {
+    if !has_compiler() {
+        return;
+    }
+    let desk = new_crate();
+    rename(&desk, "eight-errors");
+    let line = "build --manifest-path Cargo.toml --target spirv --out out";
+    let found = "x * 2.0";
+    for (wrong, message) in [
+        // Found in the module that was linked.
+        (
+            "((x as u64).rotate_left(35) & 255) as f32",
+            "rust-gpu rotates a 64-bit number",
+        ),
+        // Found by the linker.
+        (
+            "(core::ptr::from_ref(&x) as usize as u32) as f32",
+            "cannot convert pointers to integers",
+        ),
+    ] {
+        let text = EIGHT_KERNELS.replace(found, wrong);
+        for above in ["", "// A line more.\n"] {
+            let text = text.replace("fn doubled", &format!("{above}fn doubled"));
+            desk.write("my-kernels/src/lib.rs", &text);
+            let run = desk.hankel(line);
+            let said = String::from_utf8_lossy(&run.0.stderr).into_owned();
+            let at = text.lines().position(|it| it.contains(wrong));
+            let place = format!("src/lib.rs:{}:", at.expect("it stands there") + 1);
+            assert!(!run.0.status.success(), "{said}");
+            assert!(
+                said.contains(message) && said.contains(&place),
+                "{place} {said}"
+            );
+        }
+    }
+    desk.write("my-kernels/src/lib.rs", EIGHT_KERNELS);
+    desk.hankel(line).code(0);
+    let noted = root().join("target/hankel/spirv/links-at-once");
+    assert!(
+        !noted.exists(),
+        "an author's error says nothing of the compiler"
+    );
+}
+
 #[test]
 fn an_edit_links_again_what_it_reaches_and_nothing_else() {
     if !has_compiler() {
         return;
     }
     let desk = new_crate();
-    // A name that no other test has: modules are kept by it.
-    for file in ["my-kernels/Cargo.toml", "my-kernels/Cargo.lock"] {
-        let text = fs::read_to_string(desk.path(file)).expect("it was made");
-        let text = text.replacen("name = \"my-kernels\"", "name = \"eight-kernels\"", 1);
-        desk.write(file, &text);
-    }
-    let kept = root().join("target/hankel/spirv/linked/eight_kernels");
+    rename(&desk, "eight-kernels");
+    let kept = root()
+        .join("target")
+        .join(LINKED_SUBFOLDER)
+        .join("eight_kernels");
     if kept.exists() {
         fs::remove_dir_all(&kept).expect("it can be removed");
     }

@@ -18,7 +18,6 @@ use hankel_system::process::Program;
 use rspirv::spirv::Capability;
 use rustc_codegen_spirv_types::{SpirvTarget, TargetSpec, TargetSpecVersion};
 use semver::Version;
-use serde::Deserialize;
 
 use crate::diagnostics::source::Arrays;
 use crate::diagnostics::{self, rust_gpu};
@@ -27,7 +26,8 @@ use crate::finished::finish_all;
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
 use crate::library;
-use crate::link::{self, LIST, Linked, Unlinked};
+use crate::link::{self, LIST, Linked, Separately, Unlinked};
+use crate::messages::{Artifact, Messages};
 use crate::spirv::trim;
 
 /// What the modules are compiled for.
@@ -266,15 +266,19 @@ pub fn compile(
         // cargo has no other word for where the library's sources are.
         cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", &library);
         cargo.arg("--").args(&flags).args(separately.flag());
-        let messages = run(cargo, &manifest, wanted.names(), progress)?;
+        let said = run(cargo, &manifest, wanted.names(), progress)?;
+        let messages = Messages::read(&said).map_err(|error| Error::Inputs {
+            path: folder.to_owned(),
+            problem: format!("a message of cargo cannot be read: {error}"),
+        })?;
         let artefact = last_artefact(&messages, &target_dir).ok_or_else(|| Error::Manifest {
             path: manifest.clone(),
             problem: "cargo made no SPIR-V of it: its [lib] needs crate-type = [\"lib\", \"dylib\"] and a kernel".into(),
         })?;
-        if !artefact.belongs_to(&manifest, separately.is_on)? {
+        if !artefact.belongs_to(&manifest, separately.is_on())? {
             continue;
         }
-        let linked = if separately.is_on {
+        let linked = if separately.is_on() {
             let unlinked = Unlinked {
                 compiler,
                 version: &version,
@@ -286,12 +290,12 @@ pub fn compile(
                 is_part: matches!(wanted, Wanted::Only(_)),
             };
             let Some(linked) = unlinked.link() else {
-                separately.is_on = false;
+                separately.fails();
                 continue;
             };
             linked
         } else {
-            separately.does_not_work();
+            separately.at_once_works();
             link::read_list(&artefact.file)?.into()
         };
         let missing = wanted.names().iter();
@@ -317,7 +321,7 @@ pub fn compile(
         let settled = inputs.newest(folder).is_none_or(|newest| newest < start);
         if settled || before.as_ref() == Some(&inputs) {
             let read = inputs.files.keys().chain(inputs.folders.keys());
-            last.record(read.map(|name| folder.join(name)), &messages, &own, start)?;
+            last.record(read.map(|name| folder.join(name)), &said, &own, start)?;
             return Ok(Compiled {
                 linked,
                 inputs,
@@ -395,53 +399,6 @@ fn run(
         return Err(failure(manifest, names, &said, &messages));
     }
     Ok(messages)
-}
-
-/// How long a compiler counts as one that cannot link what it has not compiled just now: the cause may have been another
-/// one, like a full disk.
-const NOTED_FOR: Duration = Duration::from_secs(24 * 60 * 60);
-
-/// The most entry points that are linked at once in any case: to look at what each reaches, and to start the linker by
-/// itself, takes as long as linking about as many.
-const MOST_AT_ONCE: usize = 6;
-
-/// Whether linking is a step of its own: [`Unlinked`]. Where this compiler cannot do that, or what it would link is wrong,
-/// it compiles and links at once.
-struct Separately {
-    is_on: bool,
-    /// Whether there is nothing to learn about the compiler.
-    is_noted: bool,
-    /// Holds the version of a compiler that links nothing by itself.
-    file: PathBuf,
-    version: String,
-}
-
-impl Separately {
-    /// For a crate of so many entry points.
-    fn of(target_dir: &Path, version: &str, entry_points: usize) -> Self {
-        let file = target_dir.join("links-at-once");
-        let age = std::fs::metadata(&file).and_then(|it| it.modified());
-        let age = age.map_or(Duration::MAX, |it| it.elapsed().unwrap_or_default());
-        let is_noted =
-            age < NOTED_FOR && std::fs::read_to_string(&file).is_ok_and(|it| it == version);
-        Self {
-            is_on: !is_noted && entry_points > MOST_AT_ONCE,
-            is_noted: is_noted || entry_points <= MOST_AT_ONCE,
-            file,
-            version: version.into(),
-        }
-    }
-
-    fn flag(&self) -> Option<&'static str> {
-        self.is_on.then_some("-Zno-link")
-    }
-
-    /// What was not linked by itself was linked at once. Where this cannot be noted, the next build tries both again.
-    fn does_not_work(&self) {
-        if !self.is_noted {
-            let _ = std::fs::write(&self.file, &self.version);
-        }
-    }
 }
 
 fn target_spec(version: &str, target_dir: &Path) -> Result<TargetSpec> {
@@ -641,42 +598,21 @@ impl Artefact {
 }
 
 /// The artefact of the crate itself. cargo does not name the file where rustc has not written it.
-fn last_artefact(messages: &str, target_dir: &Path) -> Option<Artefact> {
-    #[derive(Deserialize)]
-    struct Message {
-        reason: String,
-        target: Option<Target>,
-        #[serde(default)]
-        fresh: bool,
-    }
-    #[derive(Deserialize)]
-    struct Target {
-        name: String,
-        crate_types: Vec<String>,
-    }
-    let messages = messages.lines().filter(|line| line.starts_with('{'));
-    messages
-        .filter_map(|line| serde_json::from_str::<Message>(line).ok())
-        .filter(|message| message.reason == "compiler-artifact")
-        .filter_map(|message| {
-            let target = message.target?;
-            let name = target.name.replace('-', "_");
-            let file = target_dir.join(TARGET).join("release");
-            target
-                .crate_types
-                .iter()
-                .any(|it| it == CRATE_TYPE)
-                .then(|| Artefact {
-                    file: file.join(format!("{name}{LIST}")),
-                    fresh: message.fresh,
-                })
-        })
-        .next_back()
+fn last_artefact(messages: &Messages, target_dir: &Path) -> Option<Artefact> {
+    let is_ours = |it: &&Artifact| it.target.crate_types.iter().any(|of| of == CRATE_TYPE);
+    let unit = messages.artifacts.iter().rfind(is_ours)?;
+    let name = unit.target.name.replace('-', "_");
+    let folder = target_dir.join(TARGET).join("release");
+    Some(Artefact {
+        file: folder.join(format!("{name}{LIST}")),
+        fresh: unit.fresh,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::messages::tests::artifact;
 
     #[test]
     fn versions_are_read() {
@@ -748,23 +684,16 @@ mod tests {
 
     #[test]
     fn the_last_artefact_counts() {
-        let artifact = |name: &str, of: &str, fresh: bool| {
-            format!(
-                "{{\"reason\":\"compiler-artifact\",\"fresh\":{fresh},\
-                 \"target\":{{\"name\":\"{name}\",\"crate_types\":[\"{of}\"]}}}}\n"
-            )
-        };
         let messages = [
             artifact("glam", "lib", true),
-            "noise\n".into(),
             artifact("a-b", "dylib", true),
             artifact("c", "proc-macro", false),
-            "{\"reason\":\"build-finished\"}".into(),
         ];
+        let messages = Messages::read(&messages.concat()).unwrap();
         let folder = Path::new("/target");
-        let found = last_artefact(&messages.concat(), folder).unwrap();
+        let found = last_artefact(&messages, folder).unwrap();
         let file = folder.join(TARGET).join("release/a_b.spv.json");
         assert_eq!((found.file, found.fresh), (file, true));
-        assert_eq!(last_artefact("{}", folder), None);
+        assert_eq!(last_artefact(&Messages::default(), folder), None);
     }
 }

@@ -3,36 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
 use crate::error::{During, Error, Result};
 use crate::inputs::{Names, normal, relative, workspace_of};
-
-/// What is read of cargo's messages.
-#[derive(Deserialize)]
-#[serde(tag = "reason", rename_all = "kebab-case")]
-enum Message {
-    CompilerArtifact(Artifact),
-    BuildScriptExecuted(Script),
-    #[serde(other)]
-    Other,
-}
-
-/// A unit that was compiled, now or before.
-#[derive(Deserialize)]
-struct Artifact {
-    package_id: String,
-    manifest_path: PathBuf,
-    filenames: Vec<PathBuf>,
-}
-
-/// A build script that ran, now or before.
-#[derive(Deserialize)]
-struct Script {
-    package_id: String,
-    out_dir: PathBuf,
-    env: Vec<(String, String)>,
-}
+use crate::messages::{Artifact, Messages, Script};
 
 /// Where a build took place.
 pub(crate) struct Build<'a> {
@@ -40,8 +13,8 @@ pub(crate) struct Build<'a> {
     pub folder: &'a Path,
     /// Folders whose files are made by the build, or belong to the compiler.
     pub own: &'a [PathBuf],
-    /// What cargo wrote to the standard output, as JSON.
-    pub messages: &'a str,
+    /// What cargo said.
+    pub messages: &'a Messages,
     /// The file of the crate itself. cargo does not name it where rustc has not written it.
     pub made: &'a Path,
 }
@@ -52,36 +25,20 @@ pub(crate) struct Build<'a> {
 ///
 /// cargo or rustc did not say it, or in a form that is not known.
 pub(crate) fn gather(build: &Build<'_>) -> Result<Names> {
-    let mut artifacts = Vec::new();
-    let mut scripts = Vec::new();
-    for line in build.messages.lines().filter(|line| line.starts_with('{')) {
-        match serde_json::from_str(line) {
-            Ok(Message::CompilerArtifact(mut artifact)) => {
-                if artifact.filenames.is_empty() {
-                    artifact.filenames.push(build.made.to_owned());
-                }
-                artifacts.push(artifact);
-            }
-            Ok(Message::BuildScriptExecuted(script)) => scripts.push(script),
-            Ok(Message::Other) => {}
-            Err(error) => {
-                return Err(Error::Inputs {
-                    path: build.folder.to_owned(),
-                    problem: format!("a message of cargo cannot be read: {error}"),
-                });
-            }
-        }
-    }
+    let Messages { artifacts, scripts } = build.messages;
     // The compiler's own crates belong to its version.
-    artifacts.retain(|it: &Artifact| !build.is_own(&it.manifest_path));
+    let artifacts: Vec<&Artifact> = artifacts
+        .iter()
+        .filter(|it| !build.is_own(&it.manifest_path))
+        .collect();
     let workspace = workspace_of(build.folder)?;
     let mut names = Names::default();
     let mut folders = BTreeMap::new();
-    for artifact in &artifacts {
+    for artifact in artifacts {
         let folder = artifact.manifest_path.parent().unwrap_or(build.folder);
         folders.insert(artifact.package_id.as_str(), folder);
         names.packages.insert(package(&artifact.package_id));
-        let info = DepInfo::of(artifact)?;
+        let info = DepInfo::of(artifact, build.made)?;
         let set: BTreeSet<&str> = scripts
             .iter()
             .filter(|script| script.package_id == artifact.package_id)
@@ -115,7 +72,7 @@ pub(crate) fn gather(build: &Build<'_>) -> Result<Names> {
             }
         }
     }
-    for script in &scripts {
+    for script in scripts {
         let Some(folder) = folders.get(script.package_id.as_str()) else {
             continue;
         };
@@ -195,12 +152,13 @@ struct DepInfo {
 }
 
 impl DepInfo {
-    /// Finds it beside the unit's files.
-    fn of(artifact: &Artifact) -> Result<Self> {
-        let file = artifact
-            .filenames
-            .iter()
-            .find_map(|file| dep_info(file))
+    /// Finds it beside the unit's files, or where it has none, beside `made`.
+    fn of(artifact: &Artifact, made: &Path) -> Result<Self> {
+        let none = artifact.filenames.is_empty().then_some(made);
+        let files = artifact.filenames.iter().map(PathBuf::as_path);
+        let file = files
+            .chain(none)
+            .find_map(dep_info)
             .ok_or_else(|| Error::Inputs {
                 path: artifact.manifest_path.clone(),
                 problem: "rustc left no list of what it read".into(),

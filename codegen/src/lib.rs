@@ -37,6 +37,7 @@ mod library;
 mod link;
 pub mod lint;
 pub mod manifest;
+mod messages;
 pub mod placement;
 mod registers;
 pub mod scaffold;

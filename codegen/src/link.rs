@@ -8,18 +8,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+use std::time::Duration;
 
 use hankel_system::process::Program;
 use hankel_system::temporary::Folder;
 use object::read::archive::ArchiveFile;
 use rspirv::dr::Module;
 use rustc_codegen_spirv_types::{CompileResult, ModuleResult};
-use serde::Deserialize;
 
 use crate::compile::{CRATE_TYPE, Compiler, TARGET};
 use crate::error::{During, Error, Result};
 use crate::files::sha256;
 use crate::kept::{self, Kept};
+use crate::messages::Messages;
 use crate::spirv::fingerprint::{self, Fingerprint};
 use crate::spirv::{self, divide};
 
@@ -60,6 +61,64 @@ impl Linked {
     }
 }
 
+/// The most entry points that are linked at once in any case: to look at what each reaches, and to start the linker by
+/// itself, takes as long as linking about as many.
+const MOST_AT_ONCE: usize = 6;
+
+/// How long a compiler counts as one that cannot link what it has not compiled just now: the cause may have been another
+/// one, like a full disk.
+const NOTED_FOR: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Whether linking is a step of its own: [`Unlinked`]. Where this compiler cannot do that, or what it would link is wrong,
+/// it compiles and links at once.
+pub(crate) struct Separately {
+    is_on: bool,
+    has_failed: bool,
+    /// Holds the version of a compiler that links nothing by itself.
+    file: PathBuf,
+    version: String,
+}
+
+impl Separately {
+    /// For a crate of so many entry points.
+    pub(crate) fn of(target_dir: &Path, version: &str, entry_points: usize) -> Self {
+        let file = target_dir.join("links-at-once");
+        let age = std::fs::metadata(&file).and_then(|it| it.modified());
+        let age = age.map_or(Duration::MAX, |it| it.elapsed().unwrap_or_default());
+        let is_noted =
+            age < NOTED_FOR && std::fs::read_to_string(&file).is_ok_and(|it| it == version);
+        Self {
+            is_on: !is_noted && entry_points > MOST_AT_ONCE,
+            has_failed: false,
+            file,
+            version: version.into(),
+        }
+    }
+
+    pub(crate) fn is_on(&self) -> bool {
+        self.is_on
+    }
+
+    /// rustc's flag.
+    pub(crate) fn flag(&self) -> Option<&'static str> {
+        self.is_on.then_some("-Zno-link")
+    }
+
+    /// It could not be linked. Either the compiler cannot do that, or what it links is wrong.
+    pub(crate) fn fails(&mut self) {
+        self.is_on = false;
+        self.has_failed = true;
+    }
+
+    /// What could not be linked by itself was linked at once: so it was the compiler. Where this cannot be noted, the
+    /// next build tries both again.
+    pub(crate) fn at_once_works(&self) {
+        if self.has_failed {
+            let _ = std::fs::write(&self.file, &self.version);
+        }
+    }
+}
+
 /// A crate that rustc has compiled and not linked.
 pub(crate) struct Unlinked<'a> {
     pub compiler: &'a Compiler,
@@ -71,8 +130,8 @@ pub(crate) struct Unlinked<'a> {
     pub target_dir: &'a Path,
     /// Where linked modules are kept, a folder for each crate.
     pub linked_dir: &'a Path,
-    /// What cargo said, as JSON.
-    pub messages: &'a str,
+    /// What cargo said.
+    pub messages: &'a Messages,
     /// The list of modules that linking would have written.
     pub list: &'a Path,
     /// Whether other entry points of the crate may be asked for by the next build.
@@ -193,7 +252,7 @@ impl Unlinked<'_> {
         parts.extend(flags);
         let mut libraries = Vec::new();
         for rlib in rlibs(self.messages) {
-            let bytes = std::fs::read(&rlib).ok()?;
+            let bytes = std::fs::read(rlib).ok()?;
             let archive = ArchiveFile::parse(&*bytes).ok()?;
             for member in archive.members() {
                 let member = member.ok()?;
@@ -218,8 +277,7 @@ fn of_library(object: &[u8]) -> Option<String> {
         return Some(sha256(object));
     }
     let module = spirv::load(&spirv::words(object, "").ok()?, "").ok()?;
-    let hash = fingerprint::library(&module);
-    Some(hash.iter().map(|byte| format!("{byte:02x}")).collect())
+    Some(sha256(&fingerprint::library(&module)))
 }
 
 /// The name of a kept module.
@@ -234,23 +292,12 @@ fn place(list: &Path) -> Option<(PathBuf, String)> {
 }
 
 /// The libraries for the target among cargo's artefacts.
-fn rlibs(messages: &str) -> Vec<PathBuf> {
-    #[derive(Deserialize)]
-    struct Message {
-        reason: String,
-        #[serde(default)]
-        filenames: Vec<PathBuf>,
-    }
-    let messages = messages.lines().filter(|line| line.starts_with('{'));
-    messages
-        .filter_map(|line| serde_json::from_str::<Message>(line).ok())
-        .filter(|message| message.reason == "compiler-artifact")
-        .flat_map(|message| message.filenames)
-        .filter(|file| {
-            let is_for_target = file.iter().any(|part| part == TARGET);
-            is_for_target && file.extension().is_some_and(|it| it == "rlib")
-        })
-        .collect()
+fn rlibs(messages: &Messages) -> impl Iterator<Item = &Path> {
+    let files = messages.artifacts.iter().flat_map(|it| &it.filenames);
+    files.map(PathBuf::as_path).filter(|file| {
+        let is_for_target = file.iter().any(|part| part == TARGET);
+        is_for_target && file.extension().is_some_and(|it| it == "rlib")
+    })
 }
 
 /// Entry points in at most `most` groups of about the same size.
@@ -369,6 +416,30 @@ pub(crate) fn read_list(list: &Path) -> Result<BTreeMap<String, Vec<u8>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_compiler_that_links_nothing_by_itself_is_noted() {
+        let folder = Folder::new().unwrap();
+        let of = |version: &str| Separately::of(folder.path(), version, MOST_AT_ONCE + 1);
+        assert!(!Separately::of(folder.path(), "1", MOST_AT_ONCE).is_on());
+        let mut first = of("1");
+        first.at_once_works();
+        assert!(of("1").is_on(), "it has not failed");
+        first.fails();
+        assert!(
+            !first.is_on() && of("1").is_on(),
+            "what it linked may be wrong"
+        );
+        first.at_once_works();
+        assert!(!of("1").is_on() && of("2").is_on());
+        let note = std::fs::File::options()
+            .append(true)
+            .open(&first.file)
+            .unwrap();
+        note.set_modified(std::time::SystemTime::now() - 2 * NOTED_FOR)
+            .unwrap();
+        assert!(of("1").is_on());
+    }
 
     #[test]
     fn groups_are_of_about_the_same_size() {

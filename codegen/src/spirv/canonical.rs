@@ -242,7 +242,8 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spirv::{load, store};
+    use crate::spirv::store;
+    use crate::spirv::tests::of_wgsl;
 
     const TEXT: &str = "
         struct Row { a: vec4<f32>, b: u32 }
@@ -265,16 +266,7 @@ mod tests {
         }";
 
     fn module() -> Module {
-        let parsed = naga::front::wgsl::parse_str(TEXT).unwrap();
-        let info = naga::valid::Validator::new(
-            naga::valid::ValidationFlags::all(),
-            naga::valid::Capabilities::all(),
-        )
-        .validate(&parsed)
-        .unwrap();
-        let options = naga::back::spv::Options::default();
-        let words = naga::back::spv::write_vec(&parsed, &info, &options, None).unwrap();
-        load(&words, "test").unwrap()
+        of_wgsl(TEXT)
     }
 
     /// The same module with other numbers, and what may be declared in any order in another one.

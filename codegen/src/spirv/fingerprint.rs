@@ -49,7 +49,7 @@ pub fn entry_points(module: &Module) -> BTreeMap<String, Fingerprint> {
         .collect()
 }
 
-/// The hash of a module that others are linked with: of all that it exports, in the order of the file.
+/// The hash of a module that others are linked with: of all of its functions, in the order of the file.
 pub fn library(module: &Module) -> Hash {
     let mut all = Fingerprints::of(module);
     let mut hasher = Sha256::new();
@@ -238,7 +238,7 @@ mod tests {
     const SCALED: &str = "
         @group(0) @binding(0) var<storage, read_write> numbers: array<f32>;
         fn twice(x: f32) -> f32 { return x * 2.0; }
-        fn scaled(x: f32) -> f32 { let product = twice(x) * 3.0; return product; }
+        fn scaled(x: f32) -> f32 { var product = twice(x) * 3.0; return product; }
         @compute @workgroup_size(64)
         fn scale(@builtin(global_invocation_id) id: vec3<u32>) {
             numbers[id.x] = scaled(numbers[id.x]);
