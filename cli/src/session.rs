@@ -17,7 +17,7 @@ use hankel_codegen::build::{Modules, Request};
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
 use hankel_codegen::diff;
-use hankel_codegen::finished;
+use hankel_codegen::finished::{self, finish_all};
 use hankel_codegen::inputs::{Inputs, normal};
 use hankel_codegen::manifest::WriteOptions;
 use hankel_codegen::placement::Placement;
@@ -357,11 +357,14 @@ impl Session {
         let compiled = self.compile(manifest, &target, names, reason.take())?;
         let (modules, kept) = if is_all {
             let finished = finished::folder(&target, &self.krate.name);
-            (compiled.finish(&kernels, Some(&finished))?, kept)
+            (
+                finish_all(&compiled.modules, &kernels, Some(&finished))?,
+                kept,
+            )
         } else {
             let is_wanted = |kernel: &&Kernel| names.contains(&kernel.name.as_str());
             let wanted: Vec<Kernel> = kernels.iter().filter(is_wanted).cloned().collect();
-            (compiled.finish(&wanted, None)?, some)
+            (finish_all(&compiled.modules, &wanted, None)?, some)
         };
         let bundle = Bundle::new(
             &self.krate.name,

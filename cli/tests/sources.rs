@@ -358,33 +358,35 @@ fn rename(desk: &Desk, name: &str) {
 }
 
 #[test]
-fn errors_name_todays_line_whatever_is_kept() {
+fn errors_name_the_line_where_it_is_now() {
     if !has_compiler() {
         return;
     }
     let desk = new_crate();
     rename(&desk, "eight-errors");
     let line = "build --manifest-path Cargo.toml --target spirv --out out";
-    let found = "x * 2.0";
-    for (wrong, message) in [
-        // Found in the module that was linked.
+    for (wrong, message, at) in [
+        // Found in the module that was linked, which has no lines: that of the kernel is told.
         (
             "((x as u64).rotate_left(35) & 255) as f32",
             "rust-gpu rotates a 64-bit number",
+            "#[kernel",
         ),
         // Found by the linker.
         (
             "(core::ptr::from_ref(&x) as usize as u32) as f32",
             "cannot convert pointers to integers",
+            "from_ref",
         ),
     ] {
-        let text = EIGHT_KERNELS.replace(found, wrong);
         for above in ["", "// A line more.\n"] {
-            let text = text.replace("fn doubled", &format!("{above}fn doubled"));
+            let text = EIGHT_KERNELS
+                .replace("x * 2.0", wrong)
+                .replace("fn doubled", &format!("{above}fn doubled"));
             desk.write("my-kernels/src/lib.rs", &text);
             let run = desk.hankel(line);
             let said = String::from_utf8_lossy(&run.0.stderr).into_owned();
-            let at = text.lines().position(|it| it.contains(wrong));
+            let at = text.lines().position(|it| it.contains(at));
             let place = format!("src/lib.rs:{}:", at.expect("it stands there") + 1);
             assert!(!run.0.status.success(), "{said}");
             assert!(

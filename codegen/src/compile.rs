@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
-use hankel_dsl::native::describe::Kernel;
 use hankel_system::overlooked::LastBuild;
 use hankel_system::process::Program;
 use rspirv::spirv::Capability;
@@ -22,11 +21,10 @@ use semver::Version;
 use crate::diagnostics::source::Arrays;
 use crate::diagnostics::{self, rust_gpu};
 use crate::error::{During, Error, Result};
-use crate::finished::finish_all;
 use crate::gather::{Build, gather};
 use crate::inputs::Inputs;
 use crate::library;
-use crate::link::{self, LIST, Linked, Separately, Unlinked};
+use crate::link::{self, LIST, Separately, Unlinked};
 use crate::messages::{Artifact, Messages};
 use crate::spirv::trim;
 
@@ -147,36 +145,12 @@ fn leaks(name: &str) -> bool {
 /// What came of a kernel crate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compiled {
-    /// Raw SPIR-V.
-    pub linked: Linked,
+    /// Raw SPIR-V by entry point.
+    pub modules: BTreeMap<String, Vec<u8>>,
     /// What it was made from.
     pub inputs: Inputs,
     /// What the compiler's `rustc --version` prints.
     pub compiler: String,
-}
-
-impl Compiled {
-    /// Finishes the modules of `kernels`: [`finish_all`].
-    ///
-    /// # Errors
-    ///
-    /// As for that.
-    pub fn finish(
-        &self,
-        kernels: &[Kernel],
-        kept: Option<&Path>,
-    ) -> Result<BTreeMap<String, Vec<u8>>> {
-        let finished = finish_all(&self.linked.modules, kernels, kept);
-        let failures = match &finished {
-            Err(Error::Kernel(failure)) => std::slice::from_ref(failure),
-            Err(Error::Kernels(failures)) => failures,
-            _ => &[],
-        };
-        for failure in failures {
-            self.linked.forget(&failure.kernel);
-        }
-        finished
-    }
 }
 
 /// How often a crate is compiled whose files change meanwhile.
@@ -278,7 +252,7 @@ pub fn compile(
         if !artefact.belongs_to(&manifest, separately.is_on())? {
             continue;
         }
-        let linked = if separately.is_on() {
+        let modules = if separately.is_on() {
             let unlinked = Unlinked {
                 compiler,
                 version: &version,
@@ -289,24 +263,21 @@ pub fn compile(
                 list: &artefact.file,
                 is_part: matches!(wanted, Wanted::Only(_)),
             };
-            let Some(linked) = unlinked.link() else {
+            let Some(modules) = unlinked.link() else {
                 separately.fails();
                 continue;
             };
-            linked
+            modules
         } else {
             separately.at_once_works();
-            link::read_list(&artefact.file)?.into()
+            link::read_list(&artefact.file)?
         };
         let missing = wanted.names().iter();
-        if let Some(missing) = missing
-            .copied()
-            .find(|it| !linked.modules.contains_key(*it))
-        {
+        if let Some(missing) = missing.copied().find(|it| !modules.contains_key(*it)) {
             return Err(Error::NoEntryPoint {
                 manifest,
                 kernel: missing.into(),
-                found: linked.modules.into_keys().collect(),
+                found: modules.into_keys().collect(),
             });
         }
         let names = gather(&Build {
@@ -323,7 +294,7 @@ pub fn compile(
             let read = inputs.files.keys().chain(inputs.folders.keys());
             last.record(read.map(|name| folder.join(name)), &said, &own, start)?;
             return Ok(Compiled {
-                linked,
+                modules,
                 inputs,
                 compiler: version,
             });

@@ -49,17 +49,16 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     let mut module =
         spirv::load(&words, name).or_else(|unread| validate(&words, name).and(Err(unread)))?;
     let place = Some(format!("{}:{}", kernel.file, kernel.line));
-    narrow::widen(&mut module, name).map_err(|failure| Failure {
-        construct: failure.construct.clone().or_else(|| place.clone()),
+    // rust-gpu leaves no lines of the source in a module.
+    let placed = |failure: Failure| Failure {
+        construct: failure.construct.or_else(|| place.clone()),
         ..failure
-    })?;
+    };
+    narrow::widen(&mut module, name).map_err(placed)?;
     // What is left may be resolved by spirv-opt, unless it is invalid.
     let (has_references, left) = references::resolve(&mut module, name);
-    validate(&spirv::store(&module), name).map_err(|invalid| left.unwrap_or(invalid))?;
-    refused::check(&module, name).map_err(|failure| Failure {
-        construct: failure.construct.clone().or_else(|| place.clone()),
-        ..failure
-    })?;
+    validate(&spirv::store(&module), name).map_err(|invalid| left.map_or(invalid, placed))?;
+    refused::check(&module, name).map_err(placed)?;
     canonical::order(&mut module);
     libm::mend(&mut module);
     let words = optimise(module, name)?;

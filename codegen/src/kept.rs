@@ -2,7 +2,7 @@
 //! from. So a kept file is never stale, and one that is missing or damaged is made again.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::files::{self, sha256, write_whole};
 use crate::folder::MOST_BYTES;
@@ -24,7 +24,7 @@ impl Kept {
     }
 
     /// The file of a module.
-    pub(crate) fn file(&self, name: &str) -> PathBuf {
+    fn file(&self, name: &str) -> PathBuf {
         self.folder.join(format!("{name}.spv"))
     }
 
@@ -52,13 +52,8 @@ impl Kept {
             let is_used = |stem: &str| used.contains(stem);
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             if path.extension().is_some_and(|it| it == "spv") && !stem.is_some_and(is_used) {
-                remove(&path);
+                let _ = std::fs::remove_file(&path);
             }
         }
     }
-}
-
-/// Removes a kept file. One that stays is as right as before.
-pub(crate) fn remove(file: &Path) {
-    let _ = std::fs::remove_file(file);
 }

@@ -19,7 +19,7 @@ use rustc_codegen_spirv_types::{CompileResult, ModuleResult};
 use crate::compile::{CRATE_TYPE, Compiler, TARGET};
 use crate::error::{During, Error, Result};
 use crate::files::sha256;
-use crate::kept::{self, Kept};
+use crate::kept::Kept;
 use crate::messages::Messages;
 use crate::spirv::fingerprint::{self, Fingerprint};
 use crate::spirv::{self, divide};
@@ -32,34 +32,6 @@ pub(crate) const LIST: &str = ".spv.json";
 
 /// The end of the names of objects.
 const OBJECT: &str = ".rcgu.o";
-
-/// Raw modules of entry points.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Linked {
-    /// By the entry point's name.
-    pub modules: BTreeMap<String, Vec<u8>>,
-    /// Where a module is kept for the next build.
-    kept: BTreeMap<String, PathBuf>,
-}
-
-impl From<BTreeMap<String, Vec<u8>>> for Linked {
-    fn from(modules: BTreeMap<String, Vec<u8>>) -> Self {
-        Self {
-            modules,
-            kept: BTreeMap::new(),
-        }
-    }
-}
-
-impl Linked {
-    /// Has the next build link this one again. What is kept has the lines of the source as they were when it was linked,
-    /// and a message about it would name them.
-    pub fn forget(&self, kernel: &str) {
-        if let Some(file) = self.kept.get(kernel) {
-            kept::remove(file);
-        }
-    }
-}
 
 /// The most entry points that are linked at once in any case: to look at what each reaches, and to start the linker by
 /// itself, takes as long as linking about as many.
@@ -141,7 +113,7 @@ pub(crate) struct Unlinked<'a> {
 impl Unlinked<'_> {
     /// Links it. `None`: this compiler's files are not as they are expected, or the linker fails. Then the crate is to be
     /// linked as a whole, by which cargo says what is wrong.
-    pub(crate) fn link(&self) -> Option<Linked> {
+    pub(crate) fn link(&self) -> Option<BTreeMap<String, Vec<u8>>> {
         let (folder, name) = place(self.list)?;
         let rlink = std::fs::read(folder.join(format!("{name}.rlink"))).ok()?;
         let rlink = Rlink::of(&rlink, &folder, &name)?;
@@ -155,25 +127,24 @@ impl Unlinked<'_> {
             .into_iter()
             .map(|(name, it)| (name, (named(&base, &it), it)))
             .collect();
-        let mut linked = Linked::default();
+        let mut modules = BTreeMap::new();
         let mut changed = Vec::new();
         for (entry, (file, fingerprint)) in &parts {
             match kept.read(file) {
                 Some(bytes) => {
-                    linked.modules.insert(entry.clone(), bytes);
+                    modules.insert(entry.clone(), bytes);
                 }
                 None => changed.push((fingerprint.size, entry.as_str())),
             }
-            linked.kept.insert(entry.clone(), kept.file(file));
         }
         for (entry, bytes) in self.link_parts(&module, &rlink, &name, changed)? {
             kept.write(&parts.get(&entry)?.0, &bytes);
-            linked.modules.insert(entry, bytes);
+            modules.insert(entry, bytes);
         }
         if !self.is_part {
             kept.sweep(&parts.values().map(|(file, _)| file.as_str()).collect());
         }
-        Some(linked)
+        Some(modules)
     }
 
     /// The modules of these entry points, which come with their sizes.

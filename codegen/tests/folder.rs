@@ -638,10 +638,10 @@ fn bundles_are_read_back_and_never_stale() {
     let compiled = Compiled {
         inputs: Inputs::take(&krate, &names).unwrap(),
         compiler: "rustc 1.98.1".into(),
-        linked: raw.into(),
+        modules: raw,
     };
     let kernels = support::all();
-    let modules = compiled.finish(&kernels, None).unwrap();
+    let modules = finish_all(&compiled.modules, &kernels, None).unwrap();
     let bundle = Bundle::new("a", &kernels, "0.10.0", &compiled, modules);
     fs::write(folder.path().join("old.spv"), "").unwrap();
     bundle.write(folder.path()).unwrap();

@@ -58,7 +58,7 @@ fn committed_spirv_follows_from_its_sources() {
         };
         // A build of some kernels gives what a build of all gives.
         let some: Vec<&str> = names.iter().step_by(30).copied().collect();
-        let alone = compile(Wanted::Only(&some)).linked.modules;
+        let alone = compile(Wanted::Only(&some)).modules;
         assert_eq!(alone.keys().collect::<Vec<_>>(), {
             let mut some = some.iter().collect::<Vec<_>>();
             some.sort();
@@ -68,9 +68,7 @@ fn committed_spirv_follows_from_its_sources() {
         let is_alone = |kernel: &&Kernel| some.contains(&kernel.name.as_str());
         let alone_kernels: Vec<Kernel> = kernels.iter().filter(is_alone).cloned().collect();
         let alone = finish_all(&alone, &alone_kernels, None).unwrap_or_else(|e| panic!("{e}"));
-        let fresh = compiled
-            .finish(&kernels, None)
-            .unwrap_or_else(|e| panic!("{e}"));
+        let fresh = finish_all(&compiled.modules, &kernels, None).unwrap_or_else(|e| panic!("{e}"));
         for (name, bytes) in &fresh {
             assert_eq!(
                 Some(bytes),

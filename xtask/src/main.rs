@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiler, Wanted, compile};
+use hankel_codegen::finished::finish_all;
 use hankel_dsl::native::Entry;
 use hankel_dsl::native::describe::Kernel;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
@@ -108,7 +109,7 @@ impl Committed {
             &self.kernels,
             RUST_GPU_VERSION,
             &compiled,
-            compiled.finish(&self.kernels, None)?,
+            finish_all(&compiled.modules, &self.kernels, None)?,
         ))
     }
 }

@@ -7,7 +7,6 @@ pub(crate) mod edit;
 pub mod exact;
 pub(crate) mod fingerprint;
 pub mod libm;
-pub(crate) mod lines;
 pub mod names;
 pub(crate) mod narrow;
 pub mod order;

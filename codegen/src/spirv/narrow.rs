@@ -11,7 +11,6 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{GlslStd450Op as GLOp, Op, StorageClass, Word};
 
 use super::edit::{Editor, Sequence, replace_each};
-use super::lines::Lines;
 use super::{id, literal, op};
 use crate::error::{Failure, Step};
 
@@ -93,10 +92,10 @@ impl Known {
     }
 
     fn refuse(&self, module: &Module, kernel: &str) -> Result<(), Failure> {
-        let fail = |construct: Option<String>, message: &str| Failure {
+        let fail = |message: &str| Failure {
             kernel: kernel.into(),
             step: Step::Meaning,
-            construct,
+            construct: None,
             message: format!("{message}: write `u32`, and `& 0xff` where the width matters"),
             panicked: false,
         };
@@ -113,7 +112,7 @@ impl Known {
             match op(it) {
                 _ if !holds => {}
                 Op::TypeVector => {
-                    return Err(fail(None, "a shader has no vectors of 8 or 16 bits"));
+                    return Err(fail("a shader has no vectors of 8 or 16 bits"));
                 }
                 Op::TypePointer => {
                     let class = it.operands.first();
@@ -127,7 +126,6 @@ impl Known {
                         .any(|own| class == Some(&Operand::StorageClass(*own)))
                     {
                         return Err(fail(
-                            None,
                             "memory that the host sees has no numbers of 8 or 16 bits",
                         ));
                     }
@@ -145,20 +143,17 @@ impl Known {
         };
         for function in &module.functions {
             for block in &function.blocks {
-                for (place, it) in block.instructions.iter().enumerate() {
+                for it in &block.instructions {
                     if is_cast_whole(it) {
                         return Err(Failure {
                             message: "a shader cannot cast a number to an array of bytes, or back, as `to_le_bytes` \
                                       does: write shifts and masks, `(x >> 8) as u8`"
                                 .into(),
-                            ..fail(Lines::of(module).before(block, place), "")
+                            ..fail("")
                         });
                     }
                     if self.is_met(it) && !self.is_known(it) {
-                        return Err(fail(
-                            Lines::of(module).before(block, place),
-                            &format!("{:?} of a number of 8 or 16 bits", op(it)),
-                        ));
+                        return Err(fail(&format!("{:?} of a number of 8 or 16 bits", op(it))));
                     }
                 }
             }

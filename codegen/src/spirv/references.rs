@@ -10,7 +10,6 @@ use rspirv::dr::{Function, Instruction, Module, Operand};
 use rspirv::spirv::{Op, StorageClass, Word};
 
 use super::edit::Editor;
-use super::lines::Lines;
 use super::{id, literal, op};
 use crate::error::{Failure, Step};
 
@@ -28,13 +27,12 @@ pub fn resolve(module: &mut Module, kernel: &str) -> (bool, Option<Failure>) {
         .collect();
     let (mut changed, mut left) = (false, None);
     for number in 0..module.functions.len() {
-        let (edits, unresolved) = Resolver::new(module, number, &pointers).edits();
-        if let (Some((block, place)), None) = (unresolved, &left) {
-            let block = &module.functions[number].blocks[block];
+        let (edits, is_resolved) = Resolver::new(module, number, &pointers).edits();
+        if !is_resolved {
             left = Some(Failure {
                 kernel: kernel.into(),
                 step: Step::Meaning,
-                construct: Lines::of(module).before(block, place),
+                construct: None,
                 message: "a reference to one of several arrays or variables is chosen while the kernel runs: \
                           choose a value (`*a` or `a[i]`), or an index into one array"
                     .into(),
@@ -258,9 +256,9 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// What to do, and where the first pointer is for which there is nothing to do.
-    fn edits(mut self) -> (Edits, Option<(usize, usize)>) {
-        let mut unresolved = None;
+    /// What to do, and whether that is enough for every pointer that is chosen.
+    fn edits(mut self) -> (Edits, bool) {
+        let mut is_resolved = true;
         for (at, it) in each(self.function) {
             let (true, Some(result)) = (is_chosen(self.pointers, it), it.result_id) else {
                 continue;
@@ -270,10 +268,10 @@ impl<'a> Resolver<'a> {
                 Some(made) => {
                     self.edits.made.insert(at, made);
                 }
-                None => unresolved = unresolved.or(Some(at)),
+                None => is_resolved = false,
             }
         }
-        (self.edits, unresolved)
+        (self.edits, is_resolved)
     }
 
     /// The source of the part `path` of a value.

@@ -11,7 +11,6 @@ use std::collections::HashMap;
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{ExecutionModel, Op, Word};
 
-use super::lines::Lines;
 use super::{global, id, literal, op};
 use crate::error::{Failure, Step};
 
@@ -35,12 +34,12 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
         .all(|entry| entry.operands.first() == Some(&Operand::ExecutionModel(FRAGMENT)));
     for function in &module.functions {
         for block in &function.blocks {
-            for (place, it) in block.instructions.iter().enumerate() {
+            for it in &block.instructions {
                 if let (Some(instead), false) = (of_neighbours(op(it)), fragment) {
                     return Err(Failure {
                         kernel: kernel.into(),
                         step: Step::Meaning,
-                        construct: Lines::of(module).before(block, place),
+                        construct: None,
                         message: format!("only a fragment has neighbours: {instead}"),
                         panicked: false,
                     });
@@ -49,7 +48,7 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
                     return Err(Failure {
                         kernel: kernel.into(),
                         step: Step::Meaning,
-                        construct: Lines::of(module).before(block, place),
+                        construct: None,
                         message: "rust-gpu rotates a 64-bit number as if it had 32 bits: write \
                                   `(x << n) | (x >> (64 - n))` with n between 1 and 63 for \
                                   `x.rotate_left(n)`"
