@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
-use hankel_codegen::compile::LINKED_SUBFOLDER;
+use hankel_codegen::compile::{LINKED_SUBFOLDER, LINKS_AT_ONCE};
 use tempfile::TempDir;
 
 fn root() -> &'static Path {
@@ -397,7 +397,7 @@ fn errors_name_the_line_where_it_is_now() {
     }
     desk.write("my-kernels/src/lib.rs", EIGHT_KERNELS);
     desk.hankel(line).code(0);
-    let noted = root().join("target/hankel/spirv/links-at-once");
+    let noted = root().join("target").join(LINKS_AT_ONCE);
     assert!(
         !noted.exists(),
         "an author's error says nothing of the compiler"

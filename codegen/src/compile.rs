@@ -40,6 +40,9 @@ pub const TARGET_SUBFOLDER: &str = "hankel/spirv";
 /// The folder for linked modules that are kept from one build to the next, within cargo's target folder.
 pub const LINKED_SUBFOLDER: &str = "hankel/spirv/linked";
 
+/// The file that notes which compiler cannot link what it has not compiled just now, within cargo's target folder.
+pub const LINKS_AT_ONCE: &str = "hankel/spirv/links-at-once";
+
 /// A rust-gpu compiler; `hankel_toolchain::Toolchain` has the same fields.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Compiler {
@@ -219,6 +222,7 @@ pub fn compile(
     }
     let target_dir = std::path::absolute(target_dir).during("resolve", target_dir)?;
     let linked_dir = target_dir.join(LINKED_SUBFOLDER);
+    let links_at_once = target_dir.join(LINKS_AT_ONCE);
     let target_dir = target_dir.join(TARGET_SUBFOLDER);
     let mut flags = wanted.flags();
     flags.extend(of_arrays(found.arrays).map(Into::into));
@@ -232,7 +236,7 @@ pub fn compile(
     let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
     let spec = target_spec(&version, &target_dir)?;
     let flags_of_all = flags_of_all(compiler);
-    let mut separately = Separately::of(&target_dir, &version, wanted.names().len());
+    let mut separately = Separately::of(links_at_once, &version, wanted.names().len());
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -545,11 +549,16 @@ impl Artefact {
             // rustc has not written it, and cargo compiles again what is not there.
             std::fs::write(&artefact, "").during("write", &artefact)?;
         }
-        let made = std::fs::metadata(&artefact)
-            .and_then(|data| data.modified())
-            .during("read", &artefact)?;
-        let ours = format!("{}\n{made:?}\n", manifest.display());
-        if std::fs::read_to_string(&owner).is_ok_and(|it| it == ours) {
+        // What rustc itself wrote tells whose it is, if a build was ended before it came to this.
+        let proof = if is_unlinked {
+            link::rlink_of(&self.file).unwrap_or_default()
+        } else {
+            artefact.clone()
+        };
+        let made = std::fs::metadata(&proof).and_then(|data| data.modified());
+        let ours = |made: &SystemTime| format!("{}\n{made:?}\n", manifest.display());
+        let is_ours = |made| std::fs::read_to_string(&owner).is_ok_and(|it| it == ours(made));
+        if made.as_ref().is_ok_and(is_ours) {
             return Ok(true);
         }
         if self.fresh {
@@ -563,6 +572,7 @@ impl Artefact {
             }
             return Ok(false);
         }
+        let ours = ours(&made.during("read", &proof)?);
         std::fs::write(&owner, &ours).during("write", &owner)?;
         Ok(true)
     }

@@ -52,9 +52,8 @@ pub(crate) struct Separately {
 }
 
 impl Separately {
-    /// For a crate of so many entry points.
-    pub(crate) fn of(target_dir: &Path, version: &str, entry_points: usize) -> Self {
-        let file = target_dir.join("links-at-once");
+    /// For a crate of so many entry points. `file` is for the note.
+    pub(crate) fn of(file: PathBuf, version: &str, entry_points: usize) -> Self {
         let age = std::fs::metadata(&file).and_then(|it| it.modified());
         let age = age.map_or(Duration::MAX, |it| it.elapsed().unwrap_or_default());
         let is_noted =
@@ -115,7 +114,7 @@ impl Unlinked<'_> {
     /// linked as a whole, by which cargo says what is wrong.
     pub(crate) fn link(&self) -> Option<BTreeMap<String, Vec<u8>>> {
         let (folder, name) = place(self.list)?;
-        let rlink = std::fs::read(folder.join(format!("{name}.rlink"))).ok()?;
+        let rlink = std::fs::read(rlink_of(self.list)?).ok()?;
         let rlink = Rlink::of(&rlink, &folder, &name)?;
         let object = std::fs::read(&rlink.object).ok()?;
         let words = spirv::words(&object, &name).ok()?;
@@ -256,6 +255,12 @@ fn named(base: &str, part: &Fingerprint) -> String {
     sha256(&[base.as_bytes(), &part.hash].concat())
 }
 
+/// What rustc writes for its linker.
+pub(crate) fn rlink_of(list: &Path) -> Option<PathBuf> {
+    let (folder, name) = place(list)?;
+    Some(folder.join(format!("{name}.rlink")))
+}
+
 /// Where rustc has written, and the crate's name there.
 fn place(list: &Path) -> Option<(PathBuf, String)> {
     let name = list.file_name()?.to_str()?.strip_suffix(LIST)?;
@@ -391,8 +396,8 @@ mod tests {
     #[test]
     fn a_compiler_that_links_nothing_by_itself_is_noted() {
         let folder = Folder::new().unwrap();
-        let of = |version: &str| Separately::of(folder.path(), version, MOST_AT_ONCE + 1);
-        assert!(!Separately::of(folder.path(), "1", MOST_AT_ONCE).is_on());
+        let of = |version: &str| Separately::of(folder.join("note"), version, MOST_AT_ONCE + 1);
+        assert!(!Separately::of(folder.join("note"), "1", MOST_AT_ONCE).is_on());
         let mut first = of("1");
         first.at_once_works();
         assert!(of("1").is_on(), "it has not failed");
