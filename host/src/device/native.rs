@@ -2,7 +2,7 @@
 
 use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::{Kernel, TexelFormat};
-use hankel_dsl::native::{Arg, Call, Mode, TextureMut, TextureRef};
+use hankel_dsl::native::{Arg, Call, Mode, TextureMut, TextureRef, lanes};
 
 use super::error::{DeviceError, Result};
 use super::extent::{self, Extent};
@@ -72,7 +72,11 @@ impl NativeDevice {
         } else {
             1
         };
-        let lanes = if mode.lanes { "SIMD lanes" } else { "scalar" };
+        let lanes = if mode.lanes && lanes::level().is_some() {
+            "SIMD lanes"
+        } else {
+            "scalar"
+        };
         let name = format!(
             "native ({}, {lanes}, {cores} threads)",
             std::env::consts::ARCH

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use hankel_codegen::files::sha256;
 use hankel_dsl::native::describe::Precision;
+use hankel_dsl::native::lanes;
 use hankel_host::parity::execute::Written;
 use hankel_host::parity::intervals::{Intervals, Products};
 use hankel_host::parity::numbers::{Found, Numbers, Rules};
@@ -69,6 +70,11 @@ impl<'a> Shared<'a> {
         if let Err(problem) = &it.reference {
             return unrun(Outcome::NoReference {
                 problem: problem.clone(),
+            });
+        }
+        if column == Column::NativeSimd && !lanes::BUILT {
+            return unrun(Outcome::Lacking {
+                what: "SIMD lanes: hankel was built without the feature `lanes`".into(),
             });
         }
         let Some(language) = column.language() else {

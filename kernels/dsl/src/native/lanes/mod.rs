@@ -17,14 +17,20 @@ mod transpose;
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 mod x86;
 
+/// Whether kernels are compiled for lanes: the feature `lanes`.
+pub const BUILT: bool = cfg!(feature = "lanes");
+
 /// The instruction sets that this processor has and lanes gain from, widest first, each by its
 /// name. Narrower ones are not among them: from SSE2 and SSE4.2 lanes gain nothing over scalar code
 /// (`cargo bench --workspace --bench lanes` measured it), and every one that is here costs a
-/// compiled copy of each kernel.
+/// compiled copy of each kernel. None where lanes are not [built](BUILT).
 #[must_use]
 pub fn levels() -> Vec<(&'static str, Level)> {
-    let best = Level::new();
     let mut all = Vec::new();
+    if !BUILT {
+        return all;
+    }
+    let best = Level::new();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     all.extend(
         [
@@ -146,6 +152,7 @@ pub fn on_lanes<W: Work>(level: Level, work: W) -> Option<W::Output> {
         };
     }
     match level {
+        _ if !BUILT => None,
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         Level::Avx512(simd) => run!(simd, Avx512),
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
