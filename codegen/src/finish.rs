@@ -14,7 +14,7 @@ use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
     self, bounds, canonical, exact, libm, names, narrow, order, parts, references, refused, split,
-    tables, trim, undefined, uniform,
+    tables, trim, undefined, uniform, widths,
 };
 use crate::translate::reading;
 
@@ -54,6 +54,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         construct: failure.construct.or_else(|| place.clone()),
         ..failure
     };
+    widths::mend(&mut module);
     narrow::widen(&mut module, name).map_err(placed)?;
     // What is left may be resolved by spirv-opt, unless it is invalid.
     let (has_references, left) = references::resolve(&mut module, name);

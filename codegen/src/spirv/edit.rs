@@ -53,10 +53,18 @@ impl<'a> Editor<'a> {
         self.once(Op::TypeBool, None, Vec::new())
     }
 
+    /// Integers of so many bits, with or without a sign.
+    pub fn integer_type_of(&mut self, bits: u32, signed: bool) -> Word {
+        let operands = vec![
+            Operand::LiteralBit32(bits),
+            Operand::LiteralBit32(signed.into()),
+        ];
+        self.once(Op::TypeInt, None, operands)
+    }
+
     /// 32 bits without a sign.
     pub fn word_type(&mut self) -> Word {
-        let operands = vec![Operand::LiteralBit32(32), Operand::LiteralBit32(0)];
-        self.once(Op::TypeInt, None, operands)
+        self.integer_type_of(32, false)
     }
 
     /// `ty`, if it is a scalar of floats of 32 or 64 bits.

@@ -18,6 +18,7 @@ pub(crate) mod tables;
 pub mod trim;
 pub(crate) mod undefined;
 pub mod uniform;
+pub mod widths;
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Module, Operand};

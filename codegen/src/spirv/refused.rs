@@ -63,7 +63,7 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
 }
 
 /// What to write instead of what takes differences between neighbours.
-fn of_neighbours(op: Op) -> Option<&'static str> {
+pub(super) fn of_neighbours(op: Op) -> Option<&'static str> {
     match op {
         Op::ImageSampleImplicitLod => Some("write `sample_level` for `sample` and `sample_bias`"),
         Op::ImageSampleDrefImplicitLod => Some("write `compare_level_zero` for `compare`"),

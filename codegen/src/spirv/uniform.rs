@@ -14,7 +14,7 @@ use std::collections::{HashMap, HashSet};
 use rspirv::dr::{Function, Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, GroupOperation, Op, StorageClass, Word};
 
-use super::{id, op};
+use super::{id, op, refused};
 
 /// What memory that others write counts as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +46,15 @@ pub fn divides_at_barrier(module: &Module, memory: Memory) -> bool {
 #[must_use]
 pub fn divides_at_subgroup(module: &Module, memory: Memory, group: Group) -> bool {
     divides(module, memory, group, is_of_subgroup)
+}
+
+/// Whether there is a difference between neighbouring fragments, as a texture takes one that is sampled at the level of
+/// the fragment, that only some fragments may reach.
+#[must_use]
+pub fn divides_at_neighbours(module: &Module, memory: Memory) -> bool {
+    divides(module, memory, Group::Workgroup, |op| {
+        refused::of_neighbours(op).is_some()
+    })
 }
 
 fn divides(module: &Module, memory: Memory, group: Group, together: fn(Op) -> bool) -> bool {

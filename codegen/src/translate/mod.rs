@@ -393,6 +393,7 @@ impl Ir {
             let mut module = self.module.clone();
             let folded = cleanup::fold_entry_point(&mut module);
             cleanup::unwrap_blocks(&mut module);
+            cleanup::matrix_types(&mut module);
             cleanup::plain_loops(&mut module);
             cleanup::constant_indices(&mut module);
             cleanup::drop_last_return(&mut module);
@@ -557,6 +558,16 @@ impl Ir {
                     .into(),
             );
         }
+        if language == Language::Wgsl
+            && uniform::divides_at_neighbours(&self.spirv, Memory::Doubted)
+        {
+            return Some(
+                "WGSL refuses derivatives, and textures at the level of the fragment, in a branch or a loop that may \
+                 not be the same for all fragments, or behind an index or a division that may fail: do it before, mask \
+                 the index, or use `sample_level` or `sample_gradient`"
+                    .into(),
+            );
+        }
         let wide_integers = self.has_wide(ScalarKind::Uint) || self.has_wide(ScalarKind::Sint);
         if wide_integers && (es || language == Language::Wgsl) {
             return Some(format!("{language} has no 64-bit integers"));
@@ -571,6 +582,11 @@ impl Ir {
             if self.gathers() {
                 return Some(format!(
                     "{language} does not gather texels: it came with 3.10"
+                ));
+            }
+            if cleanup::has_functions_of_bits(&self.module) {
+                return Some(format!(
+                    "{language} does not count, find or turn bits: it came with 3.10"
                 ));
             }
             if self

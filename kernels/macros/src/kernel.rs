@@ -1315,6 +1315,15 @@ impl Args {
                 "`outputs` says it all: leave `texture` out",
             ));
         }
+        if let ([Some(format)], 1) = (kinds.as_slice(), outputs.len()) {
+            return Err(syn::Error::new(
+                *span,
+                format!(
+                    "`outputs` is for several results: write `texture({})` for one",
+                    format.name
+                ),
+            ));
+        }
         if kinds.len() != outputs.len() {
             return Err(syn::Error::new(
                 *span,

@@ -163,13 +163,16 @@ pub fn kernels(input: TokenStream) -> TokenStream {
 /// Lets a function be in a [`library!`](macro@library): a text of it, in every language, that an engine
 /// includes and calls.
 ///
-/// The function takes and gives scalars (`f32`, `u32`, `i32`, `bool`), glam's vectors, structures of
-/// these, and `impl Fn(…) -> …` for what the engine looks up itself; where it is generic over
+/// The function takes and gives scalars (`f32`, `u32`, `i32`, `bool`), glam's vectors, its `Mat2`, `Mat3` and `Mat4`,
+/// structures of these, and `impl Fn(…) -> …` for what the engine looks up itself; where it is generic over
 /// `R: Real`, the texts are of `f32`. Its body is written in a part of Rust that has a form in every
 /// language; `hankel build --form functions` refuses the rest with file, line and reason:
 ///
 /// - `let` with patterns, assignments, `if`, `match` on what is known, blocks, closures;
 /// - arithmetic, comparisons, the methods of `Real`, conversions that lose nothing, bits of `u32`;
+/// - of vectors `dot`, `length`, `distance`, `normalize`, `cross`, `lerp`, `min`, `max`, `clamp`, `abs`, `floor`,
+///   `truncate`, `extend`; of matrices `*`, `from_cols`, `transpose`, `transform_point3`, `transform_vector3`,
+///   `project_point3`, and columns by their names;
 /// - structures, tuples and arrays, indexed by what is known; methods and functions of any crate whose
 ///   sources are at hand, which are put in place unless they have `#[function]`, too;
 /// - `unroll!` and `while i < end { …; i += 1; }`; macros of one's own.

@@ -1,8 +1,8 @@
 //! What memory can hold beside numbers of 32 bits and vectors of them: truth values, 64-bit integers,
-//! vectors of three without padding, numbers of 16 bits.
+//! vectors of three without padding, numbers of 16 bits, matrices.
 
-use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Bool, Element, F16, F16x2, PackedVec3, kernel};
+use hankel_dsl::glam::{Mat4, UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::{Bool, Buffer, Element, F16, F16x2, PackedVec3, kernel};
 
 /// What to do with a number.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -58,11 +58,63 @@ pub fn signed_wide(#[element] a: i64, #[element] b: i32) -> (i64, u64) {
     (sum, distance as u64)
 }
 
+/// Numbers that get 64 bits, by the sign that they had.
+#[kernel(compute, threads(64))]
+pub fn extended(#[element] a: i32, #[element] b: u32) -> (u64, i64) {
+    let signed = a as u64 ^ (b as i16 as u64) << 3;
+    let unsigned = b as i64 ^ (a as u8 as i64) << 3;
+    (signed, unsigned)
+}
+
 /// Points that are turned a quarter round the third axis.
 #[kernel(compute, threads(64))]
 pub fn packed(#[element] point: PackedVec3) -> PackedVec3 {
     let p = Vec3::from(point);
     Vec3::new(-p.y, p.x, p.z).into()
+}
+
+/// Where the camera is, and how often the skeleton's bones are turned.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Camera {
+    /// From the world to clip space.
+    pub clip_from_world: Mat4,
+    /// From a model to the world, for each of two models.
+    pub world_from_model: [Mat4; 2],
+    /// Added to each bone's number.
+    pub first_bone: u32,
+    /// Added to the number of the bone, too.
+    pub frame: u32,
+    /// Fills the structure up.
+    pub padding: UVec2,
+}
+
+/// Points in clip space, each moved by a bone and by its model.
+#[kernel(
+    compute,
+    threads(64),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
+pub fn skinned(
+    #[index] i: u32,
+    #[uniform] camera: &Camera,
+    #[storage] bones: Buffer<'_, Mat4>,
+    #[element] point: Vec4,
+) -> Vec4 {
+    let bone = bones.get(camera.first_bone.wrapping_add(camera.frame ^ i) % bones.len());
+    let model = camera.world_from_model[(i & 1) as usize];
+    camera.clip_from_world * (model * (bone * point))
+}
+
+/// Bones in the world, and how they turn directions.
+#[kernel(
+    compute,
+    threads(64),
+    parity(non_finite, why = "sums and products of absurd numbers overflow")
+)]
+pub fn bones_in_world(#[uniform] world_from_model: &Mat4, #[element] bone: Mat4) -> (Mat4, Mat4) {
+    let world = *world_from_model * bone;
+    (world, world.transpose())
 }
 
 /// What differs from one draw or dispatch to the next.

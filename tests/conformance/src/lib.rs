@@ -87,7 +87,10 @@ hankel_dsl::kernels![
     data::switched,
     data::wide,
     data::signed_wide,
+    data::extended,
     data::packed,
+    data::skinned,
+    data::bones_in_world,
     data::halves,
     data::half_bits,
     data::pushed,
@@ -144,6 +147,7 @@ hankel_dsl::kernels![
     math::native_angles,
     math::native_powers,
     math::vectors,
+    math::directions,
     math::waves,
 ];
 

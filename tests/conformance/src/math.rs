@@ -303,6 +303,38 @@ pub fn vectors(#[element] of: Vectors) -> Vectors {
     }
 }
 
+/// The direction of a vector, zero where it has none, and in each component its sign and whether it is finite: functions
+/// that ask for NaN and for infinities, which WGSL has no literals for.
+#[kernel(
+    compute,
+    threads(64),
+    parity(ulp = 4, absolute = 1e-30, why = "a quotient by a root")
+)]
+pub fn directions(#[element] of: Vectors) -> Vectors {
+    // Lengths whose squares are normal numbers, and zero.
+    let part = |x: f32| if x.abs() < 1e-3 { 0.0 } else { x };
+    let v = Vec3::new(part(of.a.x), part(of.a.y), part(of.a.z));
+    let n = v.normalize_or_zero();
+    let (tangent, bitangent) = if v.is_finite() && n != Vec3::ZERO {
+        n.any_orthonormal_pair()
+    } else {
+        (Vec3::X, Vec3::Y)
+    };
+    let quotient = of.index / v.x;
+    Vectors {
+        a: n,
+        index: tangent.dot(bitangent).abs().min(1e-3).signum() + quotient.signum(),
+        b: tangent,
+        padding: if quotient.is_finite() { 1.0 } else { 0.0 }
+            + if f32::INFINITY > quotient { 2.0 } else { 0.0 }
+            + if quotient == f32::NEG_INFINITY {
+                4.0
+            } else {
+                0.0
+            },
+    }
+}
+
 /// The sum and the difference of a number and its weight's function, in one kernel with arithmetic
 /// of its own.
 #[kernel(

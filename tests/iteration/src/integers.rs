@@ -18,6 +18,17 @@ pub fn raised(#[element] x: UVec4) -> UVec4 {
     )
 }
 
+/// Numbers that get more bits, each by its own sign, whichever sign the wider type has.
+#[kernel(compute, threads(64))]
+pub fn extended(#[element] x: UVec4) -> UVec4 {
+    UVec4::new(
+        x.x as i16 as u32 ^ (x.x >> 16) as u8 as i32 as u32,
+        x.y as u16 as i32 as u32 ^ (x.y >> 8) as i8 as u32,
+        x.z as i8 as u16 as u32 | ((x.z >> 8) as u8 as i16 as i32 as u32) << 16,
+        u32::from(x.w as u8 as i32 > 100) + 2 * u32::from((x.w as i8 as i32) < 0),
+    )
+}
+
 /// How tall something is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Height {

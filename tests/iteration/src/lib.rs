@@ -49,6 +49,7 @@ hankel_dsl::kernels![
     wide_bits,
     mirrored,
     raised,
+    extended,
     ranked,
     answered,
     small,

@@ -25,6 +25,29 @@ pub fn has_bit_counts(module: &Module) -> bool {
     functions(module).any(|function| function.expressions.iter().any(|(_, it)| counts(it)))
 }
 
+/// Whether there are any, or other functions of bits that GLSL ES 3.00 does not have.
+pub fn has_functions_of_bits(module: &Module) -> bool {
+    let others = |expression: &Expression| {
+        matches!(
+            expression,
+            Expression::Math {
+                fun: MathFunction::ReverseBits
+                    | MathFunction::ExtractBits
+                    | MathFunction::InsertBits
+                    | MathFunction::Pack4x8snorm
+                    | MathFunction::Pack4x8unorm
+                    | MathFunction::Unpack4x8snorm
+                    | MathFunction::Unpack4x8unorm,
+                ..
+            }
+        )
+    };
+    functions(module).any(|function| {
+        let mut all = function.expressions.iter();
+        all.any(|(_, it)| counts(it) || others(it))
+    })
+}
+
 /// Names them.
 pub fn name_bit_counts(module: &mut Module) {
     for function in functions_mut(module) {

@@ -7,6 +7,7 @@
 //! - [`fold_entry_point`] puts the inner function into the entry point: inputs are its arguments,
 //!   outputs its return value;
 //! - [`unwrap_blocks`] takes the structure off buffers: `input[i]`, not `input.elements[i]`;
+//! - [`matrix_types`] makes a matrix of a structure that holds its columns;
 //! - [`plain_loops`] ends loops with `break` in their body instead of a condition at their end;
 //! - [`constant_indices`] makes `v[0]` with a constant index `v.x`;
 //! - [`drop_dead_locals`] drops variables that are only written;
@@ -25,6 +26,7 @@ mod blocks;
 mod entry_point;
 mod locals;
 mod loops;
+mod matrices;
 mod names;
 mod rounding;
 mod sampling;
@@ -32,11 +34,12 @@ mod shapes;
 mod values;
 mod walk;
 
-pub use bits::{has_bit_counts, name_bit_counts};
+pub use bits::{has_bit_counts, has_functions_of_bits, name_bit_counts};
 pub use blocks::unwrap_blocks;
 pub use entry_point::fold_entry_point;
 pub use locals::{drop_dead_locals, drop_unused_locals};
 pub use loops::{has_late_loops, plain_loops};
+pub use matrices::matrix_types;
 pub use names::{name_loads, name_result};
 pub use rounding::{ROUNDED, name_results, name_roundings};
 pub use sampling::restore_sampling;

@@ -75,7 +75,7 @@ impl Pointers<'_> {
             Expression::GlobalVariable(global) => self.module.global_variables[global].name.clone(),
             Expression::AccessIndex { base, index } => match &self.pointee(base)?.inner {
                 TypeInner::Struct { members, .. } => members[index as usize].name.clone(),
-                TypeInner::Vector { .. } => {
+                TypeInner::Vector { .. } | TypeInner::Matrix { .. } => {
                     let component = b"xyzw".get(index as usize)?;
                     Some(format!("{}_{}", self.name(base)?, char::from(*component)))
                 }

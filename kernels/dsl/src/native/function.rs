@@ -2,9 +2,10 @@
 
 use std::vec::Vec;
 
-use glam::{IVec2, IVec3, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
+use glam::{IVec2, IVec3, IVec4, Mat2, Mat3, Mat4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
 use super::describe::{Scalar, Type};
+use super::layout;
 
 /// A function of a library.
 #[derive(Clone, Debug)]
@@ -82,4 +83,28 @@ vectors! {
     Vec2 F32 2 f32; Vec3 F32 3 f32; Vec4 F32 4 f32;
     UVec2 U32 2 u32; UVec3 U32 3 u32; UVec4 U32 4 u32;
     IVec2 I32 2 i32; IVec3 I32 3 i32; IVec4 I32 4 i32;
+}
+
+macro_rules! matrices {
+    ($($ty:ident $size:literal $column:ty;)*) => {$(
+        /// Columns, one after the other.
+        impl Words for $ty {
+            const COUNT: usize = $size * $size;
+            fn describe() -> Type {
+                layout::matrix(stringify!($ty), $size, <$column>::describe())
+            }
+            fn read(words: &[u32]) -> Self {
+                Self::from_cols_array(&core::array::from_fn(|i| f32::read(&words[i..])))
+            }
+            fn write(self, words: &mut Vec<u32>) {
+                for number in self.to_cols_array() {
+                    number.write(words);
+                }
+            }
+        }
+    )*};
+}
+
+matrices! {
+    Mat2 2 Vec2; Mat3 3 Vec3; Mat4 4 Vec4;
 }

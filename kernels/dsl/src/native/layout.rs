@@ -8,7 +8,7 @@ use std::string::String;
 use std::{format, vec};
 
 use bytemuck::Pod;
-use glam::{IVec2, IVec3, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
+use glam::{IVec2, IVec3, IVec4, Mat4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
 use super::describe::{Field, Inputs, Layout, Precision, Scalar, Type};
 use crate::{Bool, F16x2, Real};
@@ -17,7 +17,7 @@ use crate::{Bool, F16x2, Real};
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be in a buffer",
     note = "a structure needs `#[derive(Element)]` and `#[repr(C)]`",
-    note = "`usize` and enums have no place in a shader's memory: use `u32` or `f32`; for `bool`, use `Bool`; for halves, `F16x2`"
+    note = "`usize` and enums have no place in a shader's memory: use `u32` or `f32`; for `bool`, use `Bool`; for halves, `F16x2`; for matrices, `Mat4`"
 )]
 pub trait Element: Pod + Send + Sync {
     /// Alignment in bytes that a shader wants (std430).
@@ -92,6 +92,38 @@ leaf! {
     IVec2, 8, Type::Vector { scalar: Scalar::I32, size: 2 };
     IVec3, 16, Type::Vector { scalar: Scalar::I32, size: 3 };
     IVec4, 16, Type::Vector { scalar: Scalar::I32, size: 4 };
+}
+
+/// Its columns: in memory the same as a matrix of every language, which the texts have in its place.
+impl Element for Mat4 {
+    const ALIGN: usize = 16;
+    const UNIFORM_ARRAY: bool = true;
+    const UNIFORM: bool = true;
+    fn ty() -> Type {
+        matrix("Mat4", 4, Vec4::ty())
+    }
+}
+
+/// A matrix of so many columns of as many `f32`, by glam's name: a structure of its columns, without padding.
+pub(super) fn matrix(name: &str, size: usize, column: Type) -> Type {
+    let bytes = (size * size_of::<f32>()) as u32;
+    let columns = ["x_axis", "y_axis", "z_axis", "w_axis"];
+    let columns = columns[..size].iter().zip(0..).map(|(name, i)| Field {
+        name: (*name).into(),
+        summary: String::new(),
+        ty: column.clone(),
+        offset: i * bytes,
+        size: bytes,
+        inputs: Inputs::default(),
+    });
+    Type::Struct {
+        layout: Layout {
+            name: name.into(),
+            size: bytes * size as u32,
+            align: if size == 4 { 16 } else { 4 },
+            fields: columns.collect(),
+        },
+    }
 }
 
 // SAFETY: a transparent `u32`, of which every bit pattern is a value.
