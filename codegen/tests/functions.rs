@@ -556,7 +556,10 @@ fn a_changed_signature_needs_another_number() {
     let raised = folder_of("pub fn f(x: f32, y: f32) -> f32 { x * y }", 2);
     raised.write(out.path(), false).unwrap();
     assert!(raised.check(out.path()).unwrap().is_fine());
-    assert_eq!(read_record(out.path()).unwrap().libraries["sample"].api, 2);
+    assert_eq!(
+        read_record(out.path()).unwrap().unwrap().libraries["sample"].api,
+        2
+    );
 }
 
 #[test]
@@ -604,8 +607,8 @@ fn names_are_those_of_javascript_and_unique() {
                   f32 {\n    Real::max(a, b) * 2.0\n}";
     let tsl = text(&one(source).unwrap(), "tsl");
     let function = "/** By `bB` and `twoMax`. */\nexport const f = /*@__PURE__*/ Fn(([bB, bB_, uvUint]) => {\n    \
-                    const undefined_ = bB.mul(bB_).toConst('undefined_');\n    const twoMax_ = twoMax(undefined_, \
-                    uvUint).sub(undefined_).toConst('twoMax_');\n    return twoMax_.mul(twoMax_).add(undefined_);\n\
+                    const undefined_ = bB.mul(bB_).toConst('undefined_');\n    const twoMaxValue = twoMax(undefined_, \
+                    uvUint).sub(undefined_).toConst('twoMaxValue');\n    return twoMaxValue.mul(twoMaxValue).add(undefined_);\n\
                     }).setLayout({";
     assert!(tsl.contains(function), "{tsl}");
 }

@@ -102,6 +102,7 @@ fn shown(ty: &Type) -> String {
     match ty {
         Type::Scalar(s) => scalar(s).into(),
         Type::Vector(s, n) => format!("vec{n}<{}>", scalar(s)),
+        Type::Matrix(n) => format!("mat{n}"),
         Type::Struct(name) => name.clone(),
         Type::Lookup(signature) => {
             let params: Vec<String> = signature.params.iter().map(shown).collect();

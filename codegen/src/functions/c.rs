@@ -2,7 +2,7 @@
 //! where the compiler listens to the standard's pragma; GCC wants `-ffp-contract=off` (or `-std=c99`)
 //! on processors that fuse.
 
-use super::ir::{Builtin, Function, Id, Library, Literal, Scalar, Signature, Type};
+use super::ir::{Builtin, COLUMNS, Function, Id, Library, Literal, Scalar, Signature, Type};
 use super::print::{
     Bond, Dialect, Naming, Piece, atom, block_comment, bracketed, called, choice, components,
     digits, documented, function, list, members, provenance, signed,
@@ -75,7 +75,7 @@ impl C<'_> {
         self.0.function(name)
     }
 
-    /// Vectors and small functions, which other libraries may have declared before.
+    /// Vectors, matrices by their columns, and small functions, which other libraries may have declared before.
     fn vectors(&self) -> String {
         let guard = self.own("vectors_h").to_uppercase();
         let mut text = format!("\n#ifndef {guard}\n#define {guard}\n");
@@ -94,6 +94,18 @@ impl C<'_> {
                     params.join(", ")
                 ));
             }
+        }
+        for n in 2..=4 {
+            let (own, made) = (format!("float{n}x{n}"), format!("make_float{n}x{n}"));
+            let (own, made) = (self.own(&own), self.own(&made));
+            let (column, names) = (self.own(&format!("float{n}")), &COLUMNS[..n]);
+            let params: Vec<String> = names.iter().map(|c| format!("{column} {c}")).collect();
+            let names = names.join(", ");
+            text.push_str(&format!(
+                "typedef struct {own} {{ {column} {names}; }} {own};\n\
+                 static inline {own} {made}(\n    {}) {{\n    {own} m = {{{names}}};\n    return m;\n}}\n",
+                params.join(",\n    ")
+            ));
         }
         for (scalar, name) in [("float", "f"), ("uint32_t", "u"), ("int32_t", "i")] {
             for (which, sign) in [("min", "<"), ("max", ">")] {
@@ -125,6 +137,7 @@ impl Dialect for C<'_> {
             Type::Scalar(Scalar::I32) => "int32_t".into(),
             Type::Scalar(Scalar::Bool) => "bool".into(),
             Type::Vector(s, n) => self.own(&format!("{}{n}", super::print::c_like(*s))),
+            Type::Matrix(n) => self.own(&format!("float{n}x{n}")),
             Type::Struct(name) => self.0.structure(name),
             Type::Lookup(_) => String::new(),
         }
@@ -172,6 +185,7 @@ impl Dialect for C<'_> {
                 let name = self.own(&format!("make_{}{n}", super::print::c_like(*s)));
                 called(&name, parts)
             }
+            Type::Matrix(n) => called(&self.own(&format!("make_float{n}x{n}")), parts),
             _ => atom(format!("{{{}}}", list(parts))),
         }
     }
@@ -183,6 +197,10 @@ impl Dialect for C<'_> {
             }
             _ => format!("return {};", value.0),
         }
+    }
+
+    fn member(&self, of: &Piece, _: &Type, name: &str) -> Piece {
+        atom(format!("{}.{name}", bracketed(of, Bond::Atom)))
     }
 
     fn head(&self, function: &Function) -> String {

@@ -11,15 +11,16 @@ use syn::spanned::Spanned;
 
 use super::fold::{self, binary, builtin, float, literal, local, member, unary};
 use super::ir::{
-    Binary, Builtin, Constant, Expr, Function, Id, Kind, Literal, Local, Param, Rank, Scalar,
-    Signature, Stmt, Struct, Type, Unary,
+    Binary, Builtin, COLUMNS, Constant, Expr, Function, Id, Kind, Literal, Local, Param, Rank,
+    Scalar, Signature, Stmt, Struct, Type, Unary,
 };
+use super::linear::{matrix_constant, matrix_name, vector_name};
 use super::refusal::Refusal;
 use super::source::{Item, Method, ModuleId, Tree, docs, segments};
 use super::value::{Closure, Generic, Place, Step, Value};
 
 /// Why an expression has no value.
-enum Stop {
+pub(super) enum Stop {
     Refused(Refusal),
     Return(Value),
 }
@@ -34,7 +35,7 @@ impl From<Refusal> for Stop {
     }
 }
 
-type Done<T> = Result<T, Stop>;
+pub(super) type Done<T> = Result<T, Stop>;
 
 /// Turns of a loop whose body is run here at most.
 const MOST_TURNS: usize = 4096;
@@ -44,7 +45,7 @@ const DEEPEST: usize = 96;
 
 /// What is known where an expression stands.
 #[derive(Clone)]
-struct Frame {
+pub(super) struct Frame {
     /// Variables by name, innermost last.
     scopes: Vec<HashMap<String, usize>>,
     generics: HashMap<String, Generic>,
@@ -98,7 +99,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn refuse(&self, frame: &Frame, span: Span, reason: impl Into<String>) -> Stop {
+    pub(super) fn refuse(&self, frame: &Frame, span: Span, reason: impl Into<String>) -> Stop {
         let file = &self.tree.modules[frame.module].file;
         Stop::Refused(Refusal::at(file, span, reason))
     }
@@ -278,6 +279,11 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The value with each scalar that is an operation, or that may change, kept in a local.
+    /// A value whose parts have no variable of their own in the source, each computed once.
+    pub(super) fn part(&mut self, value: Value, name: &str) -> Value {
+        self.settled(value, name, Rank::Part)
+    }
+
     fn settled(&mut self, mut value: Value, name: &str, rank: Rank) -> Value {
         let own = match &value {
             Value::Scalar(_) => rank,
@@ -298,6 +304,15 @@ impl<'a> Evaluator<'a> {
         value
     }
 
+    /// Whether it is a local that does not change, or a member of one.
+    fn stays(&self, e: &Expr) -> bool {
+        match &e.kind {
+            Kind::Local(id) => !self.changing.contains(id),
+            Kind::Member(of, _) => self.stays(of),
+            _ => false,
+        }
+    }
+
     fn kept(&mut self, name: &str, e: Expr, rank: Rank) -> Expr {
         match &e.kind {
             Kind::Literal(_) => e,
@@ -310,9 +325,7 @@ impl<'a> Evaluator<'a> {
                 }
                 e
             }
-            Kind::Member(of, _) if matches!(of.kind, Kind::Local(id) if !self.changing.contains(&id)) => {
-                e
-            }
+            Kind::Member(of, _) if self.stays(of) => e,
             _ => {
                 let ty = e.ty.clone();
                 let id = self.new_local(name, ty.clone(), rank);
@@ -502,7 +515,7 @@ impl<'a> Evaluator<'a> {
                 let Some(identity) = self.identity(frame, &p.path) else {
                     let reason = format!(
                         "`{}` has no form at a library's interface: there are f32, u32, i32, bool, \
-                         glam's vectors of these, and structures",
+                         glam's vectors of these, its matrices Mat2, Mat3 and Mat4, and structures",
                         quote::quote!(#ty)
                     );
                     return Err(self.refuse(frame, ty.span(), reason));
@@ -520,7 +533,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// A scalar or vector type.
+    /// A scalar, vector or matrix type.
     fn plain(&self, frame: &Frame, p: &syn::TypePath) -> Option<Type> {
         let last = p.path.segments.last()?;
         let name = last.ident.to_string();
@@ -533,6 +546,9 @@ impl<'a> Evaluator<'a> {
             "i32" => Type::I32,
             "bool" => Type::BOOL,
             _ => {
+                if let Some(size) = matrix_name(&name) {
+                    return Some(Type::Matrix(size));
+                }
                 let (scalar, size) = vector_name(&name)?;
                 Type::Vector(scalar, size)
             }
@@ -606,6 +622,12 @@ impl<'a> Evaluator<'a> {
                     .map(|n| Value::Scalar(member(e, n, Type::Scalar(*scalar))))
                     .collect(),
             ),
+            Type::Matrix(size) => {
+                let column = |name: &&str| {
+                    self.taken_apart(&member(e, name, Type::Vector(Scalar::F32, *size)))
+                };
+                Value::Matrix(COLUMNS[..*size].iter().map(column).collect())
+            }
             Type::Struct(name) => {
                 let members = self.structs.iter().find(|s| s.name == *name);
                 let fields = members.map_or(Vec::new(), |s| {
@@ -654,6 +676,20 @@ impl<'a> Evaluator<'a> {
                     .map(|v| self.put_together(frame, v, &Type::Scalar(*s), span))
                     .collect::<Done<Vec<_>>>()?;
                 fold::vector(*scalar, parts)
+            }
+            (Value::Matrix(columns), Type::Matrix(n)) if columns.len() == *n => {
+                let column = Type::Vector(Scalar::F32, *n);
+                let parts = columns
+                    .iter()
+                    .map(|v| self.put_together(frame, v, &column, span))
+                    .collect::<Done<Vec<_>>>()?;
+                if let Some(Kind::Member(of, _)) = parts.first().map(|p| &p.kind)
+                    && of.ty == *ty
+                    && whole(value, of)
+                {
+                    return Ok(of.clone());
+                }
+                fold::node(ty.clone(), Kind::Construct(parts))
             }
             (Value::Struct(_, fields), Type::Struct(name)) => {
                 let Some(structure) = self.structs.iter().find(|s| s.name == *name) else {
@@ -924,7 +960,7 @@ impl<'a> Evaluator<'a> {
     // ---- expressions ---------------------------------------------------------------------------
 
     /// What a reference refers to; anything else as it is.
-    fn read(&mut self, value: Value) -> Value {
+    pub(super) fn read(&mut self, value: Value) -> Value {
         match value {
             Value::Ref(place) => {
                 let found = self.slots[place.slot].value.part(&place.path).cloned();
@@ -1122,6 +1158,10 @@ impl<'a> Evaluator<'a> {
                     "ONE" => return Ok(Value::Vector(scalar, vec![each(1.0); size])),
                     _ => return Ok(Value::Path(frame.module, Rc::new(p.clone()))),
                 }
+            }
+            if let Some(size) = matrix_name(first) {
+                return Ok(matrix_constant(size, second)
+                    .unwrap_or_else(|| Value::Path(frame.module, Rc::new(p.clone()))));
             }
             let head = syn::Path::from(p.path.segments[0].clone());
             if let Some(identity) = self.identity(frame, &head) {
@@ -1354,7 +1394,7 @@ impl<'a> Evaluator<'a> {
         Ok(Value::Unit)
     }
 
-    fn operation(
+    pub(super) fn operation(
         &mut self,
         frame: &Frame,
         op: Binary,
@@ -1428,6 +1468,9 @@ impl<'a> Evaluator<'a> {
             (a @ (Value::Int(_) | Value::Fraction(..)), Value::Scalar(b)) if !shift => {
                 let a = self.put_together(frame, &a, &b.ty, span)?;
                 Value::Scalar(binary(op, &a, &b))
+            }
+            (a @ Value::Matrix(_), b) | (a, b @ Value::Matrix(_)) => {
+                return self.matrix_operation(frame, op, a, b, span);
             }
             (Value::Vector(s, a), Value::Vector(_, b)) => {
                 let all = a
@@ -2102,6 +2145,9 @@ impl<'a> Evaluator<'a> {
             if let Some((scalar, size)) = vector_name(head_name) {
                 return self.vector_function(frame, scalar, size, &name, args, span);
             }
+            if let Some(size) = matrix_name(head_name) {
+                return self.matrix_function(frame, size, &name, args, span);
+            }
             let mut type_path = syn::Path {
                 leading_colon: None,
                 segments: syn::punctuated::Punctuated::new(),
@@ -2351,6 +2397,7 @@ impl<'a> Evaluator<'a> {
                 self.run_method(frame, &method, identity, None, given, all, span)
             }
             Value::Vector(scalar, all) => self.vector_method(frame, scalar, all, &name, args, span),
+            Value::Matrix(all) => self.matrix_method(frame, all, &name, args, span),
             Value::Array(all) if name == "map" => {
                 let [f] = args.as_slice() else {
                     return Err(self.refuse(frame, span, "`map` takes a function"));
@@ -2400,7 +2447,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn number_method(
+    pub(super) fn number_method(
         &mut self,
         frame: &Frame,
         name: &str,
@@ -2539,101 +2586,16 @@ impl<'a> Evaluator<'a> {
         ]))
     }
 
-    fn scalar(&mut self, frame: &Frame, value: Value, scalar: Scalar, span: Span) -> Done<Value> {
+    pub(super) fn scalar(
+        &mut self,
+        frame: &Frame,
+        value: Value,
+        scalar: Scalar,
+        span: Span,
+    ) -> Done<Value> {
         let value = self.read(value);
         let e = self.put_together(frame, &value, &Type::Scalar(scalar), span)?;
         Ok(Value::Scalar(e))
-    }
-
-    fn vector_function(
-        &mut self,
-        frame: &Frame,
-        scalar: Scalar,
-        size: usize,
-        name: &str,
-        args: Vec<Value>,
-        span: Span,
-    ) -> Done<Value> {
-        match name {
-            "new" if args.len() == size => {
-                let all = args
-                    .into_iter()
-                    .map(|v| self.scalar(frame, v, scalar, span));
-                Ok(Value::Vector(scalar, all.collect::<Done<_>>()?))
-            }
-            "splat" if args.len() == 1 => {
-                let value = args.into_iter().next().unwrap_or(Value::Unit);
-                let value = self.scalar(frame, value, scalar, span)?;
-                let value = self.settled(value, "component", Rank::Part);
-                Ok(Value::Vector(scalar, vec![value; size]))
-            }
-            _ => {
-                let mut args = args.into_iter().map(|v| self.read(v)).collect::<Vec<_>>();
-                if let Some(Value::Vector(s, all)) = args.first().cloned() {
-                    args.remove(0);
-                    return self.vector_method(frame, s, all, name, args, span);
-                }
-                Err(self.refuse(frame, span, format!("a vector's `{name}` has no form here")))
-            }
-        }
-    }
-
-    fn vector_method(
-        &mut self,
-        frame: &Frame,
-        scalar: Scalar,
-        all: Vec<Value>,
-        name: &str,
-        args: Vec<Value>,
-        span: Span,
-    ) -> Done<Value> {
-        let args: Vec<Value> = args.into_iter().map(|v| self.read(v)).collect();
-        match (name, args.as_slice()) {
-            ("dot", [Value::Vector(_, other)]) if scalar == Scalar::F32 => {
-                let mut sum: Option<Value> = None;
-                for (a, b) in all.iter().zip(other) {
-                    let product =
-                        self.operation(frame, Binary::Multiply, a.clone(), b.clone(), span)?;
-                    sum = Some(match sum {
-                        None => product,
-                        Some(before) => {
-                            self.operation(frame, Binary::Add, before, product, span)?
-                        }
-                    });
-                }
-                Ok(sum.unwrap_or(Value::Unit))
-            }
-            ("truncate", []) => Ok(Value::Vector(scalar, all[..all.len() - 1].to_vec())),
-            ("extend", [last]) => {
-                let mut all = all;
-                let last = self.scalar(frame, last.clone(), scalar, span)?;
-                all.push(last);
-                Ok(Value::Vector(scalar, all))
-            }
-            ("as_ivec2" | "as_uvec2" | "as_vec2" | "as_ivec3" | "as_uvec3" | "as_vec3", []) => {
-                let (to, which) = match &name[3..4] {
-                    "i" => (Scalar::I32, Builtin::ToI32),
-                    "u" => (Scalar::U32, Builtin::ToU32),
-                    _ => (Scalar::F32, Builtin::ToF32),
-                };
-                if scalar == Scalar::F32 && to != Scalar::F32 {
-                    return Err(self.refuse(
-                        frame,
-                        span,
-                        "from floats, use `to_i32` of what is clamped",
-                    ));
-                }
-                let all = all
-                    .into_iter()
-                    .map(|v| match v {
-                        Value::Scalar(e) => Value::Scalar(builtin(which, vec![e])),
-                        other => other,
-                    })
-                    .collect();
-                Ok(Value::Vector(to, all))
-            }
-            _ => Err(self.refuse(frame, span, format!("a vector's `{name}` has no form here"))),
-        }
     }
 }
 
@@ -2819,24 +2781,6 @@ fn fn_bound(bound: &syn::TypeParamBound) -> Option<(Vec<syn::Type>, syn::Type)> 
         return None;
     };
     Some((p.inputs.iter().cloned().collect(), (**result).clone()))
-}
-
-/// glam's vectors.
-fn vector_name(name: &str) -> Option<(Scalar, usize)> {
-    let (scalar, rest) = match name.strip_prefix('U') {
-        Some(rest) => (Scalar::U32, rest),
-        None => match name.strip_prefix('I') {
-            Some(rest) => (Scalar::I32, rest),
-            None => (Scalar::F32, name),
-        },
-    };
-    let size = match rest {
-        "Vec2" => 2,
-        "Vec3" => 3,
-        "Vec4" => 4,
-        _ => return None,
-    };
-    Some((scalar, size))
 }
 
 fn int_literal(value: i128, scalar: Scalar) -> Option<Literal> {

@@ -264,6 +264,15 @@ pub fn builtin(which: Builtin, args: Vec<Expr>) -> Expr {
     node(ty, Kind::Builtin(which, args))
 }
 
+/// Whether it is a local, or a member of one.
+fn is_place(e: &Expr) -> bool {
+    match &e.kind {
+        Kind::Local(_) => true,
+        Kind::Member(of, _) => is_place(of),
+        _ => false,
+    }
+}
+
 /// A vector from its components: as it is if these are all of one vector, in order.
 pub fn vector(scalar: Scalar, parts: Vec<Expr>) -> Expr {
     let ty = Type::Vector(scalar, parts.len());
@@ -278,7 +287,7 @@ pub fn vector(scalar: Scalar, parts: Vec<Expr>) -> Expr {
     if let Some(all) = whole
         && all.windows(2).all(|w| w[0] == w[1])
         && let Some(first) = all.first()
-        && matches!(first.kind, Kind::Local(_))
+        && is_place(first)
     {
         return (*first).clone();
     }

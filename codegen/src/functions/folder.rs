@@ -6,8 +6,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::FORMS;
 use super::api::{FILE, LibraryRecord, Record};
 use super::ir::Library;
+use crate::build::MANIFEST_FILE;
 use crate::error::{Error, Result};
 use crate::files::sha256;
 use crate::folder::{self, Found};
@@ -80,15 +82,7 @@ impl Folder {
         functions: &[String],
         sources: &str,
     ) -> Result<Self> {
-        let is_name = prefix.starts_with(|c: char| c.is_ascii_lowercase())
-            && !prefix.ends_with('_')
-            && !prefix.contains("__")
-            && prefix
-                .chars()
-                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
-        // GLSL keeps `GL_` for itself; file systems take names of 255 bytes.
-        let is_free = !super::names::is_taken(prefix) && !prefix.starts_with("gl_");
-        if !is_name || !is_free || prefix.len() > LONGEST_PREFIX {
+        if !is_prefix(prefix) {
             return Err(Error::Option {
                 option: "--prefix",
                 value: prefix.into(),
@@ -130,8 +124,10 @@ impl Folder {
     /// the way, unless `force`; a file cannot be written.
     pub fn write(&self, out: &Path, force: bool) -> Result<Report> {
         let folder = folder::Folder::create(out)?;
+        folder.refuse(MANIFEST_FILE, "shaders")?;
         let mut owned = folder::Owned::new();
-        if let Some((before, hash)) = record(&folder)? {
+        // What is no record is in the way.
+        if let Ok(Some((before, hash))) = record(&folder) {
             self.same_api(Some(&before))?;
             owned.insert(FILE.into(), [hash].into());
             owned.extend(
@@ -161,14 +157,18 @@ impl Folder {
     /// # Errors
     /// A signature changed and the library's number did not; the folder is none of libraries.
     pub fn check(&self, committed: &Path) -> Result<Differences> {
-        let missing = || Error::Manifest {
+        let missing = || Error::Record {
             path: committed.join(FILE),
-            problem: "it is missing, or no record of libraries of functions".into(),
+            problem: "it is missing".into(),
         };
         let folder = folder::Folder::open(committed)?.ok_or_else(missing)?;
+        folder.refuse(MANIFEST_FILE, "shaders, too")?;
         let (before, _) = record(&folder)?.ok_or_else(missing)?;
         self.same_api(Some(&before))?;
         let mut files = Vec::new();
+        if folder.was_stopped()? {
+            files.push("a build of the folder was stopped before its end".into());
+        }
         for (name, bytes) in &self.files {
             match folder.read(name)? {
                 Found::File(there) if there == *bytes => {}
@@ -178,6 +178,16 @@ impl Folder {
         }
         let extra = before.files.keys().filter(|n| !self.files.contains_key(*n));
         files.extend(extra.map(|name| format!("{name} has no source any more")));
+        for form in &FORMS {
+            for file in folder.files_in(form.name)? {
+                let name = format!("{}/{file}", form.name);
+                let known = self.files.contains_key(&name) || before.files.contains_key(&name);
+                // Hidden files are an editor's or the system's.
+                if !known && !file.starts_with('.') {
+                    files.push(format!("{name} is extra: no build wrote it"));
+                }
+            }
+        }
         Ok(Differences { files })
     }
 
@@ -208,19 +218,49 @@ impl Folder {
     }
 }
 
-/// What a folder is said to hold.
-#[must_use]
-pub fn read(path: &Path) -> Option<Record> {
-    let folder = folder::Folder::open(path).ok()??;
-    record(&folder).ok()?.map(|(record, _)| record)
+/// Whether names may begin with it.
+fn is_prefix(prefix: &str) -> bool {
+    let is_name = prefix.starts_with(|c: char| c.is_ascii_lowercase())
+        && !prefix.ends_with('_')
+        && !prefix.contains("__")
+        && prefix
+            .chars()
+            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    // GLSL keeps `GL_` for itself; file systems take names of 255 bytes.
+    let is_free = !super::names::is_taken(prefix) && !prefix.starts_with("gl_");
+    is_name && is_free && prefix.len() <= LONGEST_PREFIX
 }
 
-/// The record in a folder, and its hash; `None` where there is none that can be read.
+/// What a folder is said to hold; `None` if there is no record of libraries.
+///
+/// # Errors
+/// A record that cannot be read, or that hankel did not write.
+pub fn read(path: &Path) -> Result<Option<Record>> {
+    let Some(folder) = folder::Folder::open(path)? else {
+        return Ok(None);
+    };
+    Ok(record(&folder)?.map(|(record, _)| record))
+}
+
+/// The record in a folder, and its hash.
 fn record(folder: &folder::Folder) -> Result<Option<(Record, String)>> {
-    Ok(match folder.read(FILE)? {
-        Found::File(bytes) => serde_json::from_slice(&bytes)
-            .ok()
-            .map(|record| (record, sha256(&bytes))),
-        Found::Nothing | Found::Other(..) => None,
-    })
+    let fail = |problem: String| Error::Record {
+        path: folder.path_of(FILE),
+        problem,
+    };
+    match folder.read(FILE)? {
+        Found::Nothing => Ok(None),
+        Found::Other(_, kind) => Err(fail(format!("it is {kind}"))),
+        Found::File(bytes) => {
+            let record: Record = serde_json::from_slice(&bytes)
+                .map_err(|error| fail(format!("it is no record of libraries: {error}")))?;
+            if !is_prefix(&record.prefix) {
+                return Err(fail(format!(
+                    "hankel writes no prefix `{}`",
+                    record.prefix.escape_debug()
+                )));
+            }
+            Ok(Some((record, sha256(&bytes))))
+        }
+    }
 }

@@ -107,6 +107,7 @@ impl Glsl<'_> {
                 };
                 format!("{letter}vec{n}")
             }
+            Type::Matrix(n) => format!("mat{n}"),
             Type::Struct(name) => self.naming.structure(name),
             Type::Lookup(_) => String::new(),
         }

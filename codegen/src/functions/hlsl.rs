@@ -5,8 +5,8 @@
 use super::glsl::by_macro;
 use super::ir::{Builtin, Function, Id, Library, Literal, Signature, Type};
 use super::print::{
-    Bond, Dialect, Naming, Piece, atom, bracketed, c_like, called, choice, components, digits,
-    documented, function, list, members, provenance, rounds, signed,
+    Bond, Dialect, Naming, Piece, atom, bracketed, c_like, called, choice, column, component,
+    components, digits, documented, function, list, members, provenance, rounds, signed,
 };
 
 pub(super) struct Hlsl<'a>(pub(super) &'a Naming);
@@ -59,6 +59,7 @@ impl Dialect for Hlsl<'_> {
         match ty {
             Type::Scalar(s) => c_like(*s).into(),
             Type::Vector(s, n) => format!("{}{n}", c_like(*s)),
+            Type::Matrix(n) => format!("float{n}x{n}"),
             Type::Struct(name) => self.0.structure(name),
             Type::Lookup(_) => String::new(),
         }
@@ -93,8 +94,23 @@ impl Dialect for Hlsl<'_> {
     fn construct(&self, ty: &Type, parts: &[Piece]) -> Piece {
         match ty {
             Type::Struct(_) => atom(format!("{{ {} }}", list(parts))),
+            // Of rows.
+            Type::Matrix(_) => called("transpose", &[called(&self.ty(ty), parts)]),
             _ => called(&self.ty(ty), parts),
         }
+    }
+
+    /// `m[i]` is a row.
+    fn member(&self, of: &Piece, ty: &Type, name: &str) -> Piece {
+        match ty {
+            Type::Matrix(_) => atom(format!("transpose({})[{}]", of.0, column(name))),
+            _ => atom(format!("{}.{name}", bracketed(of, Bond::Atom))),
+        }
+    }
+
+    fn element(&self, matrix: &Piece, _: &Type, name: &str, row: &str) -> Piece {
+        let (matrix, row) = (bracketed(matrix, Bond::Atom), component(row));
+        atom(format!("{matrix}[{row}][{}]", column(name)))
     }
 
     fn give(&self, ty: &Type, value: &Piece) -> String {

@@ -24,6 +24,8 @@ pub enum Type {
     Scalar(Scalar),
     /// A vector of 2, 3 or 4 components.
     Vector(Scalar, usize),
+    /// A square matrix of floats, with so many columns.
+    Matrix(usize),
     /// A structure of the library, by its name in Rust.
     Struct(String),
     /// What the host looks up: a function that it hands in, by its place among
@@ -50,10 +52,11 @@ impl Type {
     /// A truth value.
     pub const BOOL: Self = Self::Scalar(Scalar::Bool);
 
-    /// The components of a vector, or the scalar itself.
+    /// The components of a vector or matrix, or the scalar itself.
     pub fn scalar(&self) -> Option<Scalar> {
         match self {
             Self::Scalar(s) | Self::Vector(s, _) => Some(*s),
+            Self::Matrix(_) => Some(Scalar::F32),
             Self::Struct(_) | Self::Lookup(_) => None,
         }
     }
@@ -111,6 +114,9 @@ pub struct Node {
     pub kind: Kind,
 }
 
+/// glam's names of a matrix's columns.
+pub const COLUMNS: [&str; 4] = ["x_axis", "y_axis", "z_axis", "w_axis"];
+
 /// What an expression is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
@@ -118,7 +124,7 @@ pub enum Kind {
     Literal(Literal),
     /// A local or parameter.
     Local(Id),
-    /// A component (`x`) or a structure's member.
+    /// A component (`x`), a matrix's column ([`COLUMNS`]) or a structure's member.
     Member(Expr, String),
     /// `-x`, `!x`
     Unary(Unary, Expr),
@@ -130,7 +136,7 @@ pub enum Kind {
     Call(String, Vec<Expr>),
     /// What the host looks up, by the parameter.
     Lookup(Id, Vec<Expr>),
-    /// A vector from its components, or a structure from its members.
+    /// A vector from its components, a matrix from its columns, or a structure from its members.
     Construct(Vec<Expr>),
 }
 

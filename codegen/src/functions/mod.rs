@@ -34,6 +34,7 @@ pub mod glsl;
 pub mod hlsl;
 pub mod ir;
 mod library;
+mod linear;
 pub mod msl;
 mod names;
 pub mod print;

@@ -60,6 +60,7 @@ impl Dialect for Msl<'_> {
         match ty {
             Type::Scalar(s) => c_like(*s).into(),
             Type::Vector(s, n) => format!("metal::{}{n}", c_like(*s)),
+            Type::Matrix(n) => format!("metal::float{n}x{n}"),
             Type::Struct(name) => name.clone(),
             Type::Lookup(_) => String::new(),
         }

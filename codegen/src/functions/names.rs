@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::ir::{Function, Id, Stmt};
+use super::ir::{Function, Id, Kind, Stmt, expressions, walk};
 
 /// Words that some language reserves, or has as a type or function that the texts use. A local of
 /// such a name gets `_value` appended.
@@ -374,15 +374,23 @@ pub fn is_taken(name: &str) -> bool {
     TAKEN.contains(&name)
 }
 
-/// Gives every local a name of its own. Names of those that change do not end in a digit: naga_oil
+/// Gives every local a name of its own, which is no function's that is called: in MSL and Rust it would hide that. Names of those that change do not end in a digit: naga_oil
 /// refuses such variables.
 pub fn make_unique(function: &mut Function) {
     let mut taken: HashSet<String> = HashSet::new();
+    let mut called: HashSet<String> = HashSet::new();
+    expressions(&function.body, &mut |e| {
+        walk(e, &mut |x| {
+            if let Kind::Call(name, _) = &x.kind {
+                called.insert(name.clone());
+            }
+        });
+    });
     let mut order: Vec<(Id, bool)> = function.params.iter().map(|p| (p.id, false)).collect();
     in_order(&function.body, &mut order);
     for (id, changes) in order {
         let mut base = function.locals[id].name.clone();
-        if is_taken(&base) {
+        if is_taken(&base) || called.contains(&base) {
             base.push_str("_value");
         }
         let fits = |name: &str| !changes || !name.ends_with(|c: char| c.is_ascii_digit());

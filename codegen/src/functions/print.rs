@@ -2,8 +2,8 @@
 //! statements look, the rest is the same everywhere.
 
 use super::ir::{
-    Binary, Builtin, Constant, Expr, Function, Id, Kind, Library, Literal, Scalar, Signature, Stmt,
-    Struct, Type, Unary,
+    Binary, Builtin, COLUMNS, Constant, Expr, Function, Id, Kind, Library, Literal, Scalar,
+    Signature, Stmt, Struct, Type, Unary,
 };
 use super::names::pascal;
 
@@ -149,9 +149,23 @@ pub trait Dialect {
         "}".into()
     }
 
-    /// A component or member.
-    fn member(&self, of: &Piece, _: &Type, name: &str) -> Piece {
-        atom(format!("{}.{name}", bracketed(of, Bond::Atom)))
+    /// A component, column or member.
+    fn member(&self, of: &Piece, ty: &Type, name: &str) -> Piece {
+        let of = bracketed(of, Bond::Atom);
+        match ty {
+            Type::Matrix(_) => atom(format!("{of}[{}]", column(name))),
+            _ => atom(format!("{of}.{name}")),
+        }
+    }
+
+    /// A component of a matrix's column.
+    fn element(&self, matrix: &Piece, ty: &Type, column: &str, row: &str) -> Piece {
+        let size = match ty {
+            Type::Matrix(size) => *size,
+            _ => 0,
+        };
+        let column = self.member(matrix, ty, column);
+        self.member(&column, &Type::Vector(Scalar::F32, size), row)
     }
 
     /// An operator of one operand.
@@ -368,7 +382,12 @@ impl Printer<'_> {
                 Type::Lookup(_) => d.passed(self.function, *id),
                 _ => atom(self.name(*id)),
             },
-            Kind::Member(of, name) => d.member(&self.expression(of), &of.ty, name),
+            Kind::Member(of, name) => match &of.kind {
+                Kind::Member(matrix, column) if matches!(matrix.ty, Type::Matrix(_)) => {
+                    d.element(&self.expression(matrix), &matrix.ty, column, name)
+                }
+                _ => d.member(&self.expression(of), &of.ty, name),
+            },
             Kind::Unary(op, x) => d.unary(*op, &self.expression(x)),
             Kind::Binary(op, a, b) => {
                 d.binary(*op, &self.expression(a), &self.expression(b), &a.ty)
@@ -389,10 +408,13 @@ impl Printer<'_> {
     }
 }
 
-/// Whether a value is a number or vector in `f32` that rounds on its way: where a language pins
+/// Whether a value is a number, vector or matrix in `f32` that rounds on its way: where a language pins
 /// locals, it must be one.
 pub fn rounds(ty: &Type, value: &Piece) -> bool {
-    let is_float = matches!(ty, Type::Scalar(Scalar::F32) | Type::Vector(Scalar::F32, _));
+    let is_float = matches!(
+        ty,
+        Type::Scalar(Scalar::F32) | Type::Vector(Scalar::F32, _) | Type::Matrix(_)
+    );
     is_float
         && [" + ", " - ", " * ", " / "]
             .iter()
@@ -680,6 +702,11 @@ pub fn component(name: &str) -> usize {
         .iter()
         .position(|n| *n == name)
         .unwrap_or(0)
+}
+
+/// The number of a matrix's column.
+pub fn column(name: &str) -> usize {
+    COLUMNS.iter().position(|n| *n == name).unwrap_or(0)
 }
 
 /// The name of a scalar where names are put together: `float2`, `uint3`.

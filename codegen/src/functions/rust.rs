@@ -1,8 +1,8 @@
-//! Rust for the processor, without dependencies: vectors are arrays.
+//! Rust for the processor, without dependencies: vectors are arrays, matrices arrays of columns.
 
 use super::ir::{Binary, Builtin, Function, Id, Library, Literal, Scalar, Signature, Type, Unary};
 use super::print::{
-    Bond, Dialect, Naming, Piece, atom, bracketed, called, component, components, digits,
+    Bond, Dialect, Naming, Piece, atom, bracketed, called, column, component, components, digits,
     documented, function, list, members, operator, provenance, signed,
 };
 
@@ -76,6 +76,7 @@ impl Dialect for Rust<'_> {
         match ty {
             Type::Scalar(s) => scalar(s).into(),
             Type::Vector(s, n) => format!("[{}; {n}]", scalar(s)),
+            Type::Matrix(n) => format!("[[f32; {n}]; {n}]"),
             Type::Struct(name) => name.clone(),
             Type::Lookup(signature) => {
                 let params: Vec<String> = signature.params.iter().map(|t| self.ty(t)).collect();
@@ -135,7 +136,7 @@ impl Dialect for Rust<'_> {
 
     fn construct(&self, ty: &Type, parts: &[Piece]) -> Piece {
         match ty {
-            Type::Vector(..) => atom(format!("[{}]", list(parts))),
+            Type::Vector(..) | Type::Matrix(_) => atom(format!("[{}]", list(parts))),
             _ => atom(format!("{}::of({})", self.ty(ty), list(parts))),
         }
     }
@@ -181,6 +182,7 @@ impl Dialect for Rust<'_> {
                 bracketed(of, Bond::Atom),
                 component(name)
             )),
+            Type::Matrix(_) => atom(format!("{}[{}]", bracketed(of, Bond::Atom), column(name))),
             _ => atom(format!("{}.{name}", bracketed(of, Bond::Atom))),
         }
     }

@@ -212,8 +212,8 @@ fn put_in_place(body: &mut Vec<Stmt>, locals: &[Local]) {
         if !copies && at.iter().any(|&j| total(&body[j]) + size(&e) > LONGEST) {
             continue;
         }
-        // A vector's or structure's members are read by name.
-        if matches!(e.ty, Type::Vector(..) | Type::Struct(_)) && !copies {
+        // Members of vectors, matrices and structures are read by name.
+        if matches!(e.ty, Type::Vector(..) | Type::Matrix(_) | Type::Struct(_)) && !copies {
             let mut by_member = false;
             for &j in &at {
                 let mut with = |x: &Expr| {

@@ -12,13 +12,13 @@ use std::collections::HashSet;
 use super::ir::{Binary, Builtin, Function, Id, Library, Literal, Scalar, Signature, Type, Unary};
 use super::names::camel;
 use super::print::{
-    Dialect, Naming, Piece, WIDTH, atom, block_comment, called, components, digits, documented,
-    function, list, members, provenance, reflowed, signed, wrapped,
+    Dialect, Naming, Piece, WIDTH, atom, block_comment, called, column, components, digits,
+    documented, function, list, members, provenance, reflowed, signed, wrapped,
 };
 use super::wgsl::looks_up;
 
 /// What texts import from `three/tsl`, if they use it.
-const IMPORTS: [&str; 28] = [
+const IMPORTS: [&str; 31] = [
     "Fn",
     "If",
     "Loop",
@@ -34,6 +34,9 @@ const IMPORTS: [&str; 28] = [
     "ivec2",
     "ivec3",
     "ivec4",
+    "mat2",
+    "mat3",
+    "mat4",
     "max",
     "min",
     "select",
@@ -179,10 +182,12 @@ pub fn write_types(library: &Library, naming: &Naming, sha256: &str) -> String {
     let exports = Exports::new(library, naming);
     let mut text = documented(&provenance(library, sha256), "//");
     text.push_str(
-        "\nimport type { Node, Vector2, Vector3, Vector4 } from 'three/webgpu';\n\
+        "\nimport type {\n    Matrix2, Matrix3, Matrix4, Node, Vector2, Vector3, Vector4,\n} from 'three/webgpu';\n\
          import type { struct } from 'three/tsl';\n\n\
          type Float = Node<'float'> | number;\ntype Vec2 = Node<'vec2'> | Vector2;\n\
-         type Vec3 = Node<'vec3'> | Vector3;\ntype Vec4 = Node<'vec4'> | Vector4;\n\n\
+         type Vec3 = Node<'vec3'> | Vector3;\ntype Vec4 = Node<'vec4'> | Vector4;\n\
+         type Mat2 = Node<'mat2'> | Matrix2;\ntype Mat3 = Node<'mat3'> | Matrix3;\n\
+         type Mat4 = Node<'mat4'> | Matrix4;\n\n\
          /** Rises when a signature changes. */\n",
     );
     text.push_str(&format!("export const API: {};\n", library.api));
@@ -286,6 +291,7 @@ fn type_name(ty: &Type) -> String {
             };
             format!("{letter}vec{n}")
         }
+        Type::Matrix(n) => format!("mat{n}"),
         Type::Struct(name) => name.clone(),
         Type::Lookup(_) => String::new(),
     }
@@ -305,6 +311,7 @@ fn taken(ty: &Type) -> String {
         Type::Scalar(Scalar::F32) => "Float".into(),
         Type::Scalar(Scalar::Bool) => format!("{} | boolean", given(ty)),
         Type::Vector(Scalar::F32, n) => format!("Vec{n}"),
+        Type::Matrix(n) => format!("Mat{n}"),
         Type::Lookup(signature) => {
             let params: Vec<String> = signature
                 .params
@@ -497,6 +504,7 @@ impl Dialect for Tsl<'_> {
     fn member(&self, of: &Piece, ty: &Type, name: &str) -> Piece {
         match ty {
             Type::Struct(_) => atom(format!("{}.get('{name}')", of.0)),
+            Type::Matrix(_) => atom(format!("{}.element({})", of.0, column(name))),
             _ => atom(format!("{}.{name}", of.0)),
         }
     }

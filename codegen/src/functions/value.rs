@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::fold;
-use super::ir::{Expr, Id, Kind, Literal, Scalar, Type};
+use super::ir::{COLUMNS, Expr, Id, Kind, Literal, Scalar, Type};
 use super::source::ModuleId;
 
 /// A value.
@@ -24,6 +24,8 @@ pub enum Value {
     Double(f64),
     /// A glam vector.
     Vector(Scalar, Vec<Value>),
+    /// A glam matrix: its columns.
+    Matrix(Vec<Value>),
     /// A structure: its identity and its fields. Those of a tuple structure are named by number.
     Struct(Rc<str>, Vec<(String, Value)>),
     /// A tuple.
@@ -135,7 +137,7 @@ impl Value {
     pub fn is_known(&self) -> bool {
         match self {
             Self::Scalar(e) => matches!(e.kind, Kind::Literal(_)),
-            Self::Vector(_, all) | Self::Tuple(all) | Self::Array(all) => {
+            Self::Vector(_, all) | Self::Matrix(all) | Self::Tuple(all) | Self::Array(all) => {
                 all.iter().all(Self::is_known)
             }
             Self::Struct(_, fields) => fields.iter().all(|(_, v)| v.is_known()),
@@ -148,6 +150,11 @@ impl Value {
         match self {
             Self::Scalar(e) => with(name, e),
             Self::Vector(_, all) => {
+                for (v, part) in all.iter_mut().zip(["x", "y", "z", "w"]) {
+                    v.each_scalar(&format!("{name}_{part}"), with);
+                }
+            }
+            Self::Matrix(all) => {
                 for (v, part) in all.iter_mut().zip(["x", "y", "z", "w"]) {
                     v.each_scalar(&format!("{name}_{part}"), with);
                 }
@@ -190,6 +197,10 @@ impl Value {
                 let i = ["x", "y", "z", "w"].iter().position(|n| n == name)?;
                 all.get_mut(i)
             }
+            (Self::Matrix(all), Step::Field(name)) => {
+                let i = COLUMNS.iter().position(|n| n == name)?;
+                all.get_mut(i)
+            }
             (Self::Tuple(all), Step::Field(name)) => all.get_mut(name.parse::<usize>().ok()?),
             (Self::Array(all), Step::Index(i)) => all.get_mut(*i),
             _ => None,
@@ -209,6 +220,7 @@ impl Value {
             Self::Int(_) => "a whole number that is known".into(),
             Self::Fraction(..) | Self::Double(_) => "a fraction that is known".into(),
             Self::Vector(..) => "a vector".into(),
+            Self::Matrix(_) => "a matrix".into(),
             Self::Struct(name, _) => format!("a `{}`", name.rsplit("::").next().unwrap_or(name)),
             Self::Tuple(_) => "a tuple".into(),
             Self::Array(_) => "an array".into(),

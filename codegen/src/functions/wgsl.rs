@@ -5,8 +5,8 @@
 
 use super::ir::{Builtin, Function, Library, Literal, Scalar, Type};
 use super::print::{
-    Dialect, Naming, Piece, atom, called, components, digits, documented, function, members,
-    provenance, signed,
+    Bond, Dialect, Naming, Piece, atom, bracketed, called, components, digits, documented,
+    function, members, provenance, signed,
 };
 
 /// The form of a file.
@@ -81,6 +81,7 @@ impl Dialect for Wgsl<'_> {
         match ty {
             Type::Scalar(s) => scalar(s).into(),
             Type::Vector(s, n) => format!("vec{n}<{}>", scalar(s)),
+            Type::Matrix(n) => format!("mat{n}x{n}<f32>"),
             Type::Struct(name) => self.0.structure(name),
             Type::Lookup(_) => String::new(),
         }
@@ -146,7 +147,7 @@ impl Dialect for Wgsl<'_> {
             "for (var {name}: {} = {}; {name} < {}; {name}++) {{",
             self.ty(ty),
             from.0,
-            to.0
+            bracketed(to, Bond::Sum)
         )
     }
 }

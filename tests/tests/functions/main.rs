@@ -8,6 +8,7 @@
 
 mod lookups;
 mod modules;
+mod sample;
 mod tsl;
 
 use std::collections::BTreeMap;
@@ -572,6 +573,13 @@ fn subject(function: &Function, msl_file: &Path) -> Subject {
     } else {
         ("", "")
     };
+    let text = |form: &str| {
+        if sample::has(function) {
+            sample::text(form)
+        } else {
+            text(form)
+        }
+    };
     let twice = |form: &str, before: &str, after: &str| {
         let text = text(form);
         format!("{before}{text}\n{text}{after}")
@@ -611,10 +619,11 @@ fn wanted(all: Vec<Function>) -> Vec<Function> {
         .collect()
 }
 
-/// The library's functions, and those of a host that give their lookups to others.
-fn natives_and_lookups() -> Vec<Function> {
+/// The library's functions, those of a host that give their lookups to others, and the sample's.
+fn natives_and_others() -> Vec<Function> {
     let mut all = natives();
     all.extend(wanted(lookups::natives()));
+    all.extend(wanted(sample::functions()));
     all
 }
 
@@ -648,12 +657,21 @@ fn every_function_computes_the_native_bits_in_every_language() {
         lookups::MSL_AFTER
     );
     std::fs::write(&with_lookups, host).expect("the header can be written");
+    // Under the library's name, by which the stubs call.
+    let of_sample = folder.path().join("sample.h.metal");
+    let renamed = format!(
+        "{}namespace {PREFIX} {{ namespace shadows {{ using namespace {PREFIX}::sample; }} }}\n",
+        sample::text("msl")
+    );
+    std::fs::write(&of_sample, renamed).expect("the header can be written");
     let tools = tools();
-    let mut subjects: Vec<Subject> = natives_and_lookups()
+    let mut subjects: Vec<Subject> = natives_and_others()
         .iter()
         .map(|f| {
             let header = if looks_up(f) {
                 &with_lookups
+            } else if sample::has(f) {
+                &of_sample
             } else {
                 &msl_file
             };
@@ -729,7 +747,7 @@ fn on_the_processor(name: &str, program: &str, compile: impl FnOnce(&Path, &Path
     let binary = folder.path().join("program");
     std::fs::write(&source, program).expect("the program can be written");
     let mut expected = BTreeMap::new();
-    for f in natives_and_lookups() {
+    for f in natives_and_others() {
         let rows = rows(&f);
         std::fs::write(folder.path().join(format!("{}.in", f.name)), &rows).expect("rows");
         expected.insert(f.name, mapped(f.run, &rows, arguments(&f).len()));
@@ -782,10 +800,10 @@ fn the_c_header_computes_the_native_bits_and_has_no_warnings() {
     };
     let mut program = String::from(
         "struct Light { float color[4]; };\n#include \"hankel_shadows.h\"\n\
-         #include \"hankel_shadows.h\"\n#include <stdio.h>\n#include <stdlib.h>\n",
+         #include \"hankel_shadows.h\"\n#include \"hankel_sample.h\"\n#include <stdio.h>\n#include <stdlib.h>\n",
     );
     program.push_str(lookups::C_AFTER);
-    for f in natives_and_lookups() {
+    for f in natives_and_others() {
         let words = arguments(&f);
         let line = |ty: &str, name: &str| format!("    {ty} {name};\n");
         let (kind, size) = parts(&f.result);
@@ -809,13 +827,14 @@ fn the_c_header_computes_the_native_bits_and_has_no_warnings() {
         );
     }
     program.push_str("int main(void) {\n    return 0");
-    for f in natives_and_lookups() {
+    for f in natives_and_others() {
         let _ = write!(program, " | {}()", f.name);
     }
     program.push_str(";\n}\n");
     let header = |source: &Path| {
         let folder = source.parent().expect("a folder");
         std::fs::write(folder.join("hankel_shadows.h"), text("c")).expect("the header");
+        std::fs::write(folder.join("hankel_sample.h"), sample::text("c")).expect("the header");
     };
     let warnings = [
         "-Wall",
@@ -853,11 +872,17 @@ fn the_rust_module_computes_the_native_bits() {
     let host = Host {
         scalars: ["f32", "u32", "i32"],
         vector: |_, _| String::new(),
-        call: |name| format!("library::{name}"),
+        call: |name| {
+            let of_sample = sample::functions().iter().any(|f| f.name == name);
+            format!("{}::{name}", if of_sample { "sample" } else { "library" })
+        },
     };
-    let mut program = String::from("#[path = \"hankel_shadows.rs\"]\nmod library;\nuse std::fs;\n");
+    let mut program = String::from(
+        "#[path = \"hankel_shadows.rs\"]\nmod library;\n#[path = \"hankel_sample.rs\"]\nmod sample;\n\
+         use std::fs;\n",
+    );
     let mut main = String::from("fn main() {\n");
-    for f in natives_and_lookups() {
+    for f in natives_and_others() {
         let words = arguments(&f);
         let mut at = 0;
         let args: Vec<String> = f
@@ -913,6 +938,7 @@ fn the_rust_module_computes_the_native_bits() {
         let folder = source.parent().expect("a folder");
         let module = format!("{}{}", text("rust"), lookups::RUST_AFTER);
         std::fs::write(folder.join("hankel_shadows.rs"), module).expect("the module");
+        std::fs::write(folder.join("hankel_sample.rs"), sample::text("rust")).expect("the module");
         let mut rustc = Command::new("rustc");
         rustc.args(["--edition", "2024", "-O", "-Dwarnings", "-Adead_code", "-o"]);
         rustc.arg(binary).arg(source);

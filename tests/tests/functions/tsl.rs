@@ -1,21 +1,17 @@
 //! TSL: what three.js makes of the module, for its WebGPU renderer and for WebGL 2, in the stubs of WGSL and
-//! of GLSL ES. Besides the built-in library a sample of what that has none of: structures at interfaces,
-//! branches, bits, and what the host looks up.
+//! of GLSL ES, of the built-in library and of the sample.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
 use hankel_codegen::Language;
-use hankel_codegen::functions::print::Naming;
-use hankel_codegen::functions::source::CrateText;
-use hankel_codegen::functions::{self, FORMS};
 use hankel_dsl::native::describe::{Scalar, Type};
 use hankel_dsl::native::function::Function;
 use hankel_matrix::subject::Subject;
 use hankel_matrix::tools::Tools;
 
-use super::{PREFIX, beside, glsl, in_form, natives, text, tools, wgsl};
+use super::{PREFIX, beside, glsl, in_form, natives, sample, text, tools, wgsl};
 
 /// What the host of a sample looks up: twice, within itself, and with names of its own that a loop in a
 /// shader may have. Counts are powers of two: no driver rounds such a quotient in a way of its own.
@@ -34,138 +30,10 @@ export const meanOf = Fn(([x, turns]) => {
 });
 ";
 
-/// Functions, and their source.
-macro_rules! both {
-    ($($tokens:tt)*) => {
-        $($tokens)*
-        const SOURCE: &str = stringify!($($tokens)*);
-    };
-}
-
-/// The sample.
-#[allow(
-    clippy::neg_cmp_op_on_partial_ord,
-    reason = "the functions are what is translated, as somebody may write them"
-)]
-mod sample {
-    use hankel_dsl::glam::{UVec2, Vec2};
-    use hankel_dsl::native::describe::Type;
-    use hankel_dsl::native::function::Words;
-    use hankel_dsl::{Real, function, to_i32};
-
-    both! {
-        /// Two numbers.
-        #[derive(Clone, Copy)]
-        pub struct Pair {
-            /// The smaller one.
-            pub low: f32,
-            /// The larger one.
-            pub high: f32,
-        }
-
-        /// A pair in order.
-        #[function]
-        pub fn ordered(a: f32, b: f32) -> Pair {
-            Pair { low: Real::min(a, b), high: Real::max(a, b) }
-        }
-
-        /// A pair's middle, and how far it is from an end.
-        #[function]
-        pub fn middle(pair: Pair) -> Vec2 {
-            Vec2::new((pair.low + pair.high) * 0.5, (pair.high - pair.low) * 0.5)
-        }
-
-        /// Structures that functions give and take.
-        #[function]
-        pub fn structures(a: f32, b: f32) -> Vec2 {
-            let pair = ordered(a, -b);
-            middle(Pair { low: pair.low, high: pair.high + 1.0 }) - middle(pair) * 3.0
-        }
-
-        /// Branches with statements and without, and a loop whose count is not known.
-        #[function]
-        pub fn branches(x: f32, y: f32, turns: u32) -> f32 {
-            let mut sign = 1.0;
-            let size = if x < y {
-                sign = -1.0;
-                let d = y - x;
-                d * d
-            } else {
-                x - y
-            };
-            let is_odd = (x > 0.5) & !(y > 0.5) | (x < -0.5 && y < -0.5 || x == y);
-            let kind = if is_odd { 3_u32 } else { 5 };
-            let mut sum = size * sign + kind as f32;
-            let mut i = 0_u32;
-            while i < turns & 15 {
-                sum = sum * 0.5 + i as f32;
-                i += 1;
-            }
-            sum
-        }
-
-        /// Bits and whole numbers.
-        #[function]
-        pub fn bits(word: u32, x: f32) -> UVec2 {
-            let whole = to_i32(Real::clamp(x, -100.0, 100.0));
-            let low = (word & 0xff) << 3 | word >> 29;
-            let mixed = word.wrapping_mul(747_796_405).wrapping_add(whole as u32) ^ !low;
-            UVec2::new(low | mixed & 0xf0f0, if whole < 1 { mixed } else { x.to_bits() })
-        }
-
-        /// The mean of what is looked up.
-        #[function]
-        pub fn mean(count: u32, depth_at: impl Fn(u32) -> f32) -> f32 {
-            let mut sum = depth_at(0);
-            let mut i = 1;
-            while i < count {
-                sum += depth_at(i);
-                i += 1;
-            }
-            sum / count as f32
-        }
-    }
-
-    /// The whole source.
-    pub const TEXT: &str = SOURCE;
-
-    hankel_dsl::library!(sample {
-        api: 1,
-        functions: [structures, branches, bits, mean]
-    });
-
-    /// The same as in `HOST`.
-    pub fn mean_of(x: f32, turns: u32) -> f32 {
-        let i = x + 1.0;
-        let inner = |k: u32| mean(2, |l| k as f32 * i + l as f32);
-        mean(4, |k| k as f32 * i) + mean(1 << (turns & 3), inner)
-    }
-
-    impl Words for Pair {
-        const COUNT: usize = 2;
-
-        fn describe() -> Type {
-            panic!("a structure is not at the interface of a stub")
-        }
-
-        fn read(words: &[u32]) -> Self {
-            Self {
-                low: f32::read(words),
-                high: f32::read(&words[1..]),
-            }
-        }
-
-        fn write(self, words: &mut Vec<u32>) {
-            self.low.write(words);
-            self.high.write(words);
-        }
-    }
-}
-
 /// The sample's functions, and the host's.
 fn samples() -> Vec<Function> {
     let scalar = |scalar| Type::Scalar { scalar };
-    let mut all = sample::sample_library::functions();
+    let mut all = sample::functions();
     all.push(Function {
         name: "mean_of",
         params: vec![("x", scalar(Scalar::F32)), ("turns", scalar(Scalar::U32))],
@@ -175,26 +43,6 @@ fn samples() -> Vec<Function> {
         },
     });
     all
-}
-
-/// The sample's module and its types.
-fn sample_texts() -> [String; 2] {
-    let list =
-        "hankel_dsl::library!(sample { api: 1, functions: [structures, branches, bits, mean] });";
-    let krate = CrateText {
-        name: "sample".into(),
-        version: "1.0.0".into(),
-        licence: "MIT".into(),
-        files: [("src/lib.rs".to_owned(), format!("{}\n{list}", sample::TEXT))].into(),
-    };
-    let libraries = functions::read(&[krate]).unwrap_or_else(|e| panic!("{e}"));
-    let naming = Naming {
-        prefix: PREFIX.into(),
-        library: libraries[0].name.clone(),
-    };
-    let form = FORMS.iter().find(|f| f.name == "tsl").expect("a form");
-    let (_, types) = form.beside(&libraries[0], &naming, "0").expect("types");
-    [form.text(&libraries[0], &naming, "0"), types]
 }
 
 /// Links the folder of npm's packages into a folder, from which `package` can then be imported.
@@ -214,9 +62,8 @@ fn lay(folder: &Path, tools: &Tools) {
     let write = |name: &str, text: &str| {
         std::fs::write(folder.join(name), text).expect("a file");
     };
-    let [module, types] = sample_texts();
-    write("hankel_sample.tsl.js", &module);
-    write("hankel_sample.tsl.d.ts", &types);
+    write("hankel_sample.tsl.js", &sample::text("tsl"));
+    write("hankel_sample.tsl.d.ts", &sample::types());
     write("hankel_shadows.tsl.js", &text("tsl"));
     write("hankel_shadows.tsl.d.ts", &beside("tsl").expect("types").1);
     write("host.mjs", HOST);
