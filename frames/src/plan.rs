@@ -135,6 +135,8 @@ pub struct Impossible {
     pub nearest: Option<(String, Estimate)>,
     /// The ways, and why each was left out.
     pub rejected: Vec<Omission>,
+    /// Of so many configurations; 0 if nothing that was chosen is for the scene.
+    pub considered: usize,
 }
 
 impl fmt::Display for Plan {
@@ -175,11 +177,12 @@ impl fmt::Display for Plan {
 
 impl fmt::Display for Impossible {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "nothing has an error of at most {} here",
-            self.wanted.error
-        )?;
+        if self.considered == 0 {
+            writeln!(f, "nothing that was chosen is for this scene")?;
+        } else {
+            let error = self.wanted.error;
+            writeln!(f, "nothing has an error of at most {error} here")?;
+        }
         if let Some((name, error)) = &self.nearest {
             writeln!(f, "nearest: {name}, {error}")?;
         }
@@ -479,7 +482,7 @@ struct Found {
 /// Plans a scene's shadows: the fastest of the configurations of `choices` that is within the budgets.
 ///
 /// # Errors
-/// See [`crate::FrameError`]. That nothing is within the budgets is no error.
+/// See [`crate::FrameError`]. That nothing is within the budgets, or for the scene, is no error.
 pub fn plan(
     device: &mut dyn Device,
     shaders: &dyn Shaders,
@@ -489,6 +492,20 @@ pub fn plan(
     wanted: Wanted,
     progress: &mut dyn Progress,
 ) -> Result<std::result::Result<Plan, Impossible>> {
+    let mut configurations = choices.configurations();
+    configurations.retain(|c| c.suits(scene));
+    let blind = blind(&configurations, scene, mesh)?;
+    configurations.retain(|c| blind.iter().all(|b| b.what != c.method()));
+    let mut unfit = unfit(choices, scene);
+    unfit.extend(blind);
+    if configurations.is_empty() {
+        return Ok(Err(Impossible {
+            wanted,
+            nearest: None,
+            rejected: unfit,
+            considered: 0,
+        }));
+    }
     let mut search = Search {
         device,
         shaders,
@@ -496,10 +513,6 @@ pub fn plan(
         mesh,
         pictures: Pictures::default(),
     };
-    let mut configurations = choices.configurations();
-    configurations.retain(|c| c.suits(scene));
-    let blind = blind(&configurations, scene, mesh)?;
-    configurations.retain(|c| blind.iter().all(|b| b.what != c.method()));
     progress.begin("timing each method", 1, 3);
     let predictions = search.predictions(&configurations, choices, progress)?;
     let mut order: Vec<(f64, Configuration)> = configurations
@@ -605,7 +618,8 @@ pub fn plan(
         return Ok(Err(Impossible {
             wanted,
             nearest: nearest.map(|(c, e)| (c.to_string(), e)),
-            rejected: blind.into_iter().chain(why.told(None)).collect(),
+            rejected: unfit.into_iter().chain(why.told(None)).collect(),
+            considered: configurations.len(),
         }));
     };
     let times = of_passes(&rounds[fastest]);
@@ -622,7 +636,7 @@ pub fn plan(
         times,
         bytes: chosen.bytes,
         summary: made.summary(),
-        rejected: blind
+        rejected: unfit
             .into_iter()
             .chain(why.told(Some(&chosen.configuration)))
             .collect(),
@@ -632,6 +646,26 @@ pub fn plan(
         pixels: truth.known.len(),
         scene: configured,
     }))
+}
+
+/// What of the choices is not for a scene's lights, and why.
+fn unfit(choices: &Choices, scene: &Scene) -> Vec<Omission> {
+    let shadows = choices.techniques.iter().filter_map(|technique| {
+        Some(Omission {
+            what: technique.name.into(),
+            why: technique.not_for(&scene.lights)?.into(),
+        })
+    });
+    let scattered = choices.scatterings.iter().filter_map(|technique| {
+        let instead = scene.lights.iter().find_map(|l| l.refuses(technique))?;
+        Some(Omission {
+            what: format!("scattering by {}", technique.name).into(),
+            why: format!("it must be {instead}").into(),
+        })
+    });
+    // Without a medium nothing is scattered.
+    let scattered = scattered.filter(|_| scene.medium.is_some());
+    shadows.chain(scattered).collect()
 }
 
 /// The methods that leave the shadow of a scene's translucent casters out, and why.

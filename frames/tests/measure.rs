@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use hankel_dsl::glam::Vec3;
 use hankel_frames::measure::{Ask, Choices, Measurement, Session, Subject};
-use hankel_frames::plan::{Plan, Wanted, plan};
-use hankel_frames::scene::{Fit, Scene};
+use hankel_frames::plan::{Impossible, Plan, Wanted, plan};
+use hankel_frames::scattering::Scattering;
+use hankel_frames::scene::{Fit, Medium, Scene, Source, Spot};
 use hankel_frames::techniques::Technique;
 use hankel_frames::truth::{Arriving, by_rays, by_technique};
-use hankel_frames::{FrameError, NoShaders, Quiet};
+use hankel_frames::{FrameError, NoShaders, Progress, Quiet};
 use hankel_host::device::NativeDevice;
 
 fn subject(output: [u32; 2]) -> Subject {
@@ -113,7 +115,16 @@ fn exhaustively(subject: &Subject, truth: &Arriving) -> BTreeMap<String, f64> {
     suiting.map(of).collect()
 }
 
-fn planned(subject: &Subject, wanted: Wanted) -> Result<Plan, hankel_frames::plan::Impossible> {
+fn planned(subject: &Subject, wanted: Wanted) -> Result<Plan, Impossible> {
+    planned_of(subject, &choices(), wanted, &mut Quiet)
+}
+
+fn planned_of(
+    subject: &Subject,
+    choices: &Choices,
+    wanted: Wanted,
+    progress: &mut dyn Progress,
+) -> Result<Plan, Impossible> {
     let (scene, mesh) = (&subject.scene, &subject.mesh);
     let mut device = NativeDevice::new();
     plan(
@@ -121,9 +132,9 @@ fn planned(subject: &Subject, wanted: Wanted) -> Result<Plan, hankel_frames::pla
         &NoShaders,
         scene,
         mesh,
-        &choices(),
+        choices,
         wanted,
-        &mut Quiet,
+        progress,
     )
     .unwrap()
 }
@@ -197,4 +208,76 @@ fn what_cannot_be_had_is_said() {
         none.to_string().contains("beyond the time budget"),
         "{none}"
     );
+}
+
+/// No step may begin.
+struct Never;
+
+impl Progress for Never {
+    fn begin(&mut self, name: &str, _: usize, _: usize) {
+        panic!("began: {name}");
+    }
+
+    fn advance(&mut self, _: f32) {}
+}
+
+#[test]
+fn what_is_not_for_the_lights_is_said_before_anything_is_drawn() {
+    let mut subject = subject([48, 27]);
+    let by = |names: &[&str]| Choices {
+        techniques: names
+            .iter()
+            .map(|name| Technique::named(name).unwrap())
+            .collect(),
+        ..choices()
+    };
+    let chosen = by(&["pcss", "soft"]);
+    let none = planned_of(&subject, &chosen, within(0.9), &mut Never).unwrap_err();
+    assert_eq!(none.considered, 0);
+    let text = none.to_string();
+    for part in [
+        "nothing that was chosen is for this scene",
+        "not pcss: it is for lights with an area",
+        "not soft: it is for lights with an area",
+        "give a light a `radius`",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let json = serde_json::to_value(&none).unwrap();
+    assert_eq!(json["considered"], 0);
+    assert_eq!(json["rejected"][0]["what"], "pcss");
+    let why = json["rejected"][0]["why"].as_str().unwrap();
+    assert!(why.contains("`radius`"), "{why}");
+
+    // It is said beside a plan as well.
+    let chosen = by(&["pcss", "pcf"]);
+    let plan = planned_of(&subject, &chosen, within(0.9), &mut Quiet).unwrap();
+    let text = plan.to_string();
+    assert!(text.contains("not pcss: it is for lights"), "{text}");
+
+    // With an area it is for the light.
+    let pcss = Technique::named("pcss").unwrap();
+    assert!(pcss.not_for(&subject.scene.lights).is_some());
+    subject.scene.lights[0].area.radius = 0.02;
+    assert_eq!(pcss.not_for(&subject.scene.lights), None);
+
+    // Ways to scatter light that are not for spot lights.
+    subject.scene.medium = Some(Medium::default());
+    subject.scene.lights[0].source = Source::Spot(Spot {
+        position: Vec3::new(0.0, 4.0, 0.0),
+        direction: Vec3::NEG_Y,
+        angle: 60.0,
+        inner: 48.0,
+    });
+    let chosen = Choices {
+        scatterings: vec![Scattering::named("prefiltered").unwrap()],
+        ..by(&["pcss", "pcf"])
+    };
+    let none = planned_of(&subject, &chosen, within(0.9), &mut Never).unwrap_err();
+    let text = none.to_string();
+    assert!(
+        text.contains("not scattering by prefiltered: it must be `ray-marching`"),
+        "{text}"
+    );
+    assert!(!text.contains("not pcss"), "{text}");
 }

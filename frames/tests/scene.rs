@@ -8,8 +8,8 @@ use hankel_dsl::glam::Vec3;
 use hankel_frames::passes::POWER_MOMENTS;
 use hankel_frames::scattering::Scattering;
 use hankel_frames::scene::{
-    Area, AreaShape, DepthRange, Fit, Geometry, Light, Medium, Mesh, Procedural, Scene, SceneError,
-    Shadow, Source,
+    Area, AreaShape, DepthRange, Fit, Geometry, Light, MAX_TRIANGLES, MAX_VERTICES, Medium, Mesh,
+    Procedural, Scene, SceneError, Shadow, Source,
 };
 use hankel_frames::techniques::Technique;
 
@@ -227,7 +227,19 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         ),
         (
             with("[shadow]\nsamples = [32]"),
-            &["scene.toml:10:11", "shadow.samples"],
+            &[
+                "scene.toml:10:11",
+                "`shadow.samples`",
+                "2 numbers are wanted, not 1",
+            ],
+        ),
+        (
+            with("[shadow]\nsamples = [1, 2, 3, 4]"),
+            &[
+                "scene.toml:10:11",
+                "`shadow.samples`",
+                "2 numbers are wanted, not 4",
+            ],
         ),
         (
             LEAST.replace("[-1, -2, -1]", "[-1, -2, -1]\nradius = -0.1"),
@@ -379,7 +391,15 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
         ),
         (
             LEAST.replace("[3, 4, 5]", "[3, 4]"),
-            &["scene.toml:5", "camera.eye"],
+            &[
+                "scene.toml:5:7",
+                "`camera.eye`",
+                "3 numbers are wanted, not 2",
+            ],
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "3"),
+            &["scene.toml:5:7", "`camera.eye`", "3 numbers"],
         ),
         (
             LEAST.replace("[3, 4, 5]", "[3, 4, 1e30]"),
@@ -432,6 +452,51 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
                 "`{part}` is not in `{message}`, from\n{text}"
             );
         }
+    }
+}
+
+#[test]
+fn numbers_beyond_those_that_are_wanted_are_refused() {
+    let light = |field: &str| {
+        let more = format!("[-1, -2, -1]\n{field} = [1, 1, 1, 1]");
+        LEAST.replace("[-1, -2, -1]", &more)
+    };
+    let cases = [
+        (
+            LEAST.replace("[3, 4, 5]", "[3, 4, 5, 6, 7]"),
+            "scene.toml:5:7: `camera.eye`: 3 numbers are wanted, not 5",
+        ),
+        (
+            LEAST.replace("[3, 4, 5]", "[\n3,\n4,\n5,\n6,\n]"),
+            "scene.toml:5:7: `camera.eye`: 3 numbers are wanted, not 4",
+        ),
+        (
+            LEAST.replace("[0, 0, 0]", "[0, 0, 0, 0]"),
+            "scene.toml:6:10: `camera.target`: 3 numbers are wanted, not 4",
+        ),
+        (
+            LEAST.replace("[0, 0, 0]", "[0, 0, 0]\nup = [0, 1, 0, 0]"),
+            "scene.toml:7:6: `camera.up`: 3 numbers are wanted, not 4",
+        ),
+        (
+            LEAST.replace("[-1, -2, -1]", "[-1, -2, -1, 0]"),
+            "scene.toml:8:13: `light.direction`: 3 numbers are wanted, not 4",
+        ),
+        (
+            light("position"),
+            "scene.toml:9:12: `light.position`: 3 numbers are wanted, not 4",
+        ),
+        (
+            light("colour"),
+            "scene.toml:9:10: `light.colour`: 3 numbers are wanted, not 4",
+        ),
+        (
+            format!("{LEAST}[shadow]\nsamples = [1, 2, 3]"),
+            "scene.toml:10:11: `shadow.samples`: 2 numbers are wanted, not 3",
+        ),
+    ];
+    for (text, message) in cases {
+        assert_eq!(refused(&text), format!("folder/{message}"), "from\n{text}");
     }
 }
 
@@ -660,6 +725,77 @@ fn bad_models_are_refused_with_the_place() {
         &|m| m.json["nodes"][0]["translation"] = serde_json::json!([1e39, 0.0, 0.0]),
         &[],
     );
+}
+
+/// A model whose one mesh has 100 000 vertices and four triangles, in so many nodes.
+fn of_many_vertices(nodes: usize) -> Model {
+    let mut model = Model::new();
+    let bytes = 100_000 * 12;
+    let points = model.buffer[..48].to_vec();
+    model.buffer.extend(points);
+    model.buffer.resize(72 + bytes, 0);
+    model.json["buffers"][0]["byteLength"] = (72 + bytes).into();
+    model.json["bufferViews"][0]["byteOffset"] = 72.into();
+    model.json["bufferViews"][0]["byteLength"] = bytes.into();
+    model.json["accessors"][0]["count"] = 100_000.into();
+    model.json["nodes"] = vec![serde_json::json!({ "mesh": 0 }); nodes].into();
+    model.json["scenes"][0]["nodes"] = (0..nodes).collect();
+    model
+}
+
+#[test]
+fn vertices_and_triangles_are_counted_over_all_nodes() {
+    let mesh = of_many_vertices(2).load().unwrap();
+    assert_eq!(mesh.positions.len(), 200_000);
+    assert_eq!(mesh.triangles.len(), 8);
+    let mut model = of_many_vertices(3000);
+    // The last vertex is bad: it would be found if the mesh was read.
+    let end = model.buffer.len();
+    model.buffer[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
+    let message = model.refused();
+    for part in [
+        "m.gltf",
+        "mesh 0 of node",
+        &format!("more than {MAX_VERTICES} vertices"),
+        "leave nodes out",
+    ] {
+        assert!(message.contains(part), "`{part}` is not in `{message}`");
+    }
+    // Two nodes with half of the triangles and one each: neither alone has too many.
+    let mut model = Model::new();
+    model.json["accessors"][1]["count"] = (3 * (MAX_TRIANGLES / 2 + 1)).into();
+    let message = model.refused();
+    let part = format!("more than {MAX_TRIANGLES} triangles");
+    assert!(message.contains(&part), "{message}");
+}
+
+#[test]
+fn colours_of_materials_are_from_0_to_1() {
+    let load = |factor: serde_json::Value| {
+        let mut model = Model::new();
+        model.json["materials"] = serde_json::json!([
+            {},
+            { "pbrMetallicRoughness": { "baseColorFactor": factor } },
+        ]);
+        model.json["meshes"][0]["primitives"][0]["material"] = 1.into();
+        model.load().map_err(|e| e.to_string())
+    };
+    let mesh = load(serde_json::json!([0.0, 0.25, 1.0, 0.5])).unwrap();
+    assert_eq!(mesh.colours[0], Vec3::new(0.0, 0.25, 1.0));
+    for (factor, value) in [
+        (
+            serde_json::json!([-5, 2, 1e30, 1]),
+            "[-5.0, 2.0, 1e30, 1.0]",
+        ),
+        (serde_json::json!([1e39, 1, 1, 1]), "[inf, 1.0, 1.0, 1.0]"),
+        (serde_json::json!([1, 1, 1, 1.5]), "[1.0, 1.0, 1.0, 1.5]"),
+    ] {
+        let message = load(factor).unwrap_err();
+        let of = format!("mesh 0, primitive 0, material 1: its baseColorFactor is {value}");
+        for part in ["m.gltf", &of, "from 0 to 1"] {
+            assert!(message.contains(part), "`{part}` is not in `{message}`");
+        }
+    }
 }
 
 #[test]

@@ -100,13 +100,12 @@ impl Configuration {
     #[must_use]
     pub fn suits(&self, scene: &Scene) -> bool {
         let has_medium = scene.medium.is_some();
-        let mut lights = scene.lights.iter();
         let is_scattered = self.scattering.is_some();
-        let has_area = lights.any(|light| light.area.radius > 0.0);
+        let is_for_lights = self.technique.not_for(&scene.lights).is_none();
         let mut lights = scene.lights.iter();
         let refused = |l: &Light| self.scattering.and_then(|s| l.refuses(s.technique));
         let is_refused = lights.any(|l| refused(l).is_some());
-        (!self.technique.is_soft || has_area) && !is_refused && is_scattered == has_medium
+        is_for_lights && !is_refused && is_scattered == has_medium
     }
 
     /// The same without what there is of a medium.

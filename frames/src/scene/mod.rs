@@ -79,7 +79,7 @@ use crate::visibility::SAMPLES;
 pub use error::{Place, Result, SceneError};
 pub use light::{Area, AreaShape, Light, Source, Spot};
 pub use mesh::{Bounds, Mesh};
-pub use model::MAX_TRIANGLES;
+pub use model::{MAX_TRIANGLES, MAX_VERTICES};
 pub use procedural::Procedural;
 pub use view::{CameraView, LightView};
 

@@ -17,6 +17,9 @@ use super::mesh::Mesh;
 /// Most triangles of a model: more would not fit the index buffers of a common device.
 pub const MAX_TRIANGLES: usize = 10_000_000;
 
+/// Most vertices of a model: as many as the most triangles have corners.
+pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
+
 /// Most bytes of a model, with all the files that it names.
 const MAX_BYTES: u64 = 2 << 30;
 
@@ -54,6 +57,19 @@ pub fn files(file: &Path) -> Vec<PathBuf> {
 fn beside(file: &Path, uri: &str) -> PathBuf {
     let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
     file.parent().unwrap_or(Path::new("")).join(name.as_ref())
+}
+
+/// The vertices and triangles of a primitive, by what it says of itself; those that are passed over have none.
+fn counts(primitive: &gltf::Primitive<'_>) -> [usize; 2] {
+    let positions = primitive.get(&Semantic::Positions);
+    let vertices = positions.map_or(0, |accessor| accessor.count());
+    let indices = primitive.indices();
+    let corners = indices.map_or(vertices, |accessor| accessor.count());
+    match primitive.mode() {
+        Mode::Triangles => [vertices, corners / 3],
+        Mode::TriangleStrip | Mode::TriangleFan => [vertices, corners.saturating_sub(2)],
+        _ => [0, 0],
+    }
 }
 
 struct Loader<'a> {
@@ -122,6 +138,8 @@ impl Loader<'_> {
             None => return self.fail("it has no scene"),
         };
         let mut seen = vec![false; document.nodes().count()];
+        let mut placed = Vec::new();
+        let [mut vertices, mut triangles] = [0_usize; 2];
         while let Some((node, parent)) = open.pop() {
             if std::mem::replace(&mut seen[node.index()], true) {
                 return self.fail(format!(
@@ -137,17 +155,36 @@ impl Loader<'_> {
                 ));
             }
             if let Some(mesh) = node.mesh() {
+                // Before any of them takes memory: many nodes may have the same mesh.
                 for primitive in mesh.primitives() {
-                    let place = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
-                    let mut part = self.primitive(&primitive, &buffers, &place)?;
-                    part.transform(&Affine3A::from_mat4(matrix));
-                    self.mesh.append(&part);
-                    if self.mesh.triangles.len() > MAX_TRIANGLES {
-                        return self.fail(format!("it has more than {MAX_TRIANGLES} triangles"));
+                    let [more_vertices, more_triangles] = counts(&primitive);
+                    vertices = vertices.saturating_add(more_vertices);
+                    triangles = triangles.saturating_add(more_triangles);
+                    for (count, most, what) in [
+                        (vertices, MAX_VERTICES, "vertices"),
+                        (triangles, MAX_TRIANGLES, "triangles"),
+                    ] {
+                        if count > most {
+                            return self.fail(format!(
+                                "with mesh {} of node {}, it has more than {most} {what}: \
+                                 simplify its meshes or leave nodes out",
+                                mesh.index(),
+                                node.index()
+                            ));
+                        }
                     }
                 }
+                placed.push((mesh, matrix));
             }
             open.extend(node.children().map(|n| (n, matrix)));
+        }
+        for (mesh, matrix) in placed {
+            for primitive in mesh.primitives() {
+                let place = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
+                let mut part = self.primitive(&primitive, &buffers, &place)?;
+                part.transform(&Affine3A::from_mat4(matrix));
+                self.mesh.append(&part);
+            }
         }
         let far_off = |p: &&Vec3| !p.is_finite() || p.abs().max_element() > FAR_OFF;
         if let Some(p) = self.mesh.positions.iter().find(far_off) {
@@ -263,21 +300,29 @@ impl Loader<'_> {
             triangles,
             ..Mesh::default()
         };
-        let [r, g, b, _] = primitive
-            .material()
-            .pbr_metallic_roughness()
-            .base_color_factor();
+        let material = primitive.material();
+        let colour = material.pbr_metallic_roughness().base_color_factor();
+        // The material of those that name none is white.
+        if let Some(index) = material.index()
+            && !colour.iter().all(|c| (0.0..=1.0).contains(c))
+        {
+            return self.fail(format!(
+                "{place}, material {index}: its baseColorFactor is {colour:?}, but must be four \
+                 numbers from 0 to 1"
+            ));
+        }
+        let [r, g, b, _] = colour;
         mesh.paint(Vec3::new(r, g, b));
         match primitive.get(&Semantic::Normals) {
             Some(accessor) => {
-                mesh.normals = self.vectors(&accessor, buffers, &format!("{place}, normals"))?;
-                if mesh.normals.len() != mesh.positions.len() {
+                if accessor.count() != mesh.positions.len() {
                     return self.fail(format!(
                         "{place}: {} positions, but {} normals",
                         mesh.positions.len(),
-                        mesh.normals.len()
+                        accessor.count()
                     ));
                 }
+                mesh.normals = self.vectors(&accessor, buffers, &format!("{place}, normals"))?;
                 for n in &mut mesh.normals {
                     *n = n.try_normalize().unwrap_or(Vec3::Y);
                 }

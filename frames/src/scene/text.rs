@@ -1,12 +1,13 @@
 //! From TOML to a checked scene.
 
 use std::fmt::{self, Display};
+use std::marker::PhantomData;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 
@@ -44,23 +45,58 @@ struct GeometryText {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraText {
-    eye: Spanned<[f32; 3]>,
-    target: Spanned<[f32; 3]>,
-    up: Option<Spanned<[f32; 3]>>,
+    eye: Three,
+    target: Three,
+    up: Option<Three>,
     fov: Option<Spanned<f32>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LightText {
-    direction: Spanned<[f32; 3]>,
-    position: Option<Spanned<[f32; 3]>>,
+    direction: Three,
+    position: Option<Three>,
     angle: Option<Spanned<f32>>,
     inner: Option<Spanned<f32>>,
     strength: Option<Spanned<f32>>,
-    colour: Option<Spanned<[f32; 3]>>,
+    colour: Option<Three>,
     radius: Option<Spanned<f32>>,
     shape: Option<Spanned<AreaShape>>,
+}
+
+/// A point, a direction or a colour.
+type Three = Spanned<Exactly<f32, 3>>;
+
+/// As many numbers as its type says. An array of serde's own passes over those beyond its end.
+struct Exactly<T, const N: usize>([T; N]);
+
+impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for Exactly<T, N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Numbers<T, const N: usize>(PhantomData<T>);
+
+        impl<'de, T: Deserialize<'de>, const N: usize> Visitor<'de> for Numbers<T, N> {
+            type Value = Exactly<T, N>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "{N} numbers")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(
+                self,
+                mut seq: A,
+            ) -> std::result::Result<Self::Value, A::Error> {
+                let mut given: Vec<T> = Vec::with_capacity(N);
+                while let Some(number) = seq.next_element()? {
+                    given.push(number);
+                }
+                let count = given.len();
+                let all = <[T; N]>::try_from(given).map(Exactly);
+                all.map_err(|_| A::Error::custom(format!("{N} numbers are wanted, not {count}")))
+            }
+        }
+
+        deserializer.deserialize_seq(Numbers(PhantomData))
+    }
 }
 
 /// One table `[light]`, or several `[[light]]`.
@@ -122,7 +158,7 @@ struct ShadowText {
     filter: Option<Spanned<i64>>,
     #[serde(default)]
     fit: Fit,
-    samples: Option<[Spanned<i64>; 2]>,
+    samples: Option<Exactly<Spanned<i64>, 2>>,
     moment_bias: Option<Spanned<f32>>,
     depth_bias: Option<Spanned<f32>>,
     leak_cut: Option<Spanned<f32>>,
@@ -253,8 +289,8 @@ impl Reader<'_> {
         )
     }
 
-    fn point(&self, field: &str, given: &Spanned<[f32; 3]>) -> Result<Vec3> {
-        let p = Vec3::from_array(*given.get_ref());
+    fn point(&self, field: &str, given: &Three) -> Result<Vec3> {
+        let p = Vec3::from_array(given.get_ref().0);
         if p.is_finite() && p.abs().max_element() <= FAR_OFF {
             return Ok(p);
         }
@@ -266,7 +302,7 @@ impl Reader<'_> {
         )
     }
 
-    fn direction(&self, field: &str, given: &Spanned<[f32; 3]>) -> Result<Vec3> {
+    fn direction(&self, field: &str, given: &Three) -> Result<Vec3> {
         // In double precision, in which the square of no single one vanishes.
         let d = self.point(field, given)?.as_dvec3().try_normalize();
         d.map(|d| d.as_vec3()).map_or_else(
@@ -274,7 +310,7 @@ impl Reader<'_> {
                 self.refuse(
                     given.span(),
                     field,
-                    Vec3::from_array(*given.get_ref()),
+                    Vec3::from_array(given.get_ref().0),
                     "a direction: not all three may be zero",
                 )
             },
@@ -445,7 +481,7 @@ impl Reader<'_> {
             None => d.multisampling,
         };
         let samples = match s.samples {
-            Some(counts) => {
+            Some(Exactly(counts)) => {
                 let [search, filter] = counts
                     .map(|n| self.integer("shadow.samples", Some(n), 0, 1..=Scene::MAX_SAMPLES));
                 [search?, filter?]
@@ -533,7 +569,7 @@ impl Reader<'_> {
         };
         let colour = match &l.colour {
             Some(given) => {
-                let colour = Vec3::from_array(*given.get_ref());
+                let colour = Vec3::from_array(given.get_ref().0);
                 if !colour.to_array().iter().all(|c| (0.0..=1.0).contains(c)) {
                     let allowed = "three numbers from 0 to 1: `light.strength` has no such limit";
                     return self.refuse(given.span(), "light.colour", colour, allowed);

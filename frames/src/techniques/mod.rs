@@ -23,7 +23,7 @@ use hankel_dsl::native::describe::TexelFormat;
 
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::Given;
-use crate::scene::DepthRange;
+use crate::scene::{DepthRange, Light};
 
 /// A way to turn depths into shadows.
 pub struct Technique {
@@ -100,6 +100,15 @@ impl Technique {
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         ALL.into_iter().find(|t| t.name == name)
+    }
+
+    /// Why it is not for these lights, and what to do; `None` if it is.
+    #[must_use]
+    pub fn not_for(&self, lights: &[Light]) -> Option<&'static str> {
+        let has_area = lights.iter().any(|light| light.area.radius > 0.0);
+        let why = "it is for lights with an area, and none has one here: give a light a `radius` \
+                   above 0, or choose another technique";
+        (self.is_soft && !has_area).then_some(why)
     }
 }
 
