@@ -64,10 +64,18 @@ pub enum Command {
     #[command(flatten)]
     Measure(crate::measure::Command),
     /// Find or install rust-gpu's compiler.
+    #[command(after_help = "\
+Examples:
+  hankel toolchain status      which compiler would be used, and what is missing
+  hankel toolchain install     install it, the first way that is possible")]
     Toolchain(Toolchain),
     /// What of other people's compilers, drivers and browsers is there, and what installs the rest.
     Doctor(Doctor),
     /// Print a completion script for a shell.
+    #[command(after_help = "\
+Examples:
+  hankel completions bash >/etc/bash_completion.d/hankel
+  hankel completions fish >~/.config/fish/completions/hankel.fish")]
     Completions(Completions),
     /// A process that native kernels of another crate run in.
     #[command(name = crate::session::WORKER, hide = true)]
@@ -584,7 +592,8 @@ pub struct Render {
     #[arg(long, value_name = "FORM", default_value_t)]
     pub image_passes: ImagePasses,
     /// How much the difference picture is amplified.
-    #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION)]
+    #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION, requires = "compare",
+        value_parser = clap::value_parser!(u32).range(1..))]
     pub amplify: u32,
     /// Also tells how wrong the shadow is, against rays and against filtering without moments; takes
     /// some minutes for a large picture.
@@ -731,6 +740,10 @@ pub struct Toolchain {
 pub enum ToolchainCommand {
     /// Show which compiler would be used, why, and what is missing.
     #[command(after_help = "\
+Examples:
+  hankel toolchain status                which compiler would be used
+  hankel toolchain status --format json  the same for a program
+
 Environment:
   HANKEL_TOOLCHAIN          folder of a toolchain to use, whatever else there is
   HANKEL_TOOLCHAIN_ARCHIVE  archive to unpack when nothing is installed
@@ -744,6 +757,9 @@ Examples:
   hankel toolchain install --method source      from Debian's rust-src and crates.io, without LLVM")]
     Install(ToolchainInstall),
     /// Pack an installed compiler into an archive, to share it.
+    #[command(after_help = "\
+Examples:
+  hankel toolchain pack archives    writes archives/rust-gpu-….tar.zst, for `hankel toolchain install --from`")]
     Pack(ToolchainPack),
 }
 

@@ -2,30 +2,43 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::failure::{Failure, Result};
+
 /// The rule that `target` depends on `inputs`.
-pub fn rule(target: &Path, inputs: &[PathBuf]) -> String {
-    let mut text = escaped(target);
+///
+/// # Errors
+///
+/// A path that no rule can hold.
+pub fn rule(target: &Path, inputs: &[PathBuf]) -> Result<String> {
+    let mut text = escaped(target)?;
     text.push(':');
     for input in inputs {
         text.push_str(" \\\n  ");
-        text.push_str(&escaped(input));
+        text.push_str(&escaped(input)?);
     }
     text.push('\n');
-    text
+    Ok(text)
 }
 
-/// A path with what has a meaning in Make marked.
-fn escaped(path: &Path) -> String {
+/// A path with what has a meaning in Make marked. Nothing marks a line break: what follows it would
+/// be a rule of its own.
+fn escaped(path: &Path) -> Result<String> {
     let mut text = String::new();
     for letter in path.to_string_lossy().chars() {
         match letter {
+            '\n' | '\r' => {
+                return Err(Failure::input(
+                    format!("--depfile: {path:?} has a line break, which no rule of Make can hold"),
+                    "Give the folder or file another name, or leave out --depfile.",
+                ));
+            }
             '$' => text.push('$'),
             ' ' | '#' => text.push('\\'),
             _ => {}
         }
         text.push(letter);
     }
-    text
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -36,9 +49,24 @@ mod tests {
     fn letters_with_a_meaning_are_marked() {
         let inputs = ["a b/lib.rs", "c#/$d.rs"].map(PathBuf::from);
         assert_eq!(
-            rule(Path::new("out/manifest.json"), &inputs),
+            rule(Path::new("out/manifest.json"), &inputs).unwrap(),
             "out/manifest.json: \\\n  a\\ b/lib.rs \\\n  c\\#/$$d.rs\n"
         );
-        assert_eq!(rule(Path::new("x"), &[]), "x:\n");
+        assert_eq!(rule(Path::new("x"), &[]).unwrap(), "x:\n");
+    }
+
+    #[test]
+    fn line_breaks_are_refused() {
+        let evil = "d\nall: evil";
+        for (target, input) in [(evil, "lib.rs"), ("out", evil), ("out", "a\rb")] {
+            let failure = rule(Path::new(target), &[input.into()]).unwrap_err();
+            assert_eq!(failure.code(), 2);
+            let message = failure.to_string();
+            assert!(!message.contains(['\n', '\r']), "{message}");
+            assert!(
+                message.contains("d\\nall: evil") || message.contains("a\\rb"),
+                "{message}"
+            );
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::ErrorKind;
+use std::path::Path;
 
 use hankel_codegen as codegen;
 #[cfg(feature = "frames")]
@@ -243,6 +244,91 @@ impl From<FrameError> for Failure {
 
 impl From<hankel_toolchain::Error> for Failure {
     fn from(error: hankel_toolchain::Error) -> Self {
-        Self::new(Blame::Machine, &error, None)
+        use hankel_toolchain::Error as E;
+        let blame = match &error {
+            E::Input(error) => blame_of_input(error),
+            E::Output(error) => blame_of_output(error),
+            E::ChecksumSyntax { .. }
+            | E::ChecksumUnknown { .. }
+            | E::NotAToolchain { .. }
+            | E::NotAToolchainArchive { .. }
+            | E::UnsafeEntry { .. } => Blame::Input,
+            // What was given, and not what was downloaded.
+            E::Checksum { path, .. } if !is_kept(path) => Blame::Input,
+            // The bytes are no archive, or not all of one; other kinds are the disk's.
+            E::Archive { source, .. } if is_of_content(source.kind()) => Blame::Input,
+            // Only what was given is opened without being looked for first.
+            E::Io {
+                action: "open",
+                source,
+                ..
+            } if source.kind() == ErrorKind::NotFound => Blame::Input,
+            E::Io { source, .. } if is_misplaced(source.kind()) => Blame::Input,
+            _ => Blame::Machine,
+        };
+        Self::new(blame, &error, None)
+    }
+}
+
+/// Whether a file lies among those that are kept between runs.
+fn is_kept(path: &Path) -> bool {
+    let folder = hankel_toolchain::Options::from_env().cache_folder();
+    folder.is_ok_and(|folder| path.starts_with(folder))
+}
+
+/// Whether it is what was read that is wrong, and not how it was read.
+fn is_of_content(kind: ErrorKind) -> bool {
+    matches!(
+        kind,
+        ErrorKind::InvalidData
+            | ErrorKind::InvalidInput
+            | ErrorKind::UnexpectedEof
+            | ErrorKind::Other
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use hankel_toolchain::Error;
+
+    use super::*;
+
+    #[test]
+    fn what_was_given_is_misuse_and_the_rest_is_the_machine() {
+        let given = Path::new("given");
+        let of_io = |action, kind: ErrorKind| Error::Io {
+            action,
+            path: given.into(),
+            source: io::Error::from(kind),
+        };
+        let archive = |kind: ErrorKind| Error::Archive {
+            path: given.into(),
+            source: io::Error::from(kind),
+        };
+        let checksum = |path: &Path| Error::Checksum {
+            path: path.into(),
+            expected: String::new(),
+            actual: String::new(),
+        };
+        let cache = hankel_toolchain::Options::from_env().cache_folder();
+        let download = cache.unwrap().join("download");
+        for (code, error) in [
+            (2, of_io("open", ErrorKind::NotFound)),
+            (2, of_io("create", ErrorKind::AlreadyExists)),
+            (3, of_io("read", ErrorKind::NotFound)),
+            (3, of_io("create", ErrorKind::PermissionDenied)),
+            (3, of_io("write", ErrorKind::StorageFull)),
+            (2, archive(ErrorKind::UnexpectedEof)),
+            (3, archive(ErrorKind::PermissionDenied)),
+            (2, checksum(given)),
+            (3, checksum(&download)),
+            (2, Error::ChecksumSyntax { text: "zz".into() }),
+            (3, Error::NoCacheFolder),
+        ] {
+            let failure = Failure::from(error);
+            assert_eq!(failure.code(), code, "{failure}");
+        }
     }
 }

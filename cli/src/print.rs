@@ -9,8 +9,8 @@ use hankel_system::signals;
 use hankel_system::text::visible;
 use serde::Serialize;
 
-/// Exit code of a full disk.
-const FULL: i32 = 3;
+/// Exit code of what is the machine's fault: a full disk, a name that is no text.
+const MACHINE: i32 = 3;
 
 /// A line of the result, on the standard output stream.
 macro_rules! say {
@@ -29,9 +29,20 @@ pub fn json(value: &impl Serialize) {
     match serde_json::to_string_pretty(value) {
         // JSON itself leaves some characters that steer a terminal.
         Ok(text) => raw(format!("{}\n", steered(&text)).as_bytes()),
-        // A map with keys that are no text: none of the reports has one.
-        Err(error) => note(format_args!("the report has no JSON form: {error}")),
+        // The path of something that the machine has, of the cache for example.
+        Err(error) => {
+            note(format_args!(
+                "Error: the report has no JSON form: {error}; leave out --format json"
+            ));
+            signals::exit(MACHINE)
+        }
     }
+}
+
+/// Paths of a report in JSON. What is no UTF-8 in them comes out as `\u{fffd}`, as on a terminal.
+#[cfg(feature = "frames")]
+pub fn paths<S: serde::Serializer>(all: &[std::path::PathBuf], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(all.iter().map(|path| path.to_string_lossy()))
 }
 
 /// The same JSON, with characters that steer a terminal in JSON's own spelling.
@@ -87,7 +98,7 @@ fn lost(error: &io::Error) -> ! {
     note(format_args!(
         "Error: cannot write to the standard output stream: {error}"
     ));
-    signals::exit(FULL)
+    signals::exit(MACHINE)
 }
 
 #[cfg(test)]

@@ -895,5 +895,5 @@ fn toolchain_status_says_what_there_is() {
     let json = desk.hankel("toolchain status --format json").out();
     assert!(json.contains("\"ways\""), "{json}");
     desk.hankel("toolchain install --from nowhere.tar.zst")
-        .fails(3, &["nowhere.tar.zst"]);
+        .fails(2, &["nowhere.tar.zst"]);
 }

@@ -22,8 +22,10 @@ use crate::Language;
 use crate::error::{Error, Failure, Result, Step};
 use crate::files::sha256;
 use crate::finish::{self, Finished};
+pub use crate::folder::is_own;
 use crate::folder::{Change, Folder, Found, Owned};
 use crate::frame;
+use crate::functions::api;
 use crate::headers::{self, InWgsl, Layouts};
 use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
@@ -548,6 +550,7 @@ pub fn build(request: &Request, modules: &Modules, out: &Path, force: bool) -> R
 /// A file that hankel did not write is in the way, unless `force`; a file cannot be written.
 pub fn write(generated: &Generated, out: &Path, force: bool) -> Result<Report> {
     let folder = Folder::create(out)?;
+    refuse_libraries(&folder)?;
     let owned = written_before(&folder)?;
     let change = folder.update(&generated.files, MANIFEST_FILE, owned, force)?;
     Ok(report(&generated.manifest, change))
@@ -557,9 +560,14 @@ pub fn write(generated: &Generated, out: &Path, force: bool) -> Result<Report> {
 ///
 /// # Errors
 ///
-/// It is something else.
+/// It is something else, or holds libraries of functions.
 pub fn check_output(out: &Path) -> Result<()> {
-    Folder::open(out).map(drop)
+    Folder::open(out)?.map_or(Ok(()), |folder| refuse_libraries(&folder))
+}
+
+/// Libraries are in folders of their own: `check` could not tell what belongs to which build.
+fn refuse_libraries(folder: &Folder) -> Result<()> {
+    folder.refuse(api::FILE, "libraries of functions")
 }
 
 fn report(manifest: &Manifest, change: Change) -> Report {

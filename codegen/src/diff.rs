@@ -127,14 +127,23 @@ impl Build {
         let Some(folder) = Folder::open(path)? else {
             return Err(fail("there is no such folder".into()));
         };
-        if let Found::File(bytes) = folder.read(MANIFEST_FILE)? {
+        let manifest = folder.read(MANIFEST_FILE)?;
+        if let Found::Other(_, kind) = manifest {
+            return Err(fail(format!("{MANIFEST_FILE} is {kind}")));
+        }
+        if let Found::File(bytes) = manifest {
             let manifest = Manifest::from_json(&bytes)
                 .map_err(|problem| fail(format!("{MANIFEST_FILE}: {problem}")))?;
+            let files = manifest.files.iter().map(|(name, it)| (name, &it.sha256));
+            as_recorded(&folder, files)?
+                .map_or(Ok(()), |name| Err(fail(edited(name, MANIFEST_FILE))))?;
             return Ok(Self::Shaders(Box::new(manifest)));
         }
         if let Found::File(bytes) = folder.read(api::FILE)? {
-            let record = serde_json::from_slice(&bytes)
+            let record: api::Record = serde_json::from_slice(&bytes)
                 .map_err(|error| fail(format!("{}: {error}", api::FILE)))?;
+            as_recorded(&folder, &record.files)?
+                .map_or(Ok(()), |name| Err(fail(edited(name, api::FILE))))?;
             return Ok(Self::Functions(record));
         }
         Err(fail(format!(
@@ -142,6 +151,24 @@ impl Build {
             api::FILE
         )))
     }
+}
+
+/// The first file that is missing, or has another hash than the one that was recorded.
+fn as_recorded<'a>(
+    folder: &Folder,
+    files: impl IntoIterator<Item = (&'a String, &'a String)>,
+) -> Result<Option<&'a str>> {
+    for (name, hash) in files {
+        match folder.read(name)? {
+            Found::File(bytes) if sha256(&bytes) == *hash => {}
+            _ => return Ok(Some(name)),
+        }
+    }
+    Ok(None)
+}
+
+fn edited(name: &str, record: &str) -> String {
+    format!("{name} is missing, or is not the file that {record} names: build it again")
 }
 
 /// The manifest of a folder of shaders.
@@ -245,7 +272,28 @@ pub fn of_manifests(old: &Manifest, new: &Manifest) -> Diff {
             .collect();
         Item::of(found, texts)
     });
+    // Headers.
+    diff.add("file", &others(old), &others(new), |one, other| {
+        (one != other).then(|| Item::Changed {
+            changes: Vec::new(),
+            texts: Vec::new(),
+        })
+    });
     diff
+}
+
+/// Hashes of the files that are of no kernel alone.
+fn others(manifest: &Manifest) -> BTreeMap<String, &String> {
+    let of_kernels: BTreeSet<&String> = manifest
+        .kernels
+        .values()
+        .flat_map(|kernel| kernel.languages.values().map(|text| &text.file))
+        .collect();
+    let others = manifest.files.iter();
+    others
+        .filter(|(name, _)| !of_kernels.contains(name))
+        .map(|(name, file)| (name.clone(), &file.sha256))
+        .collect()
 }
 
 /// Compares two records of libraries.

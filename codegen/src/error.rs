@@ -247,6 +247,24 @@ pub enum Error {
         /// What it is, where it is no regular file.
         kind: Option<&'static str>,
     },
+    /// A folder holds what another kind of build wrote.
+    #[error("{} has {record}: it holds {holds}", path.display())]
+    OtherKind {
+        /// The folder.
+        path: PathBuf,
+        /// The file that says so.
+        record: &'static str,
+        /// What it holds.
+        holds: &'static str,
+    },
+    /// The record of a folder of libraries is missing or damaged.
+    #[error("{}: {problem}", path.display())]
+    Record {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// The output is no folder.
     #[error("{} is {kind}: the output goes into a folder", path.display())]
     NotAFolder {
@@ -385,6 +403,14 @@ impl Error {
                     .into()
             }
             Self::NotAFolder { .. } => "Choose another folder, or move it away.".into(),
+            Self::OtherKind { .. } => {
+                "Shaders and libraries of functions are built into folders of their own: give another one."
+                    .into()
+            }
+            Self::Record { .. } => {
+                "Restore the file, or build the libraries again with `hankel build --form functions`."
+                    .into()
+            }
             Self::Busy { .. } => "Wait for it, or end it, and try again.".into(),
             Self::DuplicateKernel { .. } | Self::DuplicateLayout { .. } => {
                 "Rename one of them.".into()
@@ -465,10 +491,9 @@ impl Failure {
                 if self.message.contains("literal is NaN")
                     || self.message.contains("literal is infinite") =>
             {
-                "The kernel has a constant that is infinite or NaN, which WGSL refuses. It may come from a \
-                 function: write `f32::MAX` for `f32::INFINITY`, a comparison for `signum`, `is_nan` and \
-                 `is_finite`, a division by the length for `normalize_or_zero`, and a vector that is chosen \
-                 by comparison for `any_orthonormal_pair`. Or build only `--target spirv`."
+                "The kernel has a number that is infinite or NaN, which WGSL has no literal for: write `f32::MAX` \
+                 for `f32::INFINITY`, and say otherwise that there is no number. Comparisons with infinity, \
+                 `is_finite` and `is_nan` have a form in every language. Or build only `--target spirv`."
             }
             Step::Parse | Step::Check => {
                 "naga does not read this construct: NaN and infinity literals, 64-bit atomics and \

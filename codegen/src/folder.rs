@@ -23,10 +23,11 @@ use cap_fs_ext::{DirExt, FileTypeExt, FollowSymlinks, OpenOptionsFollowExt, Open
 use cap_std::fs::{Dir, FileType, OpenOptions};
 
 use crate::Language;
+use crate::build::MANIFEST_FILE;
 use crate::error::{During, Error, Result};
 use crate::files::sha256;
 use crate::frame::{CONTENTS, FRAME_FILE};
-use crate::functions::FORMS;
+use crate::functions::{FORMS, api};
 
 /// Where a change is prepared.
 pub(crate) const STAGE: &str = ".hankel";
@@ -188,6 +189,23 @@ impl Folder {
         }
         names.sort();
         Ok(names)
+    }
+
+    /// Refuses a folder with the `record` of another kind of build, which `holds` something else.
+    pub fn refuse(&self, record: &'static str, holds: &'static str) -> Result<()> {
+        match self.read(record)? {
+            Found::Nothing => Ok(()),
+            Found::File(_) | Found::Other(..) => Err(Error::OtherKind {
+                path: self.path.clone(),
+                record,
+                holds,
+            }),
+        }
+    }
+
+    /// Where a file of the folder is.
+    pub fn path_of(&self, name: &str) -> PathBuf {
+        self.path.join(name)
     }
 
     /// Whether a change was stopped before its end.
@@ -446,6 +464,26 @@ fn split(name: &str) -> (Option<&str>, &str) {
     match name.split_once('/') {
         Some((folder, file)) => (Some(folder), file),
         None => (None, name),
+    }
+}
+
+/// Whether a path in an output folder is one that builds use: of their records, of a folder of texts, or hidden.
+#[must_use]
+pub fn is_own(name: &Path) -> bool {
+    let mut parts = name.components();
+    let first = parts.next().and_then(|part| part.as_os_str().to_str());
+    let first = first.unwrap_or_default();
+    match parts.next() {
+        None => {
+            [MANIFEST_FILE, FRAME_FILE, api::FILE].contains(&first)
+                || first.ends_with(".spv")
+                || first.starts_with('.')
+        }
+        Some(_) => {
+            SUBFOLDERS.contains(&first)
+                || FORMS.iter().any(|form| form.name == first)
+                || first.starts_with('.')
+        }
     }
 }
 

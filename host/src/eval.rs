@@ -675,6 +675,13 @@ fn read(
     row: u64,
 ) -> Result<bool, EvalError> {
     reader.read_record(record).map_err(|e| {
+        // Such an error names the line itself: a row without an end has no position.
+        if e.is_io_error() {
+            return EvalError::Input(InputError::Io {
+                path: path.into(),
+                source: e.into(),
+            });
+        }
         let line = e.position().map_or(0, |p| line_of(path, p));
         let problem = match e.kind() {
             csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".to_string(),

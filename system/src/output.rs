@@ -259,12 +259,17 @@ impl Write for Output {
 /// # Errors
 /// [`OutputError`]: nothing was changed then.
 pub fn create_all(paths: &[&Path], inputs: &[&Path]) -> Result<Vec<Output>, OutputError> {
-    let mut targets = Vec::new();
+    let mut targets: Vec<PathBuf> = Vec::new();
     for path in paths {
         let target = behind_links(path).unwrap_or_else(|_| path.to_path_buf());
         let target = std::path::absolute(&target).unwrap_or(target);
-        let regular = target.metadata().map_or(true, |m| m.is_file());
-        if regular && targets.contains(&target) {
+        let there = target.metadata().ok();
+        let regular = there.as_ref().is_none_or(Metadata::is_file);
+        // One file may have several names.
+        let given = targets
+            .iter()
+            .any(|other| *other == target || is_same(other, there.as_ref()));
+        if regular && given {
             return Err(OutputError::Twice {
                 path: path.to_path_buf(),
             });
@@ -309,9 +314,16 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
     ))
 }
 
-/// Whether a name means what is open already, such as `/dev/stdout`.
+/// Whether a name means what is open already, such as `/dev/stdout`. Files of `/dev/shm` are files.
 fn is_stream(path: &Path) -> bool {
-    cfg!(unix) && (path.starts_with("/dev") || path.starts_with("/proc"))
+    let open = [
+        "/dev/fd",
+        "/dev/stdin",
+        "/dev/stdout",
+        "/dev/stderr",
+        "/proc",
+    ];
+    cfg!(unix) && open.iter().any(|name| path.starts_with(name))
 }
 
 #[cfg(unix)]
@@ -389,11 +401,34 @@ fn finish(new: BufWriter<File>) -> io::Result<File> {
     new.into_inner().map_err(io::IntoInnerError::into_error)
 }
 
+/// Without room for the new content, the old one stays.
 fn overwrite(mut new: File, mut into: File) -> io::Result<()> {
+    let length = new.seek(io::SeekFrom::End(0))?;
     new.rewind()?;
-    into.set_len(0)?;
+    reserve(&into, length)?;
+    into.rewind()?;
     io::copy(&mut new, &mut into)?;
+    into.set_len(length)?;
     into.flush()
+}
+
+/// Takes the room of a file of so many bytes, where the file system can tell whether there is.
+#[cfg(target_os = "linux")]
+fn reserve(file: &File, length: u64) -> io::Result<()> {
+    use rustix::fs::{FallocateFlags, fallocate};
+    use rustix::io::Errno;
+    if length == 0 {
+        return Ok(());
+    }
+    match fallocate(file, FallocateFlags::KEEP_SIZE, 0, length) {
+        Err(Errno::NOSPC | Errno::DQUOT) => Err(Errno::NOSPC.into()),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn reserve(_: &File, _: u64) -> io::Result<()> {
+    Ok(())
 }
 
 #[cfg(test)]
@@ -455,8 +490,10 @@ mod tests {
             assert!(matches!(error, OutputError::IsInput { .. }), "{error}");
         }
         let (a, b) = (folder.path().join("new"), folder.path().join("./new"));
-        let error = create_all(&[&a, &b], &[]).unwrap_err();
-        assert!(matches!(error, OutputError::Twice { .. }), "{error}");
+        for two in [[&a, &b], [&input, &link]] {
+            let error = create_all(&two.map(PathBuf::as_path), &[]).unwrap_err();
+            assert!(matches!(error, OutputError::Twice { .. }), "{error}");
+        }
         assert_eq!(names(folder.path()), ["input", "link"]);
     }
 
@@ -524,6 +561,14 @@ mod tests {
         if Path::new(&name).exists() {
             write(Path::new(&name), "two").unwrap();
             assert_eq!(fs::read_to_string(at("open")).unwrap(), "one two");
+        }
+        // A file in memory is a file.
+        if Path::new("/dev/shm").is_dir() {
+            let shared = NamedTempFile::new_in("/dev/shm").unwrap();
+            for text in ["a longer text", "short"] {
+                write(shared.path(), text).unwrap();
+                assert_eq!(fs::read_to_string(shared.path()).unwrap(), text);
+            }
         }
         let error = write(Path::new("/dev/full"), "x").unwrap_err();
         assert!(error.is_machine(), "{error}");

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use hankel_codegen::Language;
-use hankel_codegen::build::{MANIFEST_FILE, Report, build, check_output};
+use hankel_codegen::build::{MANIFEST_FILE, Report, build, check_output, is_own};
 use hankel_codegen::functions::api;
 use hankel_system::output::Output;
 
@@ -16,12 +16,22 @@ use crate::session::Session;
 use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
-    // Whether it can be written, before anything is; a folder within the output's may be made by the build.
-    if let Some(file) = args
-        .depfile
-        .as_ref()
-        .filter(|it| !it.starts_with(&args.out))
-    {
+    // Whether a rule can hold the name and can be written, before anything is; a folder within the output's may be
+    // made by the build.
+    if args.depfile.is_some() {
+        depfile::rule(&args.out, &[])?;
+    }
+    let within = args.depfile.as_deref().and_then(|it| within(it, &args.out));
+    if let Some(own) = within.as_deref().filter(|it| is_own(it)) {
+        return Err(Failure::input(
+            format!(
+                "--depfile: {} in the output is the build's own",
+                own.display()
+            ),
+            "Give it a name beside the folders of the output, such as OUT/shaders.d, or another folder.",
+        ));
+    }
+    if let Some(file) = args.depfile.as_ref().filter(|_| within.is_none()) {
         let mut read: Vec<&Path> = args
             .generate
             .placement
@@ -73,6 +83,15 @@ pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
     Ok(Outcome::Fine)
 }
 
+/// The path of a file below a folder, however both are written.
+fn within(file: &Path, folder: &Path) -> Option<PathBuf> {
+    let (file, folder) = (
+        std::path::absolute(file).ok()?,
+        std::path::absolute(folder).ok()?,
+    );
+    file.strip_prefix(folder).ok().map(Path::to_owned)
+}
+
 /// Builds after each edit, until the program is stopped.
 fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
     let sources =
@@ -109,7 +128,7 @@ fn once(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
 pub fn depend(args: &Build, record: &str, inputs: &[PathBuf]) -> Result<()> {
     if let Some(file) = &args.depfile {
         let record = args.out.join(record);
-        let text = depfile::rule(&record, inputs);
+        let text = depfile::rule(&record, inputs)?;
         let mut inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         inputs.push(&record);
         Output::create(file, &inputs)?.finish(text.as_bytes())?;

@@ -24,13 +24,22 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
             "Give the folder that `hankel build --out` made and that is committed.",
         ));
     }
-    if let Some(record) = hankel_codegen::functions::folder::read(&args.folder) {
+    if let Some(record) = hankel_codegen::functions::folder::read(&args.folder)? {
+        if let Some(option) = of_shaders(args) {
+            return Err(Failure::input(
+                format!(
+                    "{option}: it is for shaders, and this folder holds libraries of functions"
+                ),
+                "Leave it out: functions.json says what the folder was built with.",
+            ));
+        }
         let manifest = args.generate.source.manifest_path.as_deref();
         return functions::check(manifest, &record, &args.folder, args.format, quiet);
     }
     let budget = match &args.budget {
         Some(file) => Config::read(file)?.budget,
-        None if Path::new(DEFAULT_BUDGET).is_file() => {
+        // A link that leads nowhere, too: what cannot be read is no missing budget.
+        None if Path::new(DEFAULT_BUDGET).symlink_metadata().is_ok() => {
             Config::read(Path::new(DEFAULT_BUDGET))?.budget
         }
         None => Config::default().budget,
@@ -43,6 +52,16 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
         say!("{report}");
     }
     Ok(Outcome::of(report.is_fine()))
+}
+
+/// The first option that is for folders of shaders.
+fn of_shaders(args: &Check) -> Option<&'static str> {
+    #[cfg(feature = "frames")]
+    if args.scene.is_some() {
+        return Some("--scene");
+    }
+    let budget = args.budget.is_some().then_some("--budget");
+    args.generate.first_option().or(budget)
 }
 
 /// What the folder must hold.

@@ -14,7 +14,7 @@ use hankel_matrix::known::Known;
 use hankel_matrix::run::Request;
 use hankel_matrix::subject::Subject;
 use hankel_matrix::tools::Tools;
-use hankel_system::output;
+use hankel_system::{input, output};
 
 use crate::args::{Format, Parity};
 use crate::failure::{Failure, Outcome, Result};
@@ -27,6 +27,9 @@ const ABSENT: &str = include_str!("../../../snapshots/absent-cells.toml");
 
 /// Known differences of the built-in kernels.
 const KNOWN: &str = include_str!("../../../snapshots/known-differences.toml");
+
+/// Most bytes of a table of absent cells.
+const MAX_BYTES: u64 = 16 << 20;
 
 pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     let own = &args.of_matrix;
@@ -53,9 +56,10 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
     .map_err(|e| Failure::input(e, "Mend the list of known differences."))?;
     let absent = match &own.absent {
         Some(file) => {
-            let text = std::fs::read_to_string(file).map_err(|e| e.to_string());
-            let table = text.and_then(|text| Absent::parse(&text));
-            Some(table.map_err(|e| format!("{}: {e}", file.display())))
+            let text = input::read_text(file, MAX_BYTES).map_err(|e| e.to_string());
+            Some(text.and_then(|text| {
+                Absent::parse(&text).map_err(|e| format!("{}: {e}", file.display()))
+            }))
         }
         None if built_in => Some(Absent::parse(ABSENT)),
         None => None,

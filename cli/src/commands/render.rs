@@ -17,6 +17,7 @@ use crate::session::Session;
 
 #[derive(Serialize)]
 struct Report<'a> {
+    #[serde(serialize_with = "print::paths")]
     pictures: Vec<PathBuf>,
     devices: Vec<&'a str>,
     triangles: usize,
@@ -109,11 +110,11 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
         .map_or_else(|| comparison.limit(), |percent| percent / 100.0);
     let share = comparison.difference.over_1;
     if share > limit {
-        eprintln!(
+        print::note(format_args!(
             "the pictures differ: {:.3} % of the pixels by more than 1/255, at most {:.3} % may",
             share * 100.0,
             limit * 100.0
-        );
+        ));
     }
     Ok(Outcome::of(share <= limit))
 }

@@ -5,6 +5,7 @@
 #[path = "../desk/mod.rs"]
 mod desk;
 
+mod folders;
 mod inputs;
 mod kernels;
 mod names;

@@ -1,6 +1,8 @@
 //! Names, texts and values that mean something to somebody else.
 
+use std::ffi::OsStr;
 use std::fs;
+use std::os::unix::ffi::OsStrExt;
 
 use crate::desk::{Desk, run};
 
@@ -130,6 +132,41 @@ fn names_of_crates_are_names() {
     desk.hankel("new mine").code(0);
     assert_eq!(desk.names(), ["mine"]);
     assert!(desk.path("mine/src/lib.rs").is_file());
+}
+
+/// JSON holds text alone: a path that is none comes out as on a terminal, or not without a word.
+#[test]
+fn a_path_that_is_no_text_has_a_form_in_json() {
+    let desk = Desk::new();
+    desk.write(
+        "scene.toml",
+        "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\ntarget = [0.0, 0.5, 0.0]\n\
+         [light]\ndirection = [-1.0, -2.0, -0.5]\n[output]\nwidth = 16\nheight = 9\n",
+    );
+    let name = OsStr::from_bytes(b"x\xff.png");
+    let done = run(desk
+        .command("render scene.toml --format json --out")
+        .arg(name));
+    let out = done.code(0).out();
+    let report: serde_json::Value = serde_json::from_str(&out).expect("it is JSON");
+    assert_eq!(report["pictures"][0], "x\u{fffd}.png");
+    assert!(desk.path(".").join(name).is_file());
+    let done = run(desk
+        .command("toolchain status --format json")
+        .env("HANKEL_CACHE", name));
+    done.fails(3, &["no JSON form", "UTF-8", "--format json"]);
+    assert_eq!(done.out(), "");
+}
+
+/// Make has no spelling for a line break: what follows it would be a rule.
+#[test]
+fn a_path_with_a_line_break_is_in_no_rule() {
+    let desk = Desk::new();
+    let done = run(desk
+        .command("build --kernel vsm --depfile d --out")
+        .arg("d4\nall: evil"));
+    done.fails(2, &["--depfile", "d4\\nall: evil", "line break"]);
+    assert!(desk.names().is_empty(), "{:?}", desk.names());
 }
 
 /// The smallest direction that a float can say is one.

@@ -65,6 +65,28 @@ fn a_full_disk_is_told() {
     }
 }
 
+/// What is told beside a result changes it as little.
+#[test]
+fn pictures_differ_where_the_error_stream_is_full() {
+    let desk = Desk::new();
+    desk.write(
+        "scene.toml",
+        "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\ntarget = [0.0, 0.5, 0.0]\n\
+         [light]\ndirection = [-1.0, -2.0, -0.5]\n[output]\nwidth = 64\nheight = 36\n",
+    );
+    let full = File::options()
+        .write(true)
+        .open("/dev/full")
+        .expect("a device");
+    let status = desk
+        .command("render scene.toml --out p.png --compare --limit 0")
+        .stderr(full)
+        .stdout(Stdio::null())
+        .status();
+    let status = status.expect("it starts");
+    assert_eq!((status.code(), status.signal()), (Some(1), None));
+}
+
 #[test]
 fn an_error_stream_that_is_closed_or_full_changes_nothing() {
     for line in ["list --kernel nosuch", "frobnicate", "check nowhere"] {

@@ -25,6 +25,7 @@ use crate::session::{Session, Words};
 #[derive(Serialize)]
 pub struct Pictures {
     /// By the new shaders, by the old ones, and their difference.
+    #[serde(serialize_with = "crate::print::paths")]
     files: Vec<PathBuf>,
     /// The kernels of the scene's frame that the folders have.
     kernels: BTreeSet<String>,
