@@ -93,7 +93,7 @@ fn inputs_are_not_overwritten() {
     desk.hankel("build --out s --kernel vsm").code(0);
     let manifest = desk.read("s/manifest.json");
     desk.hankel("build --out s --kernel vsm --depfile s/manifest.json")
-        .fails(2, &["is read"]);
+        .fails(2, &["--depfile", "the build's own"]);
     desk.hankel("diff s s --scene scene.toml --out s/manifest.json")
         .fails(2, &["is compared"]);
     assert_eq!(desk.read("s/manifest.json"), manifest);

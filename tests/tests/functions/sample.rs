@@ -106,6 +106,9 @@ both! {
     /// Matrices that functions take and give.
     #[function]
     pub fn turned(x: Vec3, y: Vec3, z: Vec3) -> Vec3 {
+        // What is far off would overflow.
+        let (least, most) = (Vec3::splat(-1000.0), Vec3::splat(1000.0));
+        let (x, y, z) = (x.clamp(least, most), y.clamp(least, most), z.clamp(least, most));
         let turn = turned_back(Mat3::from_cols(x, y, z), Mat3::from_cols(z, x, y));
         turn * z + turn.y_axis
     }
@@ -113,6 +116,9 @@ both! {
     /// What matrices have.
     #[function]
     pub fn matrices(x: Vec4, y: Vec4, place: Vec3) -> Vec4 {
+        let (least, most) = (Vec4::splat(-1000.0), Vec4::splat(1000.0));
+        let (x, y) = (x.clamp(least, most), y.clamp(least, most));
+        let place = place.clamp(Vec3::splat(-1000.0), Vec3::splat(1000.0));
         let map = Mat4::from_cols(x, y, x * 0.5, Vec4::new(0.25, 0.5, 0.75, 1.0));
         let corner = (map * 2.0).transform_point3(place) - map.transform_vector3(place);
         (map + map.transpose()) * corner.extend(place.x)
