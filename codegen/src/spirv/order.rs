@@ -54,6 +54,8 @@ struct Values {
     magnitudes: HashMap<Word, Word>,
     /// What is compared with itself, and whether the comparison holds for NaN.
     is_nan: HashMap<Word, (Word, bool)>,
+    /// Blocks that are only reached where a number is NaN, and the number.
+    where_nan: HashMap<Word, Word>,
 }
 
 impl Values {
@@ -77,6 +79,30 @@ impl Values {
                 _ => {}
             }
         }
+        for function in &module.functions {
+            let mut reached: HashMap<Word, u32> = HashMap::new();
+            let ends = function
+                .blocks
+                .iter()
+                .filter_map(|it| it.instructions.last());
+            for it in ends.clone() {
+                for target in it.operands.iter().filter_map(Operand::id_ref_any) {
+                    *reached.entry(target).or_default() += 1;
+                }
+            }
+            for it in ends.filter(|it| op(it) == Op::BranchConditional) {
+                let (Some(condition), Some(yes), Some(no)) = (id(it, 0), id(it, 1), id(it, 2))
+                else {
+                    continue;
+                };
+                if let Some((of, holds_for_nan)) = values.is_nan.get(&condition) {
+                    let block = if *holds_for_nan { yes } else { no };
+                    if reached.get(&block) == Some(&1) {
+                        values.where_nan.insert(block, *of);
+                    }
+                }
+            }
+        }
         values
     }
 
@@ -93,6 +119,9 @@ pub fn mend(module: &mut Module) {
         let (ty, result) = (instruction.result_type?, instruction.result_id?);
         if op(instruction) == Op::Select {
             return chosen(editor, &values, instruction).map(|it| [it].into());
+        }
+        if op(instruction) == Op::Phi {
+            return joined(editor, &values, instruction).map(|it| [it].into());
         }
         let (left, right) = (id(instruction, 0)?, id(instruction, 1)?);
         let (ordered, holds_for_nan) = match op(instruction) {
@@ -187,6 +216,21 @@ fn chosen(editor: &Editor<'_>, values: &Values, select: &Instruction) -> Option<
         select.operands[place] = Operand::IdRef(of);
         select
     })
+}
+
+/// As [`chosen`], where a branch chooses.
+fn joined(editor: &Editor<'_>, values: &Values, phi: &Instruction) -> Option<Instruction> {
+    let mut joined = phi.clone();
+    for place in (0..phi.operands.len()).step_by(2) {
+        let (value, block) = (id(phi, place)?, id(phi, place + 1)?);
+        if let Some(of) = values.where_nan.get(&block)
+            && editor.float_value(value).is_some_and(f64::is_nan)
+            && values.types.get(of) == phi.result_type.as_ref()
+        {
+            joined.operands[place] = Operand::IdRef(*of);
+        }
+    }
+    (joined.operands != phi.operands).then_some(joined)
 }
 
 /// Constants without a literal in WGSL must not stay where nothing needs them.
@@ -316,6 +360,27 @@ mod tests {
         });
         let select = [Op::UGreaterThan, Op::Select, Op::Return];
         assert_eq!(made[made.len() - 3..], select);
+        assert_eq!(constants, [1.0]);
+    }
+
+    #[test]
+    fn nan_that_a_branch_gives_for_nan_is_the_number_itself() {
+        let (made, constants) = mended(|b, truth, float, x| {
+            let nan = b.constant_bit32(float, f32::NAN.to_bits());
+            let one = b.constant_bit32(float, 1.0_f32.to_bits());
+            let is_nan = b.f_unord_not_equal(truth, None, x, x).unwrap();
+            let (yes, no, end) = (b.id(), b.id(), b.id());
+            b.selection_merge(end, rspirv::spirv::SelectionControl::NONE)
+                .unwrap();
+            b.branch_conditional(is_nan, yes, no, []).unwrap();
+            b.begin_block(Some(yes)).unwrap();
+            b.branch(end).unwrap();
+            b.begin_block(Some(no)).unwrap();
+            b.branch(end).unwrap();
+            b.begin_block(Some(end)).unwrap();
+            b.phi(float, None, [(nan, yes), (one, no)]).unwrap();
+        });
+        assert!(made.contains(&Op::UGreaterThan), "{made:?}");
         assert_eq!(constants, [1.0]);
     }
 
