@@ -308,7 +308,11 @@ pub fn vectors(#[element] of: Vectors) -> Vectors {
 #[kernel(
     compute,
     threads(64),
-    parity(ulp = 4, absolute = 1e-30, why = "a quotient by a root")
+    parity(
+        ulp = 4,
+        absolute = 5e-7,
+        why = "a quotient by a root, and sums of products of numbers up to 1, which may be reordered"
+    )
 )]
 pub fn directions(#[element] of: Vectors) -> Vectors {
     // Lengths whose squares are normal numbers, and zero.
