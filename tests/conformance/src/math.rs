@@ -311,6 +311,7 @@ pub fn vectors(#[element] of: Vectors) -> Vectors {
     parity(
         ulp = 4,
         absolute = 5e-7,
+        non_finite,
         why = "a quotient by a root, and sums of products of numbers up to 1, which may be reordered"
     )
 )]
