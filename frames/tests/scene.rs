@@ -787,7 +787,6 @@ fn colours_of_materials_are_from_0_to_1() {
             serde_json::json!([-5, 2, 1e30, 1]),
             "[-5.0, 2.0, 1e30, 1.0]",
         ),
-        (serde_json::json!([1e39, 1, 1, 1]), "[inf, 1.0, 1.0, 1.0]"),
         (serde_json::json!([1, 1, 1, 1.5]), "[1.0, 1.0, 1.0, 1.5]"),
     ] {
         let message = load(factor).unwrap_err();
@@ -796,6 +795,9 @@ fn colours_of_materials_are_from_0_to_1() {
             assert!(message.contains(part), "`{part}` is not in `{message}`");
         }
     }
+    // No 32-bit float: refused by the JSON reader, or as infinite, by how serde_json is built.
+    let message = load(serde_json::json!([1e39, 1, 1, 1])).unwrap_err();
+    assert!(message.contains("m.gltf"), "{message}");
 }
 
 #[test]
