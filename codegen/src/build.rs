@@ -22,7 +22,6 @@ use crate::Language;
 use crate::error::{Error, Failure, Result, Step};
 use crate::files::sha256;
 use crate::finish::{self, Finished};
-pub use crate::folder::is_own;
 use crate::folder::{Change, Folder, Found, Owned};
 use crate::frame;
 use crate::functions::api;
@@ -32,6 +31,8 @@ use crate::manifest::{
 };
 use crate::spirv;
 use crate::translate::{Ir, Options, Place, Written};
+
+pub use crate::folder::is_own;
 
 /// The manifest's file.
 pub const MANIFEST_FILE: &str = "manifest.json";

@@ -272,17 +272,11 @@ pub fn of_manifests(old: &Manifest, new: &Manifest) -> Diff {
             .collect();
         Item::of(found, texts)
     });
-    // Headers.
-    diff.add("file", &others(old), &others(new), |one, other| {
-        (one != other).then(|| Item::Changed {
-            changes: Vec::new(),
-            texts: Vec::new(),
-        })
-    });
+    diff.add_files(&others(old), &others(new));
     diff
 }
 
-/// Hashes of the files that are of no kernel alone.
+/// Hashes of the files that are of no kernel alone: headers.
 fn others(manifest: &Manifest) -> BTreeMap<String, &String> {
     let of_kernels: BTreeSet<&String> = manifest
         .kernels
@@ -316,12 +310,7 @@ pub fn of_libraries(old: &api::Record, new: &api::Record) -> Diff {
         }
         Item::of(found, Vec::new())
     });
-    diff.add("file", &old.files, &new.files, |one, other| {
-        (one != other).then(|| Item::Changed {
-            changes: Vec::new(),
-            texts: Vec::new(),
-        })
-    });
+    diff.add_files(&old.files, &new.files);
     diff
 }
 
@@ -367,6 +356,16 @@ impl Diff {
             };
             self.items.insert(format!("{kind} {name}"), item);
         }
+    }
+
+    /// Adds the files that differ, by their hashes.
+    fn add_files<T: PartialEq>(&mut self, old: &BTreeMap<String, T>, new: &BTreeMap<String, T>) {
+        self.add("file", old, new, |one, other| {
+            (one != other).then(|| Item::Changed {
+                changes: Vec::new(),
+                texts: Vec::new(),
+            })
+        });
     }
 }
 

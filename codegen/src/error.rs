@@ -492,7 +492,7 @@ impl Failure {
                     || self.message.contains("literal is infinite") =>
             {
                 "The kernel has a number that is infinite or NaN, which WGSL has no literal for: write `f32::MAX` \
-                 for `f32::INFINITY`, and say otherwise that there is no number. Comparisons with infinity, \
+                 for `f32::INFINITY`, and an `Option` or a number of your own for NaN. Comparisons with infinity, \
                  `is_finite` and `is_nan` have a form in every language. Or build only `--target spirv`."
             }
             Step::Parse | Step::Check => {

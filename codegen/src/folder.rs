@@ -467,7 +467,7 @@ fn split(name: &str) -> (Option<&str>, &str) {
     }
 }
 
-/// Whether a path in an output folder is one that builds use: of their records, of a folder of texts, or hidden.
+/// Whether a path in an output folder belongs to builds: a record, what lies in a folder of texts, or a hidden file.
 #[must_use]
 pub fn is_own(name: &Path) -> bool {
     let mut parts = name.components();
@@ -479,12 +479,13 @@ pub fn is_own(name: &Path) -> bool {
                 || first.ends_with(".spv")
                 || first.starts_with('.')
         }
-        Some(_) => {
-            SUBFOLDERS.contains(&first)
-                || FORMS.iter().any(|form| form.name == first)
-                || first.starts_with('.')
-        }
+        Some(_) => has_texts(first) || first.starts_with('.'),
     }
+}
+
+/// Whether builds write texts into a folder of this name.
+fn has_texts(folder: &str) -> bool {
+    SUBFOLDERS.contains(&folder) || FORMS.iter().any(|form| form.name == folder)
 }
 
 /// Whether a path is one that a build or a bundle may have written: whatever else a list from
@@ -495,9 +496,7 @@ fn can_be_removed(name: &str) -> bool {
     plain
         && match folder {
             None => file.ends_with(".spv") || file == FRAME_FILE,
-            Some(folder) => {
-                SUBFOLDERS.contains(&folder) || FORMS.iter().any(|form| form.name == folder)
-            }
+            Some(folder) => has_texts(folder),
         }
 }
 

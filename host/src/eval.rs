@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use hankel_dsl::native::CallError;
 use hankel_dsl::native::call::Ending;
 use hankel_dsl::native::describe::{Kernel, Output, Param, Precision, Range, Role, Scalar, Stage};
-use hankel_system::input::{self, InputError, Lines};
+use hankel_system::input::{self, InputError, Rows};
 use hankel_system::output::{self, OutputError};
 
 use crate::crates::{KernelCrate, KernelEntry};
@@ -669,7 +669,7 @@ pub fn run(
 
 /// The next record; false at the end.
 fn read(
-    reader: &mut csv::Reader<Lines>,
+    reader: &mut csv::Reader<Rows>,
     record: &mut csv::StringRecord,
     path: &Path,
     row: u64,

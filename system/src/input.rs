@@ -132,7 +132,7 @@ pub const ROW: usize = 1 << 20;
 ///
 /// # Errors
 /// [`InputError::Io`]; [`InputError::NotRegular`] for folders, devices and sockets.
-pub fn open_table(path: &Path) -> Result<Lines, InputError> {
+pub fn open_table(path: &Path) -> Result<Rows, InputError> {
     // A named pipe that nobody has opened yet: this waits for its writer, as every program does.
     let file = if is_pipe(path) {
         File::open(path).map_err(|source| InputError::Io {
@@ -142,7 +142,7 @@ pub fn open_table(path: &Path) -> Result<Lines, InputError> {
     } else {
         open(path)?
     };
-    Ok(Lines {
+    Ok(Rows {
         from: BufReader::with_capacity(1 << 16, file),
         is_new: true,
         place: Place {
@@ -168,14 +168,14 @@ fn is_pipe(_: &Path) -> bool {
 
 /// A reader of a table in CSV whose rows have at most [`ROW`] bytes, and whose quoted cells end.
 #[derive(Debug)]
-pub struct Lines {
+pub struct Rows {
     from: BufReader<File>,
     /// Whether nothing was read yet.
     is_new: bool,
     place: Place,
 }
 
-impl Read for Lines {
+impl Read for Rows {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         let from = self.from.fill_buf()?;
         if from.is_empty() {

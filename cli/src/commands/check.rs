@@ -57,11 +57,14 @@ pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
 /// The first option that is for folders of shaders.
 fn of_shaders(args: &Check) -> Option<&'static str> {
     #[cfg(feature = "frames")]
-    if args.scene.is_some() {
-        return Some("--scene");
-    }
-    let budget = args.budget.is_some().then_some("--budget");
-    args.generate.first_option().or(budget)
+    let scene = args.scene.is_some();
+    #[cfg(not(feature = "frames"))]
+    let scene = false;
+    let own = [("--scene", scene), ("--budget", args.budget.is_some())];
+    let own = own
+        .into_iter()
+        .find_map(|(option, given)| given.then_some(option));
+    own.or_else(|| args.generate.first_option())
 }
 
 /// What the folder must hold.

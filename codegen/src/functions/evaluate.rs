@@ -1028,7 +1028,7 @@ impl<'a> Evaluator<'a> {
             }
             syn::Expr::Repeat(r) => {
                 let value = self.value(frame, &r.expr)?;
-                let value = self.settled(value, "element", Rank::Part);
+                let value = self.part(value, "element");
                 let length = self.value(frame, &r.len)?;
                 let Some(length) = length.as_int().and_then(|n| usize::try_from(n).ok()) else {
                     return Err(self.refuse(frame, r.len.span(), "the length is not known"));
@@ -1274,7 +1274,7 @@ impl<'a> Evaluator<'a> {
             };
             let mut news = Vec::new();
             for v in all {
-                news.push(self.settled(v, "next", Rank::Part));
+                news.push(self.part(v, "next"));
             }
             for (e, v) in t.elems.iter().zip(news) {
                 let place = self.place(frame, e)?;
@@ -1480,14 +1480,14 @@ impl<'a> Evaluator<'a> {
                 Value::Vector(s, all.collect::<Done<_>>()?)
             }
             (Value::Vector(s, a), b @ (Value::Scalar(_) | Value::Fraction(..) | Value::Int(_))) => {
-                let b = self.settled(b, "factor", Rank::Part);
+                let b = self.part(b, "factor");
                 let all = a
                     .into_iter()
                     .map(|a| self.operation(frame, op, a, b.clone(), span));
                 Value::Vector(s, all.collect::<Done<_>>()?)
             }
             (a @ (Value::Scalar(_) | Value::Fraction(..) | Value::Int(_)), Value::Vector(s, b)) => {
-                let a = self.settled(a, "factor", Rank::Part);
+                let a = self.part(a, "factor");
                 let all = b
                     .into_iter()
                     .map(|b| self.operation(frame, op, a.clone(), b, span));
@@ -2298,7 +2298,7 @@ impl<'a> Evaluator<'a> {
                 syn::FnArg::Receiver(r) => {
                     let by_place = r.reference.is_some() && r.mutability.is_some();
                     let value = if by_place { value } else { self.read(value) };
-                    let value = self.settled(value, "own", Rank::Part);
+                    let value = self.part(value, "own");
                     self.declare(inner, "self", value);
                 }
                 syn::FnArg::Typed(typed) => {

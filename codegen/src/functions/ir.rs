@@ -4,6 +4,8 @@
 
 use std::rc::Rc;
 
+pub use hankel_dsl::native::layout::COLUMNS;
+
 /// A scalar type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Scalar {
@@ -113,9 +115,6 @@ pub struct Node {
     /// What it is.
     pub kind: Kind,
 }
-
-/// glam's names of a matrix's columns.
-pub const COLUMNS: [&str; 4] = ["x_axis", "y_axis", "z_axis", "w_axis"];
 
 /// What an expression is.
 #[derive(Clone, Debug, PartialEq)]

@@ -104,30 +104,31 @@ impl Evaluator<'_> {
     ) -> Done<Value> {
         let args: Vec<Value> = args.into_iter().map(|v| self.read(v)).collect();
         let is_float = scalar == Scalar::F32;
-        let own = || Value::Vector(scalar, all.clone());
+        let own = Value::Vector(scalar, all.clone());
         match (name, args.as_slice()) {
-            ("dot", [other @ Value::Vector(..)]) if is_float => {
-                self.dot(frame, &own(), other, span)
+            ("dot", [Value::Vector(_, other)]) if is_float => {
+                self.sum_of_products(frame, &all, other, span)
             }
-            ("length_squared", []) if is_float => self.dot(frame, &own(), &own(), span),
-            ("length", []) if is_float => self.length(frame, &own(), span),
+            ("length_squared", []) if is_float => self.square(frame, own, span),
+            ("length", []) if is_float => self.length(frame, own, span),
             ("distance", [other]) if is_float => {
-                let between =
-                    self.operation(frame, Binary::Subtract, own(), other.clone(), span)?;
-                self.length(frame, &between, span)
+                let between = self.operation(frame, Binary::Subtract, own, other.clone(), span)?;
+                self.length(frame, between, span)
             }
             ("normalize", []) if is_float => {
-                let length = self.length(frame, &own(), span)?;
+                let own = self.part(own, "side");
+                let length = self.length(frame, own.clone(), span)?;
                 let one = Value::Scalar(float(1.0));
                 let reciprocal = self.operation(frame, Binary::Divide, one, length, span)?;
-                let reciprocal = self.part(reciprocal, "reciprocal");
-                self.operation(frame, Binary::Multiply, own(), reciprocal, span)
+                self.operation(frame, Binary::Multiply, own, reciprocal, span)
             }
-            ("cross", [Value::Vector(_, other)]) if is_float && all.len() == 3 => {
+            ("cross", [other @ Value::Vector(..)]) if is_float && all.len() == 3 => {
+                let own = components(&self.part(own, "first"));
+                let other = components(&self.part(other.clone(), "second"));
                 let mut crossed = Vec::new();
                 for (i, j) in [(1, 2), (2, 0), (0, 1)] {
-                    let first = self.product(frame, &all[i], &other[j], span)?;
-                    let second = self.product(frame, &other[i], &all[j], span)?;
+                    let first = self.product(frame, &own[i], &other[j], span)?;
+                    let second = self.product(frame, &other[i], &own[j], span)?;
                     crossed.push(self.operation(frame, Binary::Subtract, first, second, span)?);
                 }
                 Ok(Value::Vector(scalar, crossed))
@@ -136,8 +137,7 @@ impl Evaluator<'_> {
                 let share = self.part(share.clone(), "share");
                 let one = Value::Scalar(float(1.0));
                 let rest = self.operation(frame, Binary::Subtract, one, share.clone(), span)?;
-                let rest = self.part(rest, "rest");
-                let first = self.operation(frame, Binary::Multiply, own(), rest, span)?;
+                let first = self.operation(frame, Binary::Multiply, own, rest, span)?;
                 let second = self.operation(frame, Binary::Multiply, other.clone(), share, span)?;
                 self.operation(frame, Binary::Add, first, second, span)
             }
@@ -197,10 +197,17 @@ impl Evaluator<'_> {
         self.operation(frame, Binary::Multiply, a.clone(), b.clone(), span)
     }
 
-    fn dot(&mut self, frame: &Frame, a: &Value, b: &Value, span: Span) -> Done<Value> {
+    /// Of numbers, or of a matrix's columns and the numbers that they are multiplied by, from the first to the last.
+    fn sum_of_products(
+        &mut self,
+        frame: &Frame,
+        all: &[Value],
+        by: &[Value],
+        span: Span,
+    ) -> Done<Value> {
         let mut sum: Option<Value> = None;
-        for (a, b) in components(a).iter().zip(&components(b)) {
-            let product = self.product(frame, a, b, span)?;
+        for (one, number) in all.iter().zip(by) {
+            let product = self.product(frame, one, number, span)?;
             sum = Some(match sum {
                 None => product,
                 Some(before) => self.operation(frame, Binary::Add, before, product, span)?,
@@ -209,9 +216,14 @@ impl Evaluator<'_> {
         Ok(sum.unwrap_or(Value::Unit))
     }
 
-    fn length(&mut self, frame: &Frame, vector: &Value, span: Span) -> Done<Value> {
-        let vector = self.part(vector.clone(), "side");
-        let square = self.dot(frame, &vector, &vector, span)?;
+    /// The square of a vector's length.
+    fn square(&mut self, frame: &Frame, vector: Value, span: Span) -> Done<Value> {
+        let sides = components(&self.part(vector, "side"));
+        self.sum_of_products(frame, &sides, &sides, span)
+    }
+
+    fn length(&mut self, frame: &Frame, vector: Value, span: Span) -> Done<Value> {
+        let square = self.square(frame, vector, span)?;
         self.number_method(frame, "sqrt", vec![square], span)
     }
 
@@ -257,7 +269,7 @@ impl Evaluator<'_> {
                 Ok(Value::Matrix((0..size).map(rows).collect()))
             }
             ("mul_vec2" | "mul_vec3" | "mul_vec4", [v]) if is(v, size) => {
-                self.transformed(frame, &columns, &components(v), span)
+                self.sum_of_products(frame, &columns, &components(v), span)
             }
             ("mul_mat2" | "mul_mat3" | "mul_mat4", [m @ Value::Matrix(_)]) => {
                 let own = Value::Matrix(columns);
@@ -265,7 +277,7 @@ impl Evaluator<'_> {
             }
             // The last component is 1 or 0.
             ("transform_point3" | "project_point3", [v]) if size == 4 && is(v, 3) => {
-                let moved = self.transformed(frame, &columns[..3], &components(v), span)?;
+                let moved = self.sum_of_products(frame, &columns[..3], &components(v), span)?;
                 let last = columns[3].clone();
                 let moved = self.operation(frame, Binary::Add, last, moved, span)?;
                 let moved = self.part(moved, "clip");
@@ -277,30 +289,11 @@ impl Evaluator<'_> {
                 self.operation(frame, Binary::Divide, place, w.clone(), span)
             }
             ("transform_vector3", [v]) if size == 4 && is(v, 3) => {
-                let moved = self.transformed(frame, &columns[..3], &components(v), span)?;
+                let moved = self.sum_of_products(frame, &columns[..3], &components(v), span)?;
                 Ok(Value::Vector(Scalar::F32, components(&moved)[..3].to_vec()))
             }
             _ => Err(self.refuse(frame, span, format!("a matrix's `{name}` has no form here"))),
         }
-    }
-
-    /// The sum of columns, each times a number.
-    fn transformed(
-        &mut self,
-        frame: &Frame,
-        columns: &[Value],
-        by: &[Value],
-        span: Span,
-    ) -> Done<Value> {
-        let mut sum: Option<Value> = None;
-        for (column, number) in columns.iter().zip(by) {
-            let product = self.product(frame, column, number, span)?;
-            sum = Some(match sum {
-                None => product,
-                Some(before) => self.operation(frame, Binary::Add, before, product, span)?,
-            });
-        }
-        Ok(sum.unwrap_or(Value::Unit))
     }
 
     /// An operator one of whose operands is a matrix.
@@ -316,14 +309,16 @@ impl Evaluator<'_> {
             (Binary::Multiply, Value::Matrix(columns), Value::Vector(Scalar::F32, by))
                 if columns.len() == by.len() =>
             {
-                self.transformed(frame, columns, by, span)
+                self.sum_of_products(frame, columns, by, span)
             }
             (Binary::Multiply, Value::Matrix(first), Value::Matrix(second))
                 if first.len() == second.len() =>
             {
+                let each = |this: &mut Self, v: &Value| this.part(v.clone(), "column");
+                let first: Vec<Value> = first.iter().map(|v| each(self, v)).collect();
                 let columns = second
                     .iter()
-                    .map(|by| self.transformed(frame, first, &components(by), span));
+                    .map(|by| self.sum_of_products(frame, &first, &components(by), span));
                 Ok(Value::Matrix(columns.collect::<Done<_>>()?))
             }
             (Binary::Add | Binary::Subtract, Value::Matrix(first), Value::Matrix(second))

@@ -64,23 +64,28 @@ fn tools() -> Tools {
     Tools::of_cache(cache.as_deref())
 }
 
-fn naming() -> Naming {
+fn naming(library: &Library) -> Naming {
     Naming {
         prefix: PREFIX.into(),
-        library: library().name.clone(),
+        library: library.name.clone(),
     }
+}
+
+/// A library's text in a form.
+fn written(library: &Library, form: &str) -> String {
+    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
+    form.text(library, &naming(library), &"0".repeat(64))
+}
+
+/// The path and text of what lies beside it.
+fn beside(library: &Library, form: &str) -> Option<(String, String)> {
+    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
+    form.beside(library, &naming(library), &"0".repeat(64))
 }
 
 /// The shipped text in a form.
 fn text(form: &str) -> String {
-    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
-    form.text(library(), &naming(), &"0".repeat(64))
-}
-
-/// The path and text of what is shipped beside it.
-fn beside(form: &str) -> Option<(String, String)> {
-    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
-    form.beside(library(), &naming(), &"0".repeat(64))
+    written(library(), form)
 }
 
 /// A scalar of a function's arguments or result.
@@ -969,7 +974,7 @@ fn the_texts_are_those_under_review() {
         settings.set_omit_expression(true);
         settings.bind(|| {
             insta::assert_snapshot!(form.name, text);
-            if let Some((_, beside)) = beside(form.name) {
+            if let Some((_, beside)) = beside(library(), form.name) {
                 insta::assert_snapshot!(format!("{}-types", form.name), beside);
             }
         });

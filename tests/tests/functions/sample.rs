@@ -5,16 +5,15 @@
     reason = "the functions are what is translated, as somebody may write them"
 )]
 
+use hankel_codegen::functions;
 use hankel_codegen::functions::ir::Library;
-use hankel_codegen::functions::print::Naming;
 use hankel_codegen::functions::source::CrateText;
-use hankel_codegen::functions::{self, FORMS};
 use hankel_dsl::glam::{Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::native::describe::Type;
 use hankel_dsl::native::function::{Function, Words};
 use hankel_dsl::{Real, function, to_i32};
 
-use super::PREFIX;
+use super::written;
 
 /// Functions, and their source.
 macro_rules! both {
@@ -191,7 +190,8 @@ pub fn has(function: &Function) -> bool {
     functions().iter().any(|f| f.name == function.name)
 }
 
-fn library() -> (Library, Naming) {
+/// The sample, translated.
+pub fn library() -> Library {
     let list = "hankel_dsl::library!(sample { api: 1, functions: [structures, branches, bits, projected, turned, \
                 matrices, vectors, mean] });";
     let krate = CrateText {
@@ -201,24 +201,10 @@ fn library() -> (Library, Naming) {
         files: [("src/lib.rs".to_owned(), format!("{SOURCE}\n{list}"))].into(),
     };
     let mut libraries = functions::read(&[krate]).unwrap_or_else(|e| panic!("{e}"));
-    let library = libraries.remove(0);
-    let naming = Naming {
-        prefix: PREFIX.into(),
-        library: library.name.clone(),
-    };
-    (library, naming)
+    libraries.remove(0)
 }
 
-/// The sample in a form.
+/// Its text in a form.
 pub fn text(form: &str) -> String {
-    let (library, naming) = library();
-    let form = FORMS.iter().find(|f| f.name == form).expect("a form");
-    form.text(&library, &naming, "0")
-}
-
-/// The types of its module in TypeScript.
-pub fn types() -> String {
-    let (library, naming) = library();
-    let form = FORMS.iter().find(|f| f.name == "tsl").expect("a form");
-    form.beside(&library, &naming, "0").expect("types").1
+    written(&library(), form)
 }

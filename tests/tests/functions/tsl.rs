@@ -6,12 +6,13 @@ use std::path::Path;
 use std::process::Command;
 
 use hankel_codegen::Language;
+use hankel_codegen::functions::ir::Library;
 use hankel_dsl::native::describe::{Scalar, Type};
 use hankel_dsl::native::function::Function;
 use hankel_matrix::subject::Subject;
 use hankel_matrix::tools::Tools;
 
-use super::{PREFIX, beside, glsl, in_form, natives, sample, text, tools, wgsl};
+use super::{PREFIX, beside, glsl, in_form, library, natives, sample, text, tools, wgsl};
 
 /// What the host of a sample looks up: twice, within itself, and with names of its own that a loop in a
 /// shader may have. Counts are powers of two: no driver rounds such a quotient in a way of its own.
@@ -56,6 +57,11 @@ pub fn link_node_modules(folder: &Path, tools: &Tools, package: &str) {
     std::os::unix::fs::symlink(modules, folder.join("node_modules")).expect("a link");
 }
 
+/// The types of a library's module in TypeScript.
+fn types(library: &Library) -> String {
+    beside(library, "tsl").expect("types").1
+}
+
 /// Lays the modules into a folder from which three.js can be imported.
 fn lay(folder: &Path, tools: &Tools) {
     link_node_modules(folder, tools, "three");
@@ -63,9 +69,9 @@ fn lay(folder: &Path, tools: &Tools) {
         std::fs::write(folder.join(name), text).expect("a file");
     };
     write("hankel_sample.tsl.js", &sample::text("tsl"));
-    write("hankel_sample.tsl.d.ts", &sample::types());
+    write("hankel_sample.tsl.d.ts", &types(&sample::library()));
     write("hankel_shadows.tsl.js", &text("tsl"));
-    write("hankel_shadows.tsl.d.ts", &beside("tsl").expect("types").1);
+    write("hankel_shadows.tsl.d.ts", &types(library()));
     write("host.mjs", HOST);
     write("tsl.mjs", include_str!("tsl.mjs"));
 }
@@ -145,5 +151,5 @@ fn typescript_knows_what_the_modules_have() {
     };
     let module = names(&text("tsl"));
     assert!(module.len() > 60, "{module:?}");
-    assert_eq!(module, names(&beside("tsl").expect("types").1));
+    assert_eq!(module, names(&types(library())));
 }

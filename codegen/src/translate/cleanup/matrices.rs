@@ -2,10 +2,8 @@
 //! `mat4x4<f32>`, `float4x4`, `mat4`, which its mathematics library fills, and not a structure that it has never heard
 //! of. rust-gpu has no matrix types; glam's is a structure of its columns. In memory both are the same.
 
+use hankel_dsl::native::layout::COLUMNS;
 use naga::{Handle, Module, Scalar, Type, TypeInner, VectorSize};
-
-/// glam's names of the columns.
-const COLUMNS: [&str; 4] = ["x_axis", "y_axis", "z_axis", "w_axis"];
 
 /// Replaces the structures. What accesses a member accesses a column by the same number then.
 pub fn matrix_types(module: &mut Module) {
@@ -15,7 +13,8 @@ pub fn matrix_types(module: &mut Module) {
         .filter(|(_, ty)| is_matrix(module, ty))
         .map(|(handle, _)| handle)
         .collect();
-    // Types are unique: two structures that differ in their names cannot become one type.
+    // naga has each type once. An author's own structure with the same columns would become the same type as glam's,
+    // so both stay as they are.
     if let [columns] = found[..] {
         let matrix = Type {
             name: None,

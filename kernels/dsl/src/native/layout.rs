@@ -94,6 +94,9 @@ leaf! {
     IVec4, 16, Type::Vector { scalar: Scalar::I32, size: 4 };
 }
 
+/// glam's names of a matrix's columns.
+pub const COLUMNS: [&str; 4] = ["x_axis", "y_axis", "z_axis", "w_axis"];
+
 /// Its columns: in memory the same as a matrix of every language, which the texts have in its place.
 impl Element for Mat4 {
     const ALIGN: usize = 16;
@@ -107,8 +110,7 @@ impl Element for Mat4 {
 /// A matrix of so many columns of as many `f32`, by glam's name: a structure of its columns, without padding.
 pub(super) fn matrix(name: &str, size: usize, column: Type) -> Type {
     let bytes = (size * size_of::<f32>()) as u32;
-    let columns = ["x_axis", "y_axis", "z_axis", "w_axis"];
-    let columns = columns[..size].iter().zip(0..).map(|(name, i)| Field {
+    let columns = COLUMNS[..size].iter().zip(0..).map(|(name, i)| Field {
         name: (*name).into(),
         summary: String::new(),
         ty: column.clone(),
