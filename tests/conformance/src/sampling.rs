@@ -4,7 +4,7 @@
 //! beside each other the level of the first one.
 
 use hankel_dsl::glam::{UVec2, UVec3, Vec2, Vec3, Vec4};
-use hankel_dsl::{Sampler, Texture2d, Texture3d, kernel};
+use hankel_dsl::{Element, Sampler, Texture2d, Texture3d, kernel};
 
 /// Texels of all levels, and how large their level is.
 #[kernel(compute, threads(8, 8), texture(rgba32float))]
@@ -121,6 +121,39 @@ pub fn by_gradients(
     let dx = Vec2::new(step / whole.x as f32, 0.0);
     let dy = Vec2::new(0.0, 0.5 * step / whole.y as f32);
     source.sample_gradient(sampler, uv, dx, dy)
+}
+
+/// Four colours.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Tints {
+    /// The colours.
+    pub colours: [Vec4; 4],
+}
+
+/// A texture at the level of the fragment, behind an index that may be out of range. WGSL does not get the kernel: an
+/// implementation refuses it, since only some fragments may come to the texture.
+#[kernel(
+    fragment,
+    parity(non_finite, why = "products of absurd colours overflow")
+)]
+pub fn behind_an_index(
+    #[frag_coord] at: Vec3,
+    #[varying]
+    #[values(0, 1, 2, 3)]
+    which: u32,
+    #[uniform] tints: &Tints,
+    #[texture]
+    #[size(64, 32)]
+    source: Texture2d<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    sampler: Sampler,
+) -> Vec4 {
+    let tint = tints.colours[which as usize];
+    let size = source.size();
+    let uv = Vec2::new(at.x / size.x as f32, at.y / size.y as f32);
+    source.sample(sampler, uv) * tint
 }
 
 /// A texture by the level that neighbouring fragments make, and by the next one.

@@ -37,6 +37,17 @@ pub fn flat(
     )
 }
 
+/// Functions of a number's bits, which GLSL ES 3.00 does not have.
+#[kernel(fragment)]
+pub fn counted_bits(#[varying] id: u32) -> UVec4 {
+    UVec4::new(
+        id.count_ones(),
+        id.leading_zeros(),
+        id.trailing_zeros(),
+        id.reverse_bits(),
+    )
+}
+
 /// Where the fragment is and which way it faces; half of the fragments are dropped.
 #[kernel(fragment)]
 pub fn holes(#[varying] colour: Vec4, #[frag_coord] at: Vec3, #[front_facing] front: bool) -> Vec4 {

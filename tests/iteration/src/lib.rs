@@ -11,9 +11,11 @@
 use hankel_dsl::glam::{IVec4, UVec4, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
 
+mod adapters;
 mod idioms;
 mod integers;
 
+use adapters::*;
 use idioms::*;
 use integers::*;
 
@@ -54,6 +56,12 @@ hankel_dsl::kernels![
     answered,
     small,
     skipped,
+    halves,
+    taps,
+    flattened,
+    again,
+    sieved,
+    in_bytes,
 ];
 
 /// Four numbers four times: by reference in two ways, by value, and from the end.
