@@ -13,8 +13,8 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, canonical, exact, libm, names, narrow, order, parts, references, refused, split,
-    tables, trim, undefined, uniform, widths,
+    self, bounds, branches, canonical, exact, libm, names, narrow, order, parts, references,
+    refused, split, tables, trim, undefined, uniform, widths,
 };
 use crate::translate::reading;
 
@@ -25,8 +25,8 @@ const ENVIRONMENT: TargetEnv = TargetEnv::Vulkan_1_2;
 /// SPIR-V of another hash counts as stale.
 pub const PIPELINE: &str = env!("HANKEL_PIPELINE_SHA256");
 
-/// Rounds of optimisation at most; the built-in kernels take one or two.
-const MOST_ROUNDS: u32 = 8;
+/// Rounds of optimisation at most; iterators within each other take seven.
+const MOST_ROUNDS: u32 = 16;
 
 /// A finished module.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,10 +62,10 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     refused::check(&module, name).map_err(placed)?;
     canonical::order(&mut module);
     libm::mend(&mut module);
-    let words = optimise(module, name)?;
+    let (words, has_more) = optimise(module, name)?;
     let mut module = spirv::load(&words, name)?;
     order::mend(&mut module);
-    if has_references {
+    if has_references || has_more {
         references::near(&mut module);
     }
     let divided = if uniform::divides_at_barrier(&module, Memory::Trusted) {
@@ -138,12 +138,14 @@ pub fn freeze(
 pub fn cost_after_optimisation(raw: &[u8], name: &str) -> Result<Cost, Failure> {
     let words = spirv::words(raw, name)?;
     validate(&words, name)?;
-    let words = optimise(spirv::load(&words, name)?, name)?;
+    let (words, _) = optimise(spirv::load(&words, name)?, name)?;
     Ok(cost::of_module(&spirv::load(&words, name)?))
 }
 
-/// Runs spirv-opt with floating-point arithmetic held as it is written.
-fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
+/// Runs spirv-opt with floating-point arithmetic held as it is written. Tells whether references were resolved that
+/// had been in structures.
+pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool), Failure> {
+    let mut has_references = false;
     exact::pin(&mut module);
     exact::fold(&mut module);
     // Inlining and unrolling bring constants together, and what they decide may bring more.
@@ -166,14 +168,17 @@ fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
                 .register_pass(Passes::AggressiveDCE);
         })?;
         module = spirv::load(&words, name)?;
+        let is_divided = parts::divide(&mut module);
+        has_references |= is_divided && references::resolve(&mut module, name).0;
         let changes = [
             exact::fold(&mut module),
             bounds::fold(&mut module),
-            parts::divide(&mut module),
+            branches::fold(&mut module),
+            branches::thread(&mut module),
             tables::keep(&mut module),
             references::sweep(&mut module),
         ];
-        if changes == [false; 5] {
+        if !is_divided && changes == [false; 6] {
             break;
         }
     }
@@ -189,7 +194,7 @@ fn optimise(mut module: Module, name: &str) -> Result<Vec<u32>, Failure> {
     })?;
     let mut module = spirv::load(&words, name)?;
     exact::unpin(&mut module);
-    Ok(spirv::store(&module))
+    Ok((spirv::store(&module), has_references))
 }
 
 fn run_passes(

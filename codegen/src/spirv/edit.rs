@@ -1,6 +1,6 @@
 //! What several edits need: new ids, and types and constants that are there once.
 
-use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::dr::{Block, Instruction, Module, Operand};
 use rspirv::spirv::{GlslStd450Op as GLOp, Op, Word};
 
 use super::{id, literal, op};
@@ -88,6 +88,11 @@ impl<'a> Editor<'a> {
     /// The constant `true` of type `ty`.
     pub fn truth(&mut self, ty: Word) -> Word {
         self.once(Op::ConstantTrue, Some(ty), Vec::new())
+    }
+
+    /// The constant `false` of type `ty`.
+    pub fn falsehood(&mut self, ty: Word) -> Word {
+        self.once(Op::ConstantFalse, Some(ty), Vec::new())
     }
 
     /// A 32-bit integer of type `ty`.
@@ -203,6 +208,18 @@ pub fn called(instruction: &Instruction, set: Word) -> Option<GLOp> {
 pub fn is_call(instruction: &Instruction, function: GLOp) -> bool {
     op(instruction) == Op::ExtInst
         && instruction.operands.get(1) == Some(&Operand::LiteralExtInstInteger(function as u32))
+}
+
+/// Where instructions may be put at a block's end: before what ends it, and the merge before that.
+pub fn before_end(block: &Block) -> usize {
+    let last = block.instructions.len().saturating_sub(1);
+    let merges = last.checked_sub(1).is_some_and(|at| {
+        matches!(
+            op(&block.instructions[at]),
+            Op::SelectionMerge | Op::LoopMerge
+        )
+    });
+    if merges { last - 1 } else { last }
 }
 
 /// Replaces instructions of functions by others: `by` gives those, or nothing.

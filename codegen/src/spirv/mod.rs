@@ -1,6 +1,7 @@
 //! SPIR-V binaries: reading, writing, and the small edits that spirv-opt has no pass for.
 
 pub mod bounds;
+pub(crate) mod branches;
 pub(crate) mod canonical;
 pub(crate) mod divide;
 pub(crate) mod edit;
@@ -162,6 +163,7 @@ pub(crate) mod tests {
         .unwrap();
         let options = naga::back::spv::Options {
             flags: naga::back::spv::WriterFlags::DEBUG,
+            force_loop_bounding: false,
             ..Default::default()
         };
         let words = naga::back::spv::write_vec(&parsed, &info, &options, None).unwrap();

@@ -395,6 +395,7 @@ impl Ir {
             cleanup::unwrap_blocks(&mut module);
             cleanup::matrix_types(&mut module);
             cleanup::plain_loops(&mut module);
+            cleanup::turn_empty_ifs(&mut module);
             cleanup::constant_indices(&mut module);
             cleanup::drop_last_return(&mut module);
             let members: Vec<String> = (0..kernel.outputs.len())
@@ -586,7 +587,8 @@ impl Ir {
             }
             if cleanup::has_functions_of_bits(&self.module) {
                 return Some(format!(
-                    "{language} does not count, find or turn bits: it came with 3.10"
+                    "{language} has no `count_ones`, `leading_zeros`, `trailing_zeros`, `reverse_bits` and the like: \
+                     they came with 3.10"
                 ));
             }
             if self

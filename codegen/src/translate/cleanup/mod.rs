@@ -43,6 +43,6 @@ pub use matrices::matrix_types;
 pub use names::{name_loads, name_result};
 pub use rounding::{ROUNDED, name_results, name_roundings};
 pub use sampling::restore_sampling;
-pub use shapes::{constant_indices, drop_last_return};
+pub use shapes::{constant_indices, drop_last_return, turn_empty_ifs};
 pub use values::{name_phis, name_values};
 pub(crate) use walk::{each_statement, each_within, with_types};

@@ -1,8 +1,8 @@
-//! Small shapes that nobody writes: `v[0]` for `v.x`, a `return` at the end.
+//! Small shapes that nobody writes: `v[0]` for `v.x`, a `return` at the end, an `if` that does nothing.
 
 use std::collections::HashMap;
 
-use naga::{Block, Expression, Handle, Module, Statement};
+use naga::{Arena, Block, Expression, Handle, Module, Range, Span, Statement, UnaryOperator};
 
 use super::walk::functions_mut;
 
@@ -40,6 +40,62 @@ fn small(expression: &Expression) -> Option<u32> {
         Expression::Literal(naga::Literal::U32(value)) => Some(value),
         Expression::Literal(naga::Literal::I32(value)) => u32::try_from(value).ok(),
         _ => None,
+    }
+}
+
+/// `if c {} else { … }` becomes `if !c { … }`.
+pub fn turn_empty_ifs(module: &mut Module) {
+    functions_mut(module).for_each(|function| {
+        let mut body = std::mem::take(&mut function.body);
+        turn_in(&mut body, &mut function.expressions);
+        function.body = body;
+    });
+}
+
+fn turn_in(block: &mut Block, expressions: &mut Arena<Expression>) {
+    for (mut statement, span) in std::mem::take(block).span_into_iter() {
+        match &mut statement {
+            Statement::Block(inner) => turn_in(inner, expressions),
+            Statement::Switch { cases, .. } => {
+                for case in cases {
+                    turn_in(&mut case.body, expressions);
+                }
+            }
+            Statement::Loop {
+                body, continuing, ..
+            } => {
+                turn_in(body, expressions);
+                turn_in(continuing, expressions);
+            }
+            Statement::If {
+                condition,
+                accept,
+                reject,
+            } => {
+                turn_in(accept, expressions);
+                turn_in(reject, expressions);
+                if accept.is_empty() && !reject.is_empty() {
+                    std::mem::swap(accept, reject);
+                    if let Expression::Unary {
+                        op: UnaryOperator::LogicalNot,
+                        expr,
+                    } = expressions[*condition]
+                    {
+                        *condition = expr;
+                    } else {
+                        let contrary = Expression::Unary {
+                            op: UnaryOperator::LogicalNot,
+                            expr: *condition,
+                        };
+                        *condition = expressions.append(contrary, Span::UNDEFINED);
+                        let emitted = Range::new_from_bounds(*condition, *condition);
+                        block.push(Statement::Emit(emitted), Span::UNDEFINED);
+                    }
+                }
+            }
+            _ => {}
+        }
+        block.push(statement, span);
     }
 }
 
