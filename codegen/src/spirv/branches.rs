@@ -601,9 +601,8 @@ impl<'a> Graph<'a> {
     fn instructions(&self, blocks: &[usize]) -> impl Iterator<Item = &'a Instruction> {
         let function = self.function;
         blocks
-            .to_vec()
-            .into_iter()
-            .flat_map(|block| &function.blocks[block].instructions)
+            .iter()
+            .flat_map(|block| &function.blocks[*block].instructions)
     }
 
     /// Where a way leads that goes on through blocks that do nothing, and the block before.
