@@ -18,7 +18,6 @@ use hankel_shadows::soft::{Halving, Level, Pyramid, PyramidLines};
 use crate::graph::{AddCompute, AddDraw, Graph, Handle, Result, Shape, Surfaces};
 use crate::scene::{Area, DepthRange, Shadow};
 use crate::techniques::Map;
-use crate::visibility::SAMPLES;
 
 /// How maps are looked up.
 pub const BILINEAR: Sampler = Sampler::new(Filter::Linear, Address::ClampToEdge);
@@ -100,13 +99,15 @@ pub struct Translucent {
 /// What [`Graph::omit`] calls translucent casters that cast no shadow.
 pub const TRANSLUCENT: &str = "shadow of translucent casters";
 
-/// Why maps of floats hold opaque casters only.
-pub const CANNOT_BLEND_FLOATS: &str =
-    "not every device can blend 32-bit floats: a map of 16 bits shows it";
-
-/// Why maps of depths with one sample hold opaque casters only.
-pub const CANNOT_BLEND_ONE: &str =
-    "they are blended into all samples of a map: `multisampling = 4` shows it";
+/// The name of `kernel` for textures with as many samples as the scene asks for: that of one sample has `_single` after
+/// the first word of its name.
+#[must_use]
+pub fn by_samples(given: &Given, kernel: &str) -> String {
+    match (given.shadow.multisampling, kernel.split_once('_')) {
+        (1, Some((first, others))) => format!("{first}_single_{others}"),
+        _ => kernel.into(),
+    }
+}
 
 /// Depth as the light sees it, of opaque casters only, with as many samples as the scene asks for.
 ///
@@ -146,21 +147,24 @@ pub fn opaque_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
     }
 }
 
-/// Depth as the camera sees it.
+/// Depth as the camera sees it, with so many samples of each pixel.
 ///
 /// # Errors
 /// See [`light_depth`].
-pub fn camera_depth(graph: &mut Graph, given: &Given) -> Result<Handle> {
+pub fn camera_depth(graph: &mut Graph, given: &Given, samples: u32) -> Result<Handle> {
     let surfaces = Surfaces {
         positions: given.positions,
         indices: given.indices,
         clip_from_world: given.camera,
     };
-    graph
+    let pass = graph
         .draw("camera depth", surfaces, "light_depth")
         .arg("position", given.positions)
-        .arg("light", given.camera)
-        .depth(given.size)
+        .arg("light", given.camera);
+    match samples {
+        1 => pass.single_depth(given.size),
+        _ => pass.depth(given.size),
+    }
 }
 
 /// The maps of four power moments: the moment bias pulls towards a published target, by the published
@@ -205,83 +209,85 @@ pub const DEPTHS: &[Map] = &[Map {
     bias_target: [0.0; 4],
 }];
 
+/// The kernel that makes the mean of four power moments of each texel's samples, as one of [`POWER_MOMENTS`].
+const fn resolve_moments(given: &Given) -> &'static str {
+    match given.shadow.map.encoding {
+        encoding::UNIT => "resolve_unit",
+        encoding::SYMMETRIC => "resolve_symmetric",
+        _ => "resolve_plain",
+    }
+}
+
 /// The mean of four power moments of each texel's samples, as one of [`POWER_MOMENTS`].
 ///
 /// # Errors
 /// See [`light_depth`].
 pub fn moments(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Handle> {
-    let kernel = match given.shadow.map.encoding {
-        encoding::UNIT => "resolve_unit",
-        encoding::SYMMETRIC => "resolve_symmetric",
-        _ => "resolve_plain",
-    };
-    resolve_depth(graph, given, kernel, depth).image([given.shadow.size; 2])
+    resolve_depth(graph, given, resolve_moments(given), depth).image([given.shadow.size; 2])
 }
 
-/// The map of four power moments, as one of [`POWER_MOMENTS`], of opaque and translucent casters. The latter are
-/// blended into it in maps of 16 bits.
+/// The map of four power moments, as one of [`POWER_MOMENTS`], of opaque and translucent casters.
 ///
 /// # Errors
 /// See [`light_depth`].
 pub fn moment_map(graph: &mut Graph, given: &Given) -> Result<Handle> {
-    let Some(translucent) = given.translucent else {
-        let depth = opaque_depth(graph, given)?;
-        return moments(graph, given, depth);
-    };
-    let encoding = given.shadow.map.encoding;
-    let cannot = match given.shadow.multisampling {
-        _ if encoding == encoding::PLAIN => Some(CANNOT_BLEND_FLOATS),
-        1 => Some(CANNOT_BLEND_ONE),
-        _ => None,
-    };
-    if let Some(why) = cannot {
-        graph.omit(TRANSLUCENT, why);
-        let depth = opaque_depth(graph, given)?;
-        return moments(graph, given, depth);
-    }
-    let depth = opaque_depth(graph, given)?;
-    let encode = [("encoding", encoding)];
-    let [first, second] = blended_halves(
-        graph,
-        given,
-        &translucent,
-        depth,
-        "translucent_moments",
-        &encode,
-    )?;
-    resolve(graph, given, "resolve_translucent")
-        .arg("depth", depth)
-        .arg("first", first)
-        .arg("second", second)
-        .constant("encoding", encoding)
-        .image([given.shadow.size; 2])
+    let kernel = resolve_moments(given);
+    resolve_casters(graph, given, kernel, "translucent_moments")?.image([given.shadow.size; 2])
 }
 
-/// Translucent triangles before the opaque `depth`, blended into both halves of a map's moments: the kernel's `part`
-/// 0 and 1.
+/// Begins the pass that makes a map of power moments of opaque and translucent casters, by the kernel `resolve_…`; where
+/// there are translucent ones, by `resolve_translucent_…`. Their moments are drawn by the fragment kernel `blended` in
+/// two halves, which are blended: in 32-bit floats if the map has those, else in 16 bits.
 ///
 /// # Errors
 /// See [`light_depth`].
-pub fn blended_halves(
-    graph: &mut Graph,
+pub fn resolve_casters<'g>(
+    graph: &'g mut Graph,
     given: &Given,
-    translucent: &Translucent,
-    depth: Handle,
-    kernel: &'static str,
-    constants: &[(&'static str, u32)],
-) -> Result<[Handle; 2]> {
+    kernel: &str,
+    blended: &'static str,
+) -> Result<AddCompute<'g>> {
+    let depth = opaque_depth(graph, given)?;
+    let Some(translucent) = given.translucent else {
+        return Ok(resolve_depth(graph, given, kernel, depth));
+    };
+    let map = given.shadow.map;
+    let (format, encoding) = match (map.format, map.depth_range) {
+        (TexelFormat::Rgba32Float, _) => (TexelFormat::Rgba32Float, encoding::PLAIN),
+        (_, DepthRange::Unit) => (TexelFormat::Rgba16Unorm, encoding::UNIT),
+        (_, DepthRange::Symmetric) => (TexelFormat::Rgba16Unorm, encoding::SYMMETRIC),
+    };
     let mut half = |part, label| {
-        let pass = draw_translucent(graph, given, translucent, label, given.light_view)
-            .fragment(kernel)
+        let pass = draw_translucent(graph, given, &translucent, label, given.light_view)
+            .fragment(blended)
+            .constant("encoding", encoding)
             .constant("part", part)
             .blend(Blend::Alpha)
             .before(depth);
-        let pass = constants
-            .iter()
-            .fold(pass, |pass, (name, value)| pass.constant(*name, *value));
-        pass.samples([given.shadow.size; 2], given.shadow.map.format, [0.0; 4])
+        samples_of_map(pass, given, format, [0.0; 4])
     };
-    Ok([half(0, "blend first half")?, half(1, "blend second half")?])
+    let (first, second) = (half(0, "blend first half")?, half(1, "blend second half")?);
+    let kernel = kernel.replacen("resolve_", "resolve_translucent_", 1);
+    Ok(resolve_depth(graph, given, &kernel, depth)
+        .arg("first", first)
+        .arg("second", second))
+}
+
+/// Adds a draw into all samples of the light's map, as many as its depth has.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn samples_of_map(
+    pass: AddDraw<'_>,
+    given: &Given,
+    format: TexelFormat,
+    background: [f64; 4],
+) -> Result<Handle> {
+    let size = [given.shadow.size; 2];
+    match given.shadow.multisampling {
+        1 => pass.single_samples(size, format, background),
+        _ => pass.samples(size, format, background),
+    }
 }
 
 /// Begins the pass that draws translucent triangles as a light or a camera sees them.
@@ -349,21 +355,15 @@ pub fn resolve<'g>(
     graph.compute("resolve", kernel)
 }
 
-/// Begins the pass that makes a map of nothing but the light's depths, by the kernel `resolve_…` for several samples or
-/// by its counterpart `resolve_single_…` for one, as `depth` has them.
+/// Begins the pass that makes a map of the light's depths, by the kernel `resolve_…` for several samples or by its
+/// counterpart for one.
 pub fn resolve_depth<'g>(
     graph: &'g mut Graph,
     given: &Given,
-    kernel: impl Into<Cow<'static, str>>,
+    kernel: &str,
     depth: Handle,
 ) -> AddCompute<'g> {
-    let shape = graph.value(depth).map(|value| &value.shape);
-    let is_single = matches!(shape, Some(Shape::Texture(shape)) if shape.samples == 1);
-    let kernel = match kernel.into() {
-        several if is_single => several.replacen("resolve_", "resolve_single_", 1).into(),
-        several => several,
-    };
-    resolve(graph, given, kernel).arg("depth", depth)
+    resolve(graph, given, by_samples(given, kernel)).arg("depth", depth)
 }
 
 /// The filtered maps that `kernel` makes of the light's depths: a texture for each of `names`, which are those of the
@@ -374,18 +374,42 @@ pub fn resolve_depth<'g>(
 pub fn filtered_maps(
     graph: &mut Graph,
     given: &Given,
-    kernel: impl Into<Cow<'static, str>>,
+    kernel: &str,
     names: &[&'static str],
 ) -> Result<Vec<(&'static str, Handle)>> {
     let depth = light_depth(graph, given)?;
+    let maps = textures(
+        resolve_depth(graph, given, kernel, depth),
+        given,
+        names.len(),
+    )?;
+    blurred(graph, given, &maps, names)
+}
+
+/// Adds a pass that makes so many textures of the size of the light's map.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn textures(pass: AddCompute<'_>, given: &Given, count: usize) -> Result<Vec<Handle>> {
     let size = [given.shadow.size, given.shadow.size, 1];
-    let pass = resolve_depth(graph, given, kernel, depth);
-    let pass = names.iter().fold(pass, |pass, _| pass.texels(size));
-    let maps = pass.finish()?.outputs;
+    let pass = (0..count).fold(pass, |pass, _| pass.texels(size));
+    Ok(pass.finish()?.outputs)
+}
+
+/// Maps after the filter, each with its name.
+///
+/// # Errors
+/// See [`light_depth`].
+pub fn blurred(
+    graph: &mut Graph,
+    given: &Given,
+    maps: &[Handle],
+    names: &[&'static str],
+) -> Result<Vec<(&'static str, Handle)>> {
     names
         .iter()
         .zip(maps)
-        .map(|(name, map)| Ok((*name, blur(graph, given, map)?)))
+        .map(|(name, map)| Ok((*name, blur(graph, given, *map)?)))
         .collect()
 }
 
@@ -512,7 +536,7 @@ pub fn summed_area<T: Element>(
     let texels = graph.constant("size", &pyramid.size);
     let empty = graph.zeros::<T>("table", elements as usize);
     let resolved = graph
-        .compute("resolve", kernels.resolve)
+        .compute("resolve", by_samples(given, kernels.resolve))
         .arg("size", texels)
         .arg("depth", depth)
         .arg("table", empty)
@@ -547,8 +571,8 @@ pub fn summed_area<T: Element>(
     Ok([table, pyramid])
 }
 
-/// A picture as it is seen through the medium, by a kernel that `kernel` with the picture's format names; `bind`
-/// gives it what it looks up.
+/// A picture as it is seen through the medium, by a kernel that `kernel` with the picture's format names, which looks at
+/// so many samples of each pixel; `bind` gives it what it looks up.
 ///
 /// # Errors
 /// See [`light_depth`].
@@ -558,12 +582,12 @@ pub fn scatter(
     volume: &Volume,
     picture: Handle,
     kernel: &str,
+    samples: u32,
     bind: impl FnOnce(AddCompute<'_>) -> AddCompute<'_>,
 ) -> Result<Handle> {
-    let surfaces = camera_depth(graph, given)?;
+    let surfaces = camera_depth(graph, given, samples)?;
     let pass = graph
         .compute("scatter", format!("{kernel}_{}", given.format.name()))
-        .constant("samples", SAMPLES)
         .arg("view", volume.view)
         .arg("medium", volume.medium)
         .arg("light", given.light)
@@ -579,7 +603,7 @@ pub fn scatter(
 pub fn shade(
     graph: &mut Graph,
     given: &Given,
-    kernel: &'static str,
+    kernel: impl Into<Cow<'static, str>>,
     bind: impl FnOnce(AddDraw<'_>) -> AddDraw<'_>,
 ) -> Result<Handle> {
     let pass = surface(graph, given, "surface").fragment(kernel);

@@ -581,7 +581,9 @@ pub fn filtered(scene: &Scene, mesh: &Mesh, advance: &mut dyn FnMut(f32)) -> Arr
     let camera = camera_view(scene, &scene.camera, mesh);
     let lens = Lens::new(camera.clip_from_world, scene.width, scene.height);
     let pixels = [scene.width, scene.height];
-    let fragments = Fragments::find(&caster, &lens, pixels, &mut |s| advance(s * 0.3));
+    let fragments = Fragments::find(&caster, &lens, pixels, places(SAMPLES), &mut |s| {
+        advance(s * 0.3);
+    });
     let interpolated = |vertices: &[Vec3]| {
         let varying = Varying {
             components: 3,

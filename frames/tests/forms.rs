@@ -15,7 +15,7 @@ use hankel_host::device::{Backend, open};
 use hankel_host::parity::compare::Kind;
 
 /// Scenes with every image pass: each technique with each of its maps, of four samples of depth and of one, mip levels,
-/// glass, several lights.
+/// glass, several lights, a medium.
 fn scenes() -> Vec<(String, Scene)> {
     let plain = "procedural = 'box'";
     let mut all = Vec::new();
@@ -53,9 +53,7 @@ fn scenes() -> Vec<(String, Scene)> {
                 map.depth_range.name()
             );
             add(plain, shadow.clone(), one);
-            if technique.takes_one_sample {
-                add(plain, format!("{shadow}\nmultisampling = 1"), one);
-            }
+            add(plain, format!("{shadow}\nmultisampling = 1"), one);
         }
     }
     for technique in ["hamburger", "convolution", "esm", "evsm4"] {
@@ -65,18 +63,40 @@ fn scenes() -> Vec<(String, Scene)> {
             one,
         );
     }
-    for technique in ["hamburger", "hamburger-6"] {
-        add(
-            "procedural = 'glass'",
-            format!("technique = '{technique}'"),
-            one,
-        );
+    for (technique, format) in [
+        ("hamburger", "rgba16unorm"),
+        ("hamburger", "rgba32float"),
+        ("hamburger-6", "rgba16unorm"),
+        ("hamburger-6", "rgba32float"),
+        ("hamburger-6", "r32uint"),
+        ("hamburger-6", "rg32uint"),
+    ] {
+        for samples in [4, 1] {
+            add(
+                "procedural = 'glass'",
+                format!(
+                    "technique = '{technique}'\nformat = '{format}'\nmultisampling = {samples}"
+                ),
+                one,
+            );
+        }
     }
     add(
         plain,
         String::new(),
         "[[light]]\ndirection = [-1.0, -2.0, -0.5]\n[[light]]\ndirection = [1.0, -2.0, -0.5]",
     );
+    let spot = "[light]\nposition = [2.0, 4.0, 1.0]\ndirection = [-2.0, -4.0, -1.0]";
+    for light in [one, spot] {
+        for samples in [4, 1] {
+            let medium = "[medium]\nextinction = 0.2\ntechnique = 'ray-marching'\nsteps = 8";
+            add(
+                plain,
+                format!("multisampling = {samples}"),
+                &format!("{light}\n{medium}"),
+            );
+        }
+    }
     all
 }
 

@@ -303,10 +303,7 @@ fn what_cannot_be_blended_is_refused() {
     };
     assert!(add(TexelFormat::Rgba16Unorm, Blend::Alpha, &none).is_ok());
     assert!(add(TexelFormat::Rgba32Float, Blend::Off, &none).is_ok());
-    refused(
-        add(TexelFormat::Rgba32Float, Blend::Alpha, &none),
-        &["pass `glass`", "rgba32float", "16 bits"],
-    );
+    assert!(add(TexelFormat::Rgba32Float, Blend::Alpha, &none).is_ok());
     let depth = |size: u32| {
         move |graph: &mut Graph, surfaces: Surfaces| {
             let draw = graph
@@ -320,6 +317,17 @@ fn what_cannot_be_blended_is_refused() {
     refused(
         add(TexelFormat::Rgba16Unorm, Blend::Alpha, &depth(16)),
         &["pass `glass`", "`before`", "`depth` is 16x16", "32x32"],
+    );
+    let single = |graph: &mut Graph, surfaces: Surfaces| {
+        let draw = graph
+            .draw("depth", surfaces, "light_depth")
+            .arg("position", surfaces.positions)
+            .arg("light", surfaces.clip_from_world);
+        Some(draw.single_depth([32; 2]).unwrap())
+    };
+    refused(
+        add(TexelFormat::Rgba16Unorm, Blend::Alpha, &single),
+        &["pass `glass`", "`before`", "with 1 samples", "with 4"],
     );
     refused(
         add(TexelFormat::Rgba16Unorm, Blend::Off, &depth(32)),
@@ -423,16 +431,29 @@ fn shadows_of_glass_are_near_the_rays() {
     let slack = "depth_bias = 0.008";
     for (technique, more, limit) in [
         ("hamburger", "", 0.070),
+        ("hamburger", "format = 'rgba32float'", 0.070),
         ("hamburger-6", "", 0.070),
+        ("hamburger-6", "format = 'rgba32float'", 0.070),
+        ("hamburger-6", "format = 'r32uint'", 0.070),
+        ("hamburger-6", "format = 'rg32uint'", 0.070),
+        ("moments-4", "", 0.070),
+        ("moments-6", "", 0.070),
         ("hausdorff", "", 0.072),
         ("vsm", "", 0.092),
         ("pcf", slack, 0.053),
         ("pcf-gaussian", slack, 0.171),
     ] {
-        let (scene, mesh) = scene(&format!("technique = '{technique}'\n{more}"));
-        let errors = light(&scene, &mesh).errors(&truth).unwrap();
-        println!("{technique}: {errors}");
-        assert!(errors.rms < limit, "{technique}: {errors}");
+        for samples in [4, 1] {
+            let (scene, mesh) = scene(&format!(
+                "technique = '{technique}'\nmultisampling = {samples}\n{more}"
+            ));
+            let errors = light(&scene, &mesh).errors(&truth).unwrap();
+            println!("{technique} {more:?}, {samples}: {errors}");
+            assert!(
+                errors.rms < limit,
+                "{technique} {more:?}, {samples}: {errors}"
+            );
+        }
     }
 }
 
@@ -443,31 +464,45 @@ fn darker(picture: &Arriving, truth: &Arriving) -> f32 {
 }
 
 /// Also of glass, moments give lower bounds: nowhere darker than the same filter over lists of all surfaces in
-/// each sample, but for the bias, which may be all shadow, and what rounding does to the bound. Hausdorff bounds of
-/// depths in [0, 1] have a bias for moments that are rounded to 16 bits once; blending rounds them again with each
-/// pane, up to four times. What that makes is measured (0.0099).
+/// each sample, but for the bias, which may be all shadow, and what rounding does to the bound. Hausdorff
+/// bounds of depths in [0, 1] jump where a surface of few lies at the receiver: rounding to 16 bits makes up to six of the
+/// 14 400 pixels darker, whatever the bias, by 0.31 at most.
 #[test]
 fn blended_moments_are_nowhere_darker_than_all_surfaces_filtered() {
-    for (technique, ranges) in [
-        ("hamburger", &["symmetric", "unit"][..]),
-        ("hausdorff", &["symmetric", "unit"]),
-        ("vsm", &["symmetric", "unit"]),
-        ("hamburger-6", &["symmetric"]),
+    for (technique, map) in [
+        ("hamburger", "rgba16unorm' depth_range='symmetric"),
+        ("hamburger", "rgba16unorm' depth_range='unit"),
+        ("hamburger", "rgba32float"),
+        ("hausdorff", "rgba16unorm' depth_range='symmetric"),
+        ("hausdorff", "rgba16unorm' depth_range='unit"),
+        ("vsm", "rgba16unorm' depth_range='symmetric"),
+        ("vsm", "rgba16unorm' depth_range='unit"),
+        ("vsm", "rgba32float"),
+        ("hamburger-6", "rgba16unorm"),
+        ("hamburger-6", "rgba32float"),
+        ("hamburger-6", "r32uint"),
+        ("hamburger-6", "rg32uint"),
+        ("moments-4", "rgba32float"),
+        ("moments-6", "rgba32float"),
     ] {
-        for range in ranges {
+        let map = map.replace(' ', "\n");
+        for samples in [4, 1] {
             let (scene, mesh) = scene(&format!(
-                "technique = '{technique}'\nformat = 'rgba16unorm'\ndepth_range = '{range}'\nleak_cut = 0.0"
+                "technique = '{technique}'\nformat = '{map}'\nmultisampling = {samples}\nleak_cut = 0.0"
             ));
             let truth = filtered(&scene, &mesh, &mut |_| ());
-            let by = darker(&light(&scene, &mesh), &truth);
-            println!("{technique}, {range}: darker by {by}");
-            let is_delicate = technique == "hausdorff" && *range == "unit";
-            let allowed = if is_delicate {
-                0.012
-            } else {
-                scene.shadow.moment_bias + 1e-5
-            };
-            assert!(by < allowed, "{technique}, {range}: darker by {by}");
+            let picture = light(&scene, &mesh);
+            let by = darker(&picture, &truth);
+            let allowed = scene.shadow.moment_bias + 1e-5;
+            let pairs = picture.values.iter().zip(&truth.values);
+            let wrong = pairs.filter(|(a, b)| *b - *a > allowed).count();
+            println!("{technique}, {map:?}, {samples}: darker by {by}, {wrong} beyond the bias");
+            let is_delicate = technique == "hausdorff" && map.contains("unit");
+            let most = if is_delicate { 6 } else { 0 };
+            assert!(
+                wrong <= most,
+                "{technique}, {map:?}, {samples}: darker by {by}, {wrong} pixels"
+            );
         }
     }
 }
@@ -499,16 +534,27 @@ fn chance_is_not_biased() {
 /// frame that was made for that light.
 #[test]
 fn devices_agree_and_the_order_follows_the_light() {
-    let (scene, mesh) = scene_of(256, 5, "technique = 'hamburger'");
-    let native = light(&scene, &mesh);
     let shaders = common::shaders();
     let mut device = open(Backend::Vulkan).unwrap_or_else(|e| panic!("{e}"));
-    let vulkan =
-        hankel_frames::truth::by_technique_on(&mut *device, &shaders, &scene, &mesh).unwrap();
-    let errors = native.errors(&vulkan).unwrap();
-    println!("devices: {errors}");
-    assert!(errors.rms < 0.01 && errors.percentile_99 < 0.02, "{errors}");
+    for shadow in [
+        "technique = 'hamburger'",
+        "technique = 'hamburger'\nmultisampling = 1",
+        "technique = 'hamburger-6'\nmultisampling = 1",
+        "technique = 'pcf'\nmultisampling = 1",
+    ] {
+        let (scene, mesh) = scene_of(256, 5, shadow);
+        let native = light(&scene, &mesh);
+        let vulkan =
+            hankel_frames::truth::by_technique_on(&mut *device, &shaders, &scene, &mesh).unwrap();
+        let errors = native.errors(&vulkan).unwrap();
+        println!("devices, {shadow:?}: {errors}");
+        assert!(
+            errors.rms < 0.01 && errors.percentile_99 < 0.02,
+            "{shadow}: {errors}"
+        );
+    }
 
+    let (scene, mesh) = scene_of(256, 5, "technique = 'hamburger'");
     let turned = Light::directional(Vec3::new(0.5, 0.6, -0.3));
     let mut device = NativeDevice::new();
     let mut frame = Frame::new(&mut device, &NoShaders, &scene, &mesh, Show::Light).unwrap();
@@ -557,6 +603,8 @@ fn what_is_left_out_is_said() {
     for (technique, shows) in [
         ("pcf", true),
         ("hamburger-6", true),
+        ("moments-4", true),
+        ("moments-6-compensated", true),
         ("esm", false),
         ("convolution", false),
         ("moments-8", false),
@@ -567,23 +615,6 @@ fn what_is_left_out_is_said() {
             .iter()
             .any(|(what, _)| what == TRANSLUCENT);
         assert_eq!(is_blind, !shows, "{technique}");
-    }
-    for (technique, setting, part) in [
-        ("hamburger", "format = 'rgba32float'", "32-bit"),
-        ("hamburger-6", "format = 'rgba32float'", "32-bit"),
-        ("hamburger-6", "format = 'r32uint'", "words"),
-        ("hamburger-6", "format = 'rg32uint'", "words"),
-        ("hamburger", "multisampling = 1", "multisampling = 4"),
-        ("pcf", "multisampling = 1", "multisampling = 4"),
-    ] {
-        let (scene, _) = scene(&format!("technique = '{technique}'\n{setting}"));
-        let omitted = omitted(&scene, &glass);
-        assert!(
-            omitted
-                .iter()
-                .any(|(what, why)| what == TRANSLUCENT && why.contains(part)),
-            "{omitted:?}"
-        );
     }
 }
 
@@ -617,14 +648,14 @@ fn a_plan_says_which_methods_cannot_show_glass() {
     )
     .unwrap();
     let plan = found.unwrap_or_else(|impossible| panic!("{impossible}"));
-    assert!(plan.choice.starts_with("hamburger rgba16unorm"), "{plan}");
+    assert!(plan.choice.starts_with("hamburger "), "{plan}");
     let text = plan.to_string();
     assert!(
         text.contains(&format!("not esm: no {TRANSLUCENT}")),
         "{text}"
     );
     assert!(
-        text.contains("not hamburger rgba32float: no") && text.contains("alpha blending"),
+        !text.contains("not hamburger rgba32float: no") && text.contains("alpha blending"),
         "{text}"
     );
 }

@@ -584,13 +584,14 @@ impl<'d> Executor<'d> {
                     Target::Depth { depth } => (*depth, Onto::Depth(place.texture(*depth)?)),
                     Target::Colour {
                         colour,
+                        samples,
                         background,
                         blend,
                         before,
-                        ..
                     } => {
                         let onto = Onto::Colour {
                             texture: place.texture(*colour)?,
+                            samples: *samples,
                             background: *background,
                             blend: *blend,
                             before: before.map(|depth| place.texture(depth)).transpose()?,

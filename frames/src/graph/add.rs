@@ -535,7 +535,7 @@ impl AddDraw<'_> {
         format: hankel_dsl::native::describe::TexelFormat,
         background: [f64; 4],
     ) -> Result<Handle> {
-        self.coloured(TextureShape::d2(width, height, format), background)
+        self.coloured(TextureShape::d2(width, height, format), SAMPLES, background)
     }
 
     /// Adds the pass: a picture with all [`SAMPLES`] samples of each pixel.
@@ -549,10 +549,23 @@ impl AddDraw<'_> {
         background: [f64; 4],
     ) -> Result<Handle> {
         let shape = TextureShape::d2(width, height, format).multisampled(SAMPLES);
-        self.coloured(shape, background)
+        self.coloured(shape, SAMPLES, background)
     }
 
-    fn coloured(self, shape: TextureShape, background: [f64; 4]) -> Result<Handle> {
+    /// Adds the pass: a picture with one sample in the middle of each pixel.
+    ///
+    /// # Errors
+    /// [`GraphError`]; the graph is then as it was.
+    pub fn single_samples(
+        self,
+        [width, height]: [u32; 2],
+        format: hankel_dsl::native::describe::TexelFormat,
+        background: [f64; 4],
+    ) -> Result<Handle> {
+        self.coloured(TextureShape::d2(width, height, format), 1, background)
+    }
+
+    fn coloured(self, shape: TextureShape, samples: u32, background: [f64; 4]) -> Result<Handle> {
         if self.fragment.is_none() {
             return Err(GraphError::Draw {
                 pass: self.label.into(),
@@ -560,11 +573,11 @@ impl AddDraw<'_> {
             });
         }
         self.graph
-            .check_blend(&self.label, self.blend, self.before, shape)?;
+            .check_blend(&self.label, self.blend, self.before, shape, samples)?;
         let (blend, before) = (self.blend, self.before);
         self.finish(shape, |colour| Target::Colour {
             colour,
-            samples: SAMPLES,
+            samples,
             background,
             blend,
             before,

@@ -11,7 +11,6 @@ use hankel_host::device::{Blend, DeviceError, TextureShape};
 use hankel_shadows::depth::Transform;
 
 use super::{Argument, Call, Graph, Handle, Origin, Result, Shape, Surfaces};
-use crate::visibility::SAMPLES;
 
 /// Why a pass was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -456,14 +455,15 @@ impl Graph {
         Ok(())
     }
 
-    /// Whether every device can blend into a target, and whether the depth before which that is done is one of
-    /// its own samples.
+    /// Whether every device can blend into a target of so many samples, and whether the depth before which that is done
+    /// is one of its own samples.
     pub(super) fn check_blend(
         &self,
         pass: &str,
         blend: Blend,
         before: Option<Handle>,
         target: TextureShape,
+        samples: u32,
     ) -> Result<()> {
         let refuse = |problem: String| GraphError::Draw {
             pass: pass.into(),
@@ -471,8 +471,8 @@ impl Graph {
         };
         if blend != Blend::Off && !target.format.is_blendable() {
             return Err(refuse(format!(
-                "its colour is {}, which not every device can blend: draw into floats or normalised integers \
-                 of at most 16 bits, or leave `blend` out",
+                "its colour is {}, which no device can blend: draw into floats or normalised integers, or leave \
+                 `blend` out",
                 target.format.name()
             )));
         }
@@ -486,12 +486,12 @@ impl Graph {
         }
         let value = self.current(before, |problem| refuse(format!("`before`: {problem}")))?;
         let [width, height, _] = target.size;
-        let wanted = TextureShape::depth(width, height).multisampled(SAMPLES);
+        let wanted = TextureShape::depth(width, height).multisampled(samples);
         match &value.shape {
             Shape::Texture(shape) if *shape == wanted => Ok(()),
             Shape::Texture(shape) => Err(refuse(format!(
                 "`before`: `{}` is {}x{} texels of {} with {} samples, but depth of {width}x{height} with \
-                 {SAMPLES} is wanted",
+                 {samples} is wanted",
                 value.label,
                 shape.size[0],
                 shape.size[1],

@@ -172,8 +172,7 @@ pub struct Choices {
     pub filters: Vec<u32>,
     /// What the map holds.
     pub fits: Vec<Fit>,
-    /// Samples of depth in a texel, 4 or 1, of techniques that [take one](Technique::takes_one_sample). Others have four,
-    /// whatever is said here.
+    /// Samples of depth in a texel, 4 or 1.
     pub multisampling: Vec<u32>,
     /// Techniques of scattering, for scenes with a medium.
     pub scatterings: Vec<&'static Scattering>,
@@ -239,13 +238,9 @@ impl Choices {
                 true => &narrowest,
                 false => &self.filters,
             };
-            let multisampling = match technique.takes_one_sample {
-                true => &self.multisampling[..],
-                false => &[SAMPLES],
-            };
             let ways = technique.maps.iter().flat_map(|&map| {
                 let with = move |&multisampling| (map, multisampling);
-                multisampling.iter().map(with)
+                self.multisampling.iter().map(with)
             });
             for (map, multisampling) in ways {
                 for &size in &self.sizes {

@@ -16,6 +16,7 @@ use crate::passes::{
     Given, POWER_MOMENTS, Rectification, Volume, blur, light_depth, moments, scatter,
 };
 use crate::scene::Shadow;
+use crate::visibility::SAMPLES;
 
 /// Why, and what else to use.
 const NOT_FOR_SPOTS: Option<&str> = Some(
@@ -106,6 +107,7 @@ fn add_four(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) 
         volume,
         picture,
         "scatter_prefiltered",
+        SAMPLES,
         |pass| {
             pass.arg("rectified", rectification.rectified)
                 .arg("table", table)
@@ -125,6 +127,7 @@ fn add_six(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -
         volume,
         picture,
         "scatter_prefiltered_6",
+        SAMPLES,
         |pass| {
             pass.arg("rectified", rectification.rectified)
                 .arg("target", target)

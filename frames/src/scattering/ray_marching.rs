@@ -3,9 +3,7 @@
 
 use super::Scattering;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, Volume, light_depth, scatter};
-use crate::scene::Shadow;
-use crate::visibility::SAMPLES;
+use crate::passes::{Given, Volume, by_samples, light_depth, scatter};
 
 pub const TECHNIQUE: Scattering = Scattering {
     name: "ray-marching",
@@ -16,21 +14,17 @@ pub const TECHNIQUE: Scattering = Scattering {
 };
 
 fn add(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -> Result<Handle> {
-    // The kernel looks at the first of several samples, whatever a map is made of.
-    let several = Given {
-        shadow: Shadow {
-            multisampling: SAMPLES,
-            ..given.shadow
+    let depth = light_depth(graph, given)?;
+    let kernel = by_samples(
+        given,
+        if given.is_spot {
+            "scatter_march_spot"
+        } else {
+            "scatter_march"
         },
-        ..*given
-    };
-    let depth = light_depth(graph, &several)?;
-    let kernel = if given.is_spot {
-        "scatter_march_spot"
-    } else {
-        "scatter_march"
-    };
-    scatter(graph, given, volume, picture, kernel, |pass| {
+    );
+    let samples = given.shadow.multisampling;
+    scatter(graph, given, volume, picture, &kernel, samples, |pass| {
         pass.arg("depth", depth)
             .note(format!("{} steps", volume.steps))
     })

@@ -68,6 +68,7 @@ mod view;
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
+use hankel_shadows::soft::MOST_POINTS;
 use hankel_system::input;
 use serde::Deserialize;
 
@@ -217,8 +218,8 @@ pub struct Shadow {
     pub technique: &'static Technique,
     /// Texels along an edge of the map, 16 to [`Scene::MAX_MAP`].
     pub size: u32,
-    /// Samples of depth in each texel, of which the map is made: [`SAMPLES`], or 1 if the technique takes one
-    /// ([`Technique::takes_one_sample`]).
+    /// Samples of depth in each texel, of which the map is made: [`SAMPLES`] or 1. Where rays through a medium are
+    /// marched along, the camera's depth has as many.
     pub multisampling: u32,
     /// How its map is stored, one of the technique's.
     pub map: Map,
@@ -270,17 +271,12 @@ impl Shadow {
         }
     }
 
-    /// These shadows by another technique: what is said of biases and of soft shadows is as that one has it, and so
-    /// are its samples of depth where it needs several.
+    /// These shadows by another technique: what is said of biases and of soft shadows is as that one has it.
     #[must_use]
     pub const fn by(self, technique: &'static Technique, map: Map) -> Self {
         Self {
             size: self.size,
-            multisampling: if technique.takes_one_sample {
-                self.multisampling
-            } else {
-                SAMPLES
-            },
+            multisampling: self.multisampling,
             filter: self.filter,
             fit: self.fit,
             mips: self.mips,
@@ -304,7 +300,7 @@ impl Scene {
     /// The most anisotropy of a lookup in mip levels.
     pub const MAX_ANISOTROPY: u32 = 16;
     /// Most samples of a soft shadow's search and filter, each.
-    pub const MAX_SAMPLES: u32 = 1024;
+    pub const MAX_SAMPLES: u32 = MOST_POINTS as u32;
     /// Most steps along a ray through a medium.
     pub const MAX_STEPS: u32 = 4096;
     /// Width and height of a picture unless given.

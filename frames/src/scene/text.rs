@@ -464,17 +464,8 @@ impl Reader<'_> {
         }
         let multisampling = match s.multisampling {
             Some(n) => {
-                let allowed = match (technique.takes_one_sample, *n.get_ref()) {
-                    (_, 4) | (true, 1) => None,
-                    (true, _) => Some("4 or 1".into()),
-                    (false, 1) => Some(format!(
-                        "4: `{}` has no kernel for one sample of depth in a texel",
-                        technique.name
-                    )),
-                    (false, _) => Some("4".into()),
-                };
-                if let Some(allowed) = allowed {
-                    return self.refuse(n.span(), "shadow.multisampling", n.get_ref(), allowed);
+                if !matches!(*n.get_ref(), 1 | 4) {
+                    return self.refuse(n.span(), "shadow.multisampling", n.get_ref(), "4 or 1");
                 }
                 *n.get_ref() as u32
             }

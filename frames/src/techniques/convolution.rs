@@ -31,7 +31,6 @@ pub const FOUR: Technique = Technique {
     depth_bias: 0.0,
     maps: MAPS,
     is_lower_bound: false,
-    takes_one_sample: true,
     is_soft: false,
     add: |graph, given| {
         let [make, shade] = ["resolve_convolution", "shade_convolution"];
@@ -79,7 +78,7 @@ fn add(
 ) -> Result<Handle> {
     let series = graph.constant("series", &series(terms));
     let kernel = format!("{make}_{}", given.shadow.map.format.name());
-    let maps = filtered_maps(graph, given, kernel, &TEXTURES[..terms / 2])?;
+    let maps = filtered_maps(graph, given, &kernel, &TEXTURES[..terms / 2])?;
     shade_filtered(graph, given, shade, &maps, |pass| {
         pass.arg("series", series)
     })

@@ -20,7 +20,6 @@ pub const TECHNIQUE: Technique = Technique {
         ..DEPTHS[0]
     }],
     is_lower_bound: true,
-    takes_one_sample: true,
     is_soft: false,
     add,
 };

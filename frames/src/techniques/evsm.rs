@@ -46,7 +46,6 @@ pub const POSITIVE: Technique = Technique {
     depth_bias: 0.0,
     maps: MAPS,
     is_lower_bound: true,
-    takes_one_sample: true,
     is_soft: false,
     add: |graph, given| add(graph, given, 1),
 };
@@ -63,7 +62,7 @@ fn add(graph: &mut Graph, given: &Given, warps: u32) -> Result<Handle> {
     let exponents = graph.constant("exponents", &EXPONENTS[map.encoding as usize]);
     let depth = light_depth(graph, given)?;
     let kernel = format!("resolve_evsm_{}", map.format.name());
-    let map = resolve_depth(graph, given, kernel, depth)
+    let map = resolve_depth(graph, given, &kernel, depth)
         .arg("exponents", exponents)
         .image([given.shadow.size; 2])?;
     let map = blur(graph, given, map)?;

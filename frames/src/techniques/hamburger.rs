@@ -12,7 +12,6 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 0.0,
     maps: POWER_MOMENTS,
     is_lower_bound: true,
-    takes_one_sample: true,
     is_soft: false,
     add,
 };

@@ -8,10 +8,7 @@ use hankel_shadows::shade::encoding;
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{
-    CANNOT_BLEND_FLOATS, CANNOT_BLEND_ONE, Given, TRANSLUCENT, blended_halves, blur, opaque_depth,
-    resolve, resolve_depth, shade, shade_filtered, taps_along,
-};
+use crate::passes::{Given, blurred, resolve_casters, shade, shade_filtered, taps_along, textures};
 use crate::scene::DepthRange;
 
 pub const TECHNIQUE: Technique = Technique {
@@ -30,7 +27,6 @@ pub const TECHNIQUE: Technique = Technique {
         map(TexelFormat::Rg32Uint, WORDS[1].encoding, WORDS[1].bias),
     ],
     is_lower_bound: true,
-    takes_one_sample: true,
     is_soft: false,
     add,
 };
@@ -92,38 +88,13 @@ const TEN_BITS: Bias = {
 fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let encoding = given.shadow.map.encoding;
     let words = WORDS.iter().find(|words| words.encoding == encoding);
-    let (kernel, textures, bias) = match words {
+    let (kernel, count, bias) = match words {
         Some(words) => (words.resolve, words.textures.len(), words.bias),
         None if encoding == encoding::PLAIN => ("resolve_plain_6", 2, SYMMETRIC_6_32),
         None => ("resolve_symmetric_6", 2, SYMMETRIC_6_16),
     };
-    let depth = opaque_depth(graph, given)?;
-    let is_single = given.shadow.multisampling == 1;
-    let size = [given.shadow.size, given.shadow.size, 1];
-    let pass = match &given.translucent {
-        Some(translucent) if encoding == encoding::SYMMETRIC && !is_single => {
-            let blend = "translucent_moments_6";
-            let [first, second] = blended_halves(graph, given, translucent, depth, blend, &[])?;
-            resolve(graph, given, "resolve_translucent_6")
-                .arg("depth", depth)
-                .arg("first", first)
-                .arg("second", second)
-        }
-        Some(_) => {
-            let why = match words {
-                Some(_) => "no device blends words: a map in `rgba16unorm` shows it",
-                None if encoding == encoding::SYMMETRIC => CANNOT_BLEND_ONE,
-                None => CANNOT_BLEND_FLOATS,
-            };
-            graph.omit(TRANSLUCENT, why);
-            resolve_depth(graph, given, kernel, depth)
-        }
-        None => resolve_depth(graph, given, kernel, depth),
-    };
-    let maps = (0..textures)
-        .fold(pass, |pass, _| pass.texels(size))
-        .finish()?
-        .outputs;
+    let pass = resolve_casters(graph, given, kernel, "translucent_moments_6")?;
+    let maps = textures(pass, given, count)?;
     let target = graph.constant("bias target", &bias.six());
     if let Some(words) = words {
         let maps = blur_words(graph, given, words, maps)?;
@@ -135,15 +106,13 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
             })
         });
     }
-    let first = blur(graph, given, maps[0])?;
-    let second = blur(graph, given, maps[1])?;
-    let maps = [("first", first), ("second", second)];
+    let maps = blurred(graph, given, &maps, &["first", "second"])?;
     shade_filtered(graph, given, "shade_hamburger_6", &maps, |pass| {
         pass.arg("target", target).constant("encoding", encoding)
     })
 }
 
-/// As [`blur`], over all textures of words at once.
+/// The filter, over all textures of words at once.
 fn blur_words(
     graph: &mut Graph,
     given: &Given,

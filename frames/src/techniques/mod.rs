@@ -38,8 +38,6 @@ pub struct Technique {
     pub maps: &'static [Map],
     /// Whether its shadow is never darker than [`crate::truth::filtered`], but for rounding.
     pub is_lower_bound: bool,
-    /// Whether depth may have one sample in each texel: there is a kernel for it. Others look at several.
-    pub takes_one_sample: bool,
     /// Whether its penumbrae are those of a light with an area. It has no filter of a fixed width then,
     /// and of a light that is a point nothing to gain.
     pub is_soft: bool,

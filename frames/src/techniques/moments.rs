@@ -6,7 +6,7 @@ use hankel_moments::bias::{Bias, SYMMETRIC_4_32, SYMMETRIC_6_32, SYMMETRIC_8_32,
 
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, filtered_maps, shade_filtered};
+use crate::passes::{Given, blurred, filtered_maps, resolve_casters, shade_filtered, textures};
 use crate::scene::DepthRange;
 
 pub const FOUR: Technique = Technique {
@@ -16,9 +16,11 @@ pub const FOUR: Technique = Technique {
     depth_bias: 0.0,
     maps: &[map(SYMMETRIC_4_32)],
     is_lower_bound: true,
-    takes_one_sample: true,
     is_soft: false,
-    add: |graph, given| add(graph, given, ["resolve_plain", "shade_moments_4"], &["map"]),
+    add: |graph, given| {
+        let kernels = ["resolve_plain", "shade_moments_4"];
+        add_blended(graph, given, kernels, "translucent_moments", &["map"])
+    },
 };
 
 pub const SIX: Technique = Technique {
@@ -27,7 +29,8 @@ pub const SIX: Technique = Technique {
     maps: &[map(SYMMETRIC_6_32)],
     add: |graph, given| {
         let kernels = ["resolve_plain_6", "shade_moments_6"];
-        add(graph, given, kernels, &["first", "second"])
+        let names = &["first", "second"];
+        add_blended(graph, given, kernels, "translucent_moments_6", names)
     },
     ..FOUR
 };
@@ -59,7 +62,7 @@ pub const FOUR_COMPENSATED: Technique = Technique {
     summary: "four moments, by the bound for any number in about twice the digits",
     add: |graph, given| {
         let kernels = ["resolve_plain", "shade_moments_4_compensated"];
-        add(graph, given, kernels, &["map"])
+        add_blended(graph, given, kernels, "translucent_moments", &["map"])
     },
     ..FOUR
 };
@@ -69,7 +72,8 @@ pub const SIX_COMPENSATED: Technique = Technique {
     summary: "six moments, by the bound for any number in about twice the digits",
     add: |graph, given| {
         let kernels = ["resolve_plain_6", "shade_moments_6_compensated"];
-        add(graph, given, kernels, &["first", "second"])
+        let names = &["first", "second"];
+        add_blended(graph, given, kernels, "translucent_moments_6", names)
     },
     ..SIX
 };
@@ -105,12 +109,27 @@ const fn map(bias: Bias) -> Map {
     }
 }
 
+/// Four or six moments, into which translucent casters can be blended.
+fn add_blended(
+    graph: &mut Graph,
+    given: &Given,
+    [make, shade]: [&'static str; 2],
+    blended: &'static str,
+    names: &[&'static str],
+) -> Result<Handle> {
+    let pass = resolve_casters(graph, given, make, blended)?;
+    let maps = textures(pass, given, names.len())?;
+    let maps = blurred(graph, given, &maps, names)?;
+    shade_filtered(graph, given, shade, &maps, |pass| pass)
+}
+
+/// More moments: with an opacity they are more than two textures hold.
 fn add(
     graph: &mut Graph,
     given: &Given,
     [make, shade]: [&'static str; 2],
-    textures: &[&'static str],
+    names: &[&'static str],
 ) -> Result<Handle> {
-    let maps = filtered_maps(graph, given, make, textures)?;
+    let maps = filtered_maps(graph, given, make, names)?;
     shade_filtered(graph, given, shade, &maps, |pass| pass)
 }

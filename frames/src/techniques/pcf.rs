@@ -9,7 +9,7 @@ use hankel_host::device::Blend;
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{
-    CANNOT_BLEND_ONE, DEPTHS, Given, TRANSLUCENT, draw_translucent, opaque_depth, shade,
+    DEPTHS, Given, by_samples, draw_translucent, opaque_depth, samples_of_map, shade,
 };
 
 pub const TECHNIQUE: Technique = Technique {
@@ -19,7 +19,6 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: false,
-    takes_one_sample: true,
     is_soft: false,
     add,
 };
@@ -31,26 +30,22 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     );
     graph.omit("blur", "depths cannot be filtered before the comparison");
     let depth = opaque_depth(graph, given)?;
-    if given.shadow.multisampling == 1 {
-        if given.translucent.is_some() {
-            graph.omit(TRANSLUCENT, CANNOT_BLEND_ONE);
-        }
-        return shade(graph, given, "shade_single_pcf", |pass| {
+    let Some(translucent) = given.translucent else {
+        return shade(graph, given, by_samples(given, "shade_pcf"), |pass| {
             pass.arg("depth", depth)
         });
-    }
-    let Some(translucent) = given.translucent else {
-        return shade(graph, given, "shade_pcf", |pass| pass.arg("depth", depth));
     };
-    let size = given.shadow.size;
-    let texels = graph.constant("size", &UVec2::splat(size));
+    let texels = graph.constant("size", &UVec2::splat(given.shadow.size));
     let label = "keep by chance";
     let kept = draw_translucent(graph, given, &translucent, label, given.light_view)
         .fragment("stochastic_depths")
         .arg("size", texels)
-        .blend(Blend::Least)
-        .samples([size; 2], TexelFormat::Rgba16Unorm, [1.0; 4])?;
-    shade(graph, given, "shade_stochastic", |pass| {
-        pass.arg("depth", depth).arg("kept", kept)
-    })
+        .blend(Blend::Least);
+    let kept = samples_of_map(kept, given, TexelFormat::Rgba16Unorm, [1.0; 4])?;
+    shade(
+        graph,
+        given,
+        by_samples(given, "shade_stochastic"),
+        |pass| pass.arg("depth", depth).arg("kept", kept),
+    )
 }

@@ -1,10 +1,11 @@
 //! Percentage-closer filtering with the weights of a Gaussian and of bilinear lookup, over all
 //! samples: what filtered shadow maps approximate. Slow.
 
+use hankel_dsl::glam::IVec2;
+
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{DEPTHS, Given, gaussian, light_depth, shade};
-use crate::visibility::SAMPLES;
+use crate::passes::{DEPTHS, Given, by_samples, light_depth, shade, taps_along};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "pcf-gaussian",
@@ -13,7 +14,6 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: true,
-    takes_one_sample: false,
     is_soft: false,
     add,
 };
@@ -25,10 +25,11 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     );
     graph.omit("blur", "its weights are part of the comparison");
     let depth = light_depth(graph, given)?;
-    let weights = graph.constants("weights", &gaussian(given.shadow.filter));
-    shade(graph, given, "shade_pcf_gaussian", |pass| {
-        pass.arg("depth", depth)
-            .arg("weights", weights)
-            .constant("samples", SAMPLES)
-    })
+    let taps = taps_along(graph, given.shadow.filter, IVec2::ZERO);
+    shade(
+        graph,
+        given,
+        by_samples(given, "shade_pcf_gaussian"),
+        |pass| pass.arg("taps", taps).arg("depth", depth),
+    )
 }

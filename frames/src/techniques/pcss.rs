@@ -2,12 +2,12 @@
 //! filtering over the penumbra that it makes.
 
 use hankel_dsl::glam::Vec2;
+use hankel_shadows::soft::Points;
 
 use super::Technique;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{DEPTHS, Given, light_depth, shade};
+use crate::passes::{DEPTHS, Given, by_samples, light_depth, shade};
 use crate::scene::Area;
-use crate::visibility::SAMPLES;
 
 pub const TECHNIQUE: Technique = Technique {
     name: "pcss",
@@ -16,7 +16,6 @@ pub const TECHNIQUE: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: false,
-    takes_one_sample: false,
     is_soft: true,
     add,
 };
@@ -28,15 +27,15 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     );
     graph.omit("blur", "the filter's width differs from pixel to pixel");
     let depth = light_depth(graph, given)?;
-    let [search, filter] = given.shadow.samples;
-    let search = graph.constants("search", &points(&given.source, search));
-    let filter = graph.constants("filter", &points(&given.source, filter));
-    shade(graph, given, "shade_pcss", |pass| {
+    let [search, filter] = given
+        .shadow
+        .samples
+        .map(|count| points(&given.source, count));
+    let points = graph.constant("points", &Points::new(&search, &filter));
+    shade(graph, given, by_samples(given, "shade_pcss"), |pass| {
         pass.arg("area", given.area)
-            .arg("search", search)
-            .arg("filter", filter)
+            .arg("points", points)
             .arg("depth", depth)
-            .constant("samples", SAMPLES)
     })
 }
 

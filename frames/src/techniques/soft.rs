@@ -15,7 +15,6 @@ pub const FOUR: Technique = Technique {
     depth_bias: 1e-3,
     maps: &[SUMMED],
     is_lower_bound: false,
-    takes_one_sample: false,
     is_soft: true,
     add: add_four,
 };

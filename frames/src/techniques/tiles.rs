@@ -10,9 +10,8 @@ use hankel_shadows::tiles::{ACROSS, EDGE, Listed, TEXELS, Tiles, tiles_of};
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{
-    BILINEAR, DEPTHS, Given, POWER_MOMENTS, gaussian, light_depth, shade, taps_along,
+    BILINEAR, DEPTHS, Given, POWER_MOMENTS, by_samples, light_depth, shade, taps_along,
 };
-use crate::visibility::SAMPLES;
 
 pub const HAMBURGER: Technique = Technique {
     name: "hamburger-tiles",
@@ -20,7 +19,6 @@ pub const HAMBURGER: Technique = Technique {
     depth_bias: 0.0,
     maps: &[SYMMETRIC],
     is_lower_bound: true,
-    takes_one_sample: false,
     is_soft: false,
     add: hamburger,
 };
@@ -32,7 +30,6 @@ pub const PCF_GAUSSIAN: Technique = Technique {
     depth_bias: 2e-3,
     maps: DEPTHS,
     is_lower_bound: true,
-    takes_one_sample: false,
     is_soft: false,
     add: pcf_gaussian,
 };
@@ -61,10 +58,9 @@ fn known(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Known> {
     };
     let tiles = graph.constant("tiles", &tiles);
     let depths = graph
-        .compute("tile depths", "tile_depths")
+        .compute("tile depths", by_samples(given, "tile_depths"))
         .arg("tiles", tiles)
         .arg("depth", depth)
-        .constant("samples", SAMPLES)
         .elements(count)?;
     let listed = graph.zeros::<Listed>("listed", 1);
     let list = graph.zeros::<u32>("list", count);
@@ -104,12 +100,11 @@ fn hamburger(graph: &mut Graph, given: &Given) -> Result<Handle> {
     } = known(graph, given, depth)?;
     let map = empty(graph, given, "map")?;
     let written = graph
-        .compute("resolve", "resolve_symmetric_tiles")
+        .compute("resolve", by_samples(given, "resolve_symmetric_tiles"))
         .arg("listed", listed)
         .arg("list", list)
         .arg("depth", depth)
         .arg("map", map)
-        .constant("samples", SAMPLES)
         .at_most(most)
         .note("listed tiles")
         .finish()?;
@@ -151,11 +146,11 @@ fn pcf_gaussian(graph: &mut Graph, given: &Given) -> Result<Handle> {
     );
     let depth = light_depth(graph, given)?;
     let Known { between, .. } = known(graph, given, depth)?;
-    let weights = graph.constants("weights", &gaussian(given.shadow.filter));
-    shade(graph, given, "shade_pcf_gaussian_tiles", |pass| {
-        pass.arg("between", between)
-            .arg("weights", weights)
+    let taps = taps_along(graph, given.shadow.filter, IVec2::ZERO);
+    let kernel = by_samples(given, "shade_pcf_gaussian_tiles");
+    shade(graph, given, kernel, |pass| {
+        pass.arg("taps", taps)
+            .arg("between", between)
             .arg("depth", depth)
-            .constant("samples", SAMPLES)
     })
 }

@@ -27,7 +27,6 @@ pub const TECHNIQUE: Technique = Technique {
         ),
     ],
     is_lower_bound: true,
-    takes_one_sample: true,
     is_soft: false,
     add,
 };

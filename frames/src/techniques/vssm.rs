@@ -4,7 +4,7 @@
 use super::soft::SUMMED;
 use super::{Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, TABLES, light_depth, shade, summed_area};
+use crate::passes::{Given, TABLES, by_samples, light_depth, shade, summed_area};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "vssm",
@@ -16,7 +16,6 @@ pub const TECHNIQUE: Technique = Technique {
         ..SUMMED
     }],
     is_lower_bound: false,
-    takes_one_sample: false,
     is_soft: true,
     add,
 };
@@ -27,7 +26,7 @@ const PARTS: u32 = 3;
 fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let depth = light_depth(graph, given)?;
     let [table, pyramid] = summed_area(graph, given, depth, &TABLES)?;
-    shade(graph, given, "shade_vssm", |pass| {
+    shade(graph, given, by_samples(given, "shade_vssm"), |pass| {
         pass.arg("area", given.area)
             .arg("pyramid", pyramid)
             .arg("table", table)

@@ -18,9 +18,6 @@ struct Fragment {
     samples: u8,
 }
 
-/// All samples of a pixel.
-const ALL: u8 = (1 << SAMPLES.len()) - 1;
-
 /// Values at the vertices, interpolated for the fragments.
 pub struct Varying {
     /// Floats of one value.
@@ -35,18 +32,21 @@ pub struct Fragments {
     /// Where each pixel's begin, and where the last one's end.
     starts: Vec<usize>,
     width: usize,
+    /// Samples of a pixel.
+    samples: usize,
 }
 
 impl Fragments {
-    /// What each sample sees first. `advance` is told the share that is done.
+    /// What each sample sees first; `samples` are where they lie in a pixel. `advance` is told the share that is done.
     #[must_use]
     pub fn find(
         caster: &Caster,
         lens: &Lens,
         size: [u32; 2],
+        samples: &[[f64; 2]],
         advance: &mut dyn FnMut(f32),
     ) -> Self {
-        Self::of(lens, size, advance, |_, segment, see| {
+        Self::of(lens, size, samples, advance, |_, segment, see| {
             if let Some(hit) = caster.first(segment) {
                 see(hit.triangle);
             }
@@ -60,11 +60,12 @@ impl Fragments {
         caster: &Caster,
         lens: &Lens,
         size: [u32; 2],
+        samples: &[[f64; 2]],
         clip: &[Vec4],
         depths: Option<&[f32]>,
         advance: &mut dyn FnMut(f32),
     ) -> Self {
-        Self::of(lens, size, advance, |sample, segment, see| {
+        Self::of(lens, size, samples, advance, |sample, segment, see| {
             let is_nearer = |hit: &Hit| {
                 depths.is_none_or(|depths| caster.depth(segment, *hit, clip) < depths[sample])
             };
@@ -77,6 +78,7 @@ impl Fragments {
     fn of(
         lens: &Lens,
         [width, height]: [u32; 2],
+        samples: &[[f64; 2]],
         advance: &mut dyn FnMut(f32),
         look: impl Fn(usize, &Segment, &mut dyn FnMut(u32)) + Sync,
     ) -> Self {
@@ -84,9 +86,9 @@ impl Fragments {
         let mut pixels: Vec<Vec<Fragment>> = vec![Vec::new(); width * height as usize];
         in_bands(&mut pixels, width, advance, |y, row| {
             for (x, pixel) in row.iter_mut().enumerate() {
-                for (i, at) in SAMPLES.into_iter().enumerate() {
-                    let segment = lens.segment([x as u32, y as u32], at);
-                    let sample = (y * width + x) * SAMPLES.len() + i;
+                for (i, at) in samples.iter().enumerate() {
+                    let segment = lens.segment([x as u32, y as u32], *at);
+                    let sample = (y * width + x) * samples.len() + i;
                     look(sample, &segment, &mut |triangle| {
                         let found = pixel.iter_mut().find(|f| f.triangle == triangle);
                         match found {
@@ -110,6 +112,7 @@ impl Fragments {
             all: pixels.into_iter().flatten().collect(),
             starts,
             width,
+            samples: samples.len(),
         }
     }
 
@@ -127,7 +130,8 @@ impl Fragments {
     /// Share of the pixels whose samples do not all see the same.
     #[must_use]
     pub fn edges(&self) -> f64 {
-        let is_mixed = |p: &Range<usize>| self.all[p.clone()].iter().any(|f| f.samples != ALL);
+        let all = (1 << self.samples) - 1;
+        let is_mixed = |p: &Range<usize>| self.all[p.clone()].iter().any(|f| f.samples != all);
         let count = self.starts.len() - 1;
         self.pixels().filter(is_mixed).count() as f64 / count.max(1) as f64
     }

@@ -49,6 +49,8 @@ pub(crate) enum Onto {
     Depth(TextureId),
     Colour {
         texture: TextureId,
+        /// Of each pixel that is drawn; if there are more than in the texture, that gets their mean.
+        samples: u32,
         background: [f64; 4],
         blend: Blend,
         before: Option<TextureId>,

@@ -6,7 +6,7 @@ use hankel_host::device::{
     Blend, Colour, Depth, Device, Draw as DeviceDraw, Pass, TextureId, TextureShape,
 };
 
-use super::{CULL, Draw, FAR, FullScreen, Onto, SAMPLES, SEEN, TOPOLOGY};
+use super::{CULL, Draw, FAR, FullScreen, Onto, SEEN, TOPOLOGY};
 use crate::error::{Result, during};
 use crate::graph::FULL_SCREEN_VERTICES;
 
@@ -45,12 +45,13 @@ impl Raster {
             Onto::Depth(texture) => Some(cleared(texture)),
             Onto::Colour {
                 texture,
+                samples,
                 background,
                 blend,
                 before,
             } => {
-                let shape = draw.shape.multisampled(SAMPLES);
-                let (texture, resolve) = if draw.shape.samples == 1 {
+                let shape = draw.shape.multisampled(samples);
+                let (texture, resolve) = if draw.shape.samples < samples {
                     (self.scratch(device, draw.label, shape)?, Some(texture))
                 } else {
                     (texture, None)
@@ -69,7 +70,7 @@ impl Raster {
                         ..cleared(texture)
                     }),
                     None if blend == Blend::Off => {
-                        let depth = TextureShape::depth(width, height).multisampled(SAMPLES);
+                        let depth = TextureShape::depth(width, height).multisampled(samples);
                         Some(cleared(self.scratch(device, draw.label, depth)?))
                     }
                     None => None,

@@ -64,6 +64,7 @@ impl Rays {
             (
                 Onto::Colour {
                     texture,
+                    samples,
                     background,
                     blend,
                     before,
@@ -74,6 +75,7 @@ impl Rays {
                 let depths = before.map(|depth| device.read_texture(depth)).transpose();
                 let depths = depths.map_err(during(draw.label))?;
                 let hidden = Hidden {
+                    samples: places(samples),
                     blend,
                     position: vertices.first().map_or(&[][..], Vec::as_slice),
                     depths: depths.as_deref(),
@@ -84,14 +86,16 @@ impl Rays {
                     blend,
                     background: Vec4::from(background.map(colour)),
                     format: draw.shape.format.texel(),
-                    are_kept: draw.shape.samples > 1,
+                    drawn: samples as usize,
+                    kept: draw.shape.samples as usize,
                 };
                 let texels = self.shade(device, draw, stage, &lens, &vertices, &target)?;
                 device
                     .write_texture(texture, &texels)
                     .map_err(during(draw.label))?;
                 // A map's samples are no picture's.
-                let found = self.found.get(&draw.pass).filter(|_| !target.are_kept);
+                let is_picture = target.kept < target.drawn;
+                let found = self.found.get(&draw.pass).filter(|_| is_picture);
                 Ok(found.map(|f| f.fragments.edges()))
             }
             (Onto::Colour { texture, .. } | Onto::Depth(texture), _) => {
@@ -166,11 +170,12 @@ impl Rays {
             // Shading is the rest.
             let mut cast = |share: f32| advance(share * 0.7);
             let fragments = if hidden.blend == Blend::Off {
-                Fragments::find(caster, lens, size, &mut cast)
+                Fragments::find(caster, lens, size, hidden.samples, &mut cast)
             } else {
                 let clip: Vec<Vec4> = bytemuck::pod_collect_to_vec(hidden.position);
                 let depths: Option<Vec<f32>> = hidden.depths.map(bytemuck::pod_collect_to_vec);
-                Fragments::layers(caster, lens, size, &clip, depths.as_deref(), &mut cast)
+                let depths = depths.as_deref();
+                Fragments::layers(caster, lens, size, hidden.samples, &clip, depths, &mut cast)
             };
             let found = Found {
                 stamps,
@@ -353,6 +358,8 @@ fn arguments<'a>(
 
 /// What hides fragments from each other.
 struct Hidden<'a> {
+    /// Where the samples of a pixel lie.
+    samples: &'static [[f64; 2]],
     /// Without blending the nearest hides the others.
     blend: Blend,
     /// Where the vertices go in clip space.
@@ -366,8 +373,10 @@ struct Samples {
     blend: Blend,
     background: Vec4,
     format: TexelFormat,
-    /// Whether all samples are kept, not their mean.
-    are_kept: bool,
+    /// Samples of a pixel that are drawn.
+    drawn: usize,
+    /// How many the target has: all of them, or one, their mean.
+    kept: usize,
 }
 
 impl Samples {
@@ -384,6 +393,7 @@ impl Samples {
         let mut stored = vec![0; self.format.bytes()];
         for pixel in fragments.drawn() {
             let mut samples = [background; SAMPLES.len()];
+            let samples = &mut samples[..self.drawn];
             for (i, sees) in pixel {
                 for (sample, sees) in samples.iter_mut().zip(sees) {
                     if sees {
@@ -391,8 +401,12 @@ impl Samples {
                     }
                 }
             }
-            let mean = [samples.iter().sum::<Vec4>() / SAMPLES.len() as f32];
-            let all: &[Vec4] = if self.are_kept { &samples } else { &mean };
+            let mean = [samples.iter().sum::<Vec4>() / samples.len() as f32];
+            let all = if self.kept == self.drawn {
+                &*samples
+            } else {
+                &mean
+            };
             for colour in all {
                 self.format.store(&mut stored, *colour);
                 picture.extend_from_slice(&stored);

@@ -109,13 +109,22 @@ impl Format {
         }
     }
 
-    /// Whether every device can blend what is drawn into it: colours of up to 16 bits in each channel. Blending
-    /// of 32-bit floats is optional in WebGPU, and integers have none.
+    /// Whether what is drawn into it can be blended: colours, but for integers. Blending of 32-bit floats is optional
+    /// in WebGPU (`float32-blendable`): a device without it says so when it is to draw.
     #[must_use]
     pub const fn is_blendable(self) -> bool {
         match self {
-            Self::Texel(t) => !t.is_integer() && t.bytes() < 4 * t.channels(),
+            Self::Texel(t) => !t.is_integer(),
             Self::Depth32 => false,
+        }
+    }
+
+    /// Whether it has 32-bit floats.
+    #[must_use]
+    pub const fn has_32_bit_floats(self) -> bool {
+        match self {
+            Self::Texel(t) => !t.is_integer() && t.bytes() == 4 * t.channels(),
+            Self::Depth32 => true,
         }
     }
 }

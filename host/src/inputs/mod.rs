@@ -248,9 +248,14 @@ pub fn of_entry(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>, InputError>
         Role::Constant { default, .. } => Some((p.name.clone(), default)),
         _ => None,
     });
+    let multisampled = kernel.params.iter().filter_map(|p| match p.role {
+        Role::Texture { texture, .. } if texture.is_multisampled() => Some(p.name.clone()),
+        _ => None,
+    });
     let request = Request {
         seed: mixed(kernel, seed),
         constants: constants.collect(),
+        multisampled: multisampled.collect(),
     };
     let Some(given) = entry.own_inputs(&request).map_err(own)? else {
         return cases(kernel, seed);

@@ -168,10 +168,13 @@ impl Kernel {
                 _ => quote!(let __extent: #ty = <#ty>::new(#(#numbers),*);),
             }),
             Range::Uniform { value, .. } => {
+                // What is wrong with the value is shown at it; the name is found by what else is made here, also where a
+                // macro has written the value.
+                let extent = format_ident!("__extent");
                 let span = value.span();
                 Some(match value {
-                    Expr::Path(_) => quote_spanned!(span=> let __extent: #ty = *#value;),
-                    _ => quote_spanned!(span=> let __extent: #ty = #value;),
+                    Expr::Path(_) => quote_spanned!(span=> let #extent: #ty = *#value;),
+                    _ => quote_spanned!(span=> let #extent: #ty = #value;),
                 })
             }
             Range::Outputs | Range::Elements(_) => None,

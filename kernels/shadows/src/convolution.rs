@@ -8,10 +8,10 @@
 use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
-use hankel_dsl::{Element, Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_dsl::{Element, Sampler, Texture2d, kernel};
 use hankel_moments::{OddHarmonics, fourier_light};
 
-use crate::resolve::{Depths, resolves};
+use crate::samples::Samples;
 use crate::shade::Light;
 
 /// What each term counts for.
@@ -125,75 +125,95 @@ fn shadow_8(
 
 /// Means of a texel's cosines and sines of four terms.
 #[inline(always)]
-fn mean_4(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
-    let terms = depth.mean(at, samples, low);
+fn mean_4(depth: impl Samples, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let terms = depth.mean_of_depths(at, samples, low);
     (terms.cosines, terms.sines)
 }
 
 /// The same of eight.
 #[inline(always)]
-fn mean_8(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4, Vec4, Vec4) {
-    let first = depth.mean(at, samples, low);
-    let second = depth.mean(at, samples, high);
+fn mean_8(depth: impl Samples, at: UVec2, samples: u32) -> (Vec4, Vec4, Vec4, Vec4) {
+    let first = depth.mean_of_depths(at, samples, low);
+    let second = depth.mean_of_depths(at, samples, high);
     (first.cosines, first.sines, second.cosines, second.sines)
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's cosines and sines of four terms, in 8 bits.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba8unorm, rgba8unorm),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 4e-3,
+            why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
+        )
+    )]
     resolve_convolution_rgba8unorm,
     resolve_single_convolution_rgba8unorm,
-    mean_4() -> (Vec4, Vec4),
-    outputs(rgba8unorm, rgba8unorm),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-3,
-        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
-    )
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth; samples| { mean_4(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's cosines and sines of eight terms, in 8 bits: of terms 1 to 4, then of terms 5 to 8.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba8unorm, rgba8unorm, rgba8unorm, rgba8unorm),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 4e-3,
+            why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
+        )
+    )]
     resolve_convolution_8_rgba8unorm,
     resolve_single_convolution_8_rgba8unorm,
-    mean_8() -> (Vec4, Vec4, Vec4, Vec4),
-    outputs(rgba8unorm, rgba8unorm, rgba8unorm, rgba8unorm),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-3,
-        why = "sums and products only, then rounding to 1/255: drivers may round a tie either way, which is one step"
-    )
+    (#[index] at: UVec2,) -> (Vec4, Vec4, Vec4, Vec4),
+    |depth; samples| { mean_8(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's cosines and sines of four terms, in 16 bits.
-    resolve_convolution_rgba16unorm [fragment = resolve_convolution_rgba8unorm],
-    resolve_single_convolution_rgba16unorm [fragment = resolve_single_convolution_rgba8unorm],
-    mean_4() -> (Vec4, Vec4),
-    outputs(rgba16unorm, rgba16unorm),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba16unorm, rgba16unorm),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_convolution_rgba16unorm [forms(fragment = resolve_convolution_rgba8unorm)],
+    resolve_single_convolution_rgba16unorm [forms(fragment = resolve_single_convolution_rgba8unorm)],
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth; samples| { mean_4(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's cosines and sines of eight terms, in 16 bits: of terms 1 to 4, then of terms 5 to 8.
-    resolve_convolution_8_rgba16unorm [fragment = resolve_convolution_8_rgba8unorm],
-    resolve_single_convolution_8_rgba16unorm [fragment = resolve_single_convolution_8_rgba8unorm],
-    mean_8() -> (Vec4, Vec4, Vec4, Vec4),
-    outputs(rgba16unorm, rgba16unorm, rgba16unorm, rgba16unorm),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba16unorm, rgba16unorm, rgba16unorm, rgba16unorm),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_convolution_8_rgba16unorm [forms(fragment = resolve_convolution_8_rgba8unorm)],
+    resolve_single_convolution_8_rgba16unorm [forms(fragment = resolve_single_convolution_8_rgba8unorm)],
+    (#[index] at: UVec2,) -> (Vec4, Vec4, Vec4, Vec4),
+    |depth; samples| { mean_8(depth, at, samples) }
 }
 
 shading! {

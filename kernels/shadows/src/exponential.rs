@@ -4,10 +4,10 @@
 //! with it agree. They are taken of each sample's depth, and then filtered.
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
-use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel, math};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel, math};
 use hankel_moments::{markov_1, warped_2};
 
-use crate::resolve::{Depths, resolves};
+use crate::samples::Samples;
 use crate::shade::Light;
 
 /// Exponents of the two warps of exponential variance shadow maps, for depths moved to [-1, 1].
@@ -44,45 +44,63 @@ pub(crate) fn exponential(exponent: f32, z: f32) -> f32 {
 
 /// Mean of a texel's `exp(exponent * z)`.
 #[inline(always)]
-fn mean_exponential(depth: impl Depths, at: UVec2, samples: u32, exponent: &f32) -> f32 {
-    depth.mean(at, samples, |z| exponential(*exponent, z))
+fn mean_exponential(depth: impl Samples, at: UVec2, samples: u32, exponent: &f32) -> f32 {
+    depth.mean_of_depths(at, samples, |z| exponential(*exponent, z))
 }
 
 /// Means of a texel's two warps and of their squares.
 #[inline(always)]
-fn mean_warps(depth: impl Depths, at: UVec2, samples: u32, exponents: &Exponents) -> Vec4 {
-    depth.mean(at, samples, |z| {
+fn mean_warps(depth: impl Samples, at: UVec2, samples: u32, exponents: &Exponents) -> Vec4 {
+    depth.mean_of_depths(at, samples, |z| {
         let (positive, negative) = exponents.warp(z);
         Vec4::new(positive, positive * positive, negative, negative * negative)
     })
 }
 
-resolves! {
+of_samples! {
     /// Mean of a texel's `exp(exponent * z)`, depths z in [0, 1]: an exponential shadow map.
-    resolve_esm, resolve_single_esm,
-    mean_exponential(
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(r32float),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::maps::exponential_depths
+    )]
+    resolve_esm,
+    resolve_single_esm,
+    (
+        #[index] at: UVec2,
+        #[uniform]
         #[range(1.0..=80.0)]
-        exponent: &f32
+        exponent: &f32,
     ) -> f32,
-    texture(r32float),
-    forms(fragment),
-    pinned,
-    inputs = crate::inputs::maps::exponential_depths
+    |depth; samples| { mean_exponential(depth, at, samples, exponent) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's two warps and of their squares: an exponential variance shadow map.
-    resolve_evsm, resolve_single_evsm, mean_warps(exponents: &Exponents) -> Vec4,
-    texture(rgba16float, rgba32float),
-    forms(fragment),
-    pinned,
-    inputs = crate::inputs::maps::warped_depths,
-    parity(
-        ulp = 1,
-        exact(rgba32float),
-        non_finite,
-        why = "rounding to 16 bits, up or down: one step; with exponents above 5.54 they overflow"
-    )
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba16float, rgba32float),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::maps::warped_depths,
+        parity(
+            ulp = 1,
+            exact(rgba32float),
+            non_finite,
+            why = "rounding to 16 bits, up or down: one step; with exponents above 5.54 they overflow"
+        )
+    )]
+    resolve_evsm,
+    resolve_single_evsm,
+    (
+        #[index] at: UVec2,
+        #[uniform] exponents: &Exponents,
+    ) -> Vec4,
+    |depth; samples| { mean_warps(depth, at, samples, exponents) }
 }
 
 shading! {

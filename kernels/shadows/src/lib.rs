@@ -12,8 +12,8 @@
 //! | to eight and ten | [`resolve_plain_8`](moment_maps::resolve_plain_8), [`resolve_plain_10`](moment_maps::resolve_plain_10) |
 //! | to terms of Fourier series | [`resolve_convolution_rgba8unorm`](convolution::resolve_convolution_rgba8unorm), [`resolve_convolution_rgba16unorm`](convolution::resolve_convolution_rgba16unorm), [`resolve_convolution_8_rgba8unorm`](convolution::resolve_convolution_8_rgba8unorm), [`resolve_convolution_8_rgba16unorm`](convolution::resolve_convolution_8_rgba16unorm) |
 //! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm) |
-//! | translucent casters, blended | [`translucent`](translucent::translucent), [`translucent_moments`](translucent::translucent_moments) twice, [`resolve_translucent`](translucent::resolve_translucent) |
-//! | and six moments of them | [`translucent_moments_6`](translucent::translucent_moments_6) twice, [`resolve_translucent_6`](translucent::resolve_translucent_6) |
+//! | translucent casters, blended | [`translucent`](translucent::translucent), [`translucent_moments`](translucent::translucent_moments) twice, [`resolve_translucent_unit`](translucent::resolve_translucent_unit), [`resolve_translucent_symmetric`](translucent::resolve_translucent_symmetric), [`resolve_translucent_plain`](translucent::resolve_translucent_plain) |
+//! | and six moments of them | [`translucent_moments_6`](translucent::translucent_moments_6) twice, [`resolve_translucent_symmetric_6`](translucent::resolve_translucent_symmetric_6), [`resolve_translucent_plain_6`](translucent::resolve_translucent_plain_6), [`resolve_translucent_packed_10`](translucent::resolve_translucent_packed_10), [`resolve_translucent_packed_16`](translucent::resolve_translucent_packed_16) |
 //! | or hashed | [`stochastic_depths`](translucent::stochastic_depths) |
 //! | and what is seen through them | [`tint`](translucent::tint), [`tinted`](translucent::tinted) |
 //! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba8unorm`](blur::blur_rgba8unorm), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float), [`blur_packed_10`](packed::blur_packed_10), [`blur_packed_16`](packed::blur_packed_16) |
@@ -22,13 +22,14 @@
 //! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`halve_summed_6`](soft::halve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) |
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface), [`surface_with_plane`](mips::surface_with_plane) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_single_pcf`](shade::shade_single_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_4_compensated`](moment_maps::shade_moments_4_compensated), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_6_compensated`](moment_maps::shade_moments_6_compensated), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_8_compensated`](moment_maps::shade_moments_8_compensated), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_moments_10_compensated`](moment_maps::shade_moments_10_compensated), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_4_compensated`](moment_maps::shade_moments_4_compensated), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_6_compensated`](moment_maps::shade_moments_6_compensated), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_8_compensated`](moment_maps::shade_moments_8_compensated), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_moments_10_compensated`](moment_maps::shade_moments_10_compensated), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
 //! | with mip levels | [`shade_hamburger_mips`](shade::shade_hamburger_mips), [`shade_hausdorff_mips`](shade::shade_hausdorff_mips), [`shade_variance_mips`](shade::shade_variance_mips), [`shade_hamburger_6_mips`](six::shade_hamburger_6_mips), [`shade_trigonometric_mips`](trigonometric::shade_trigonometric_mips), [`shade_esm_mips`](exponential::shade_esm_mips), [`shade_evsm_mips`](exponential::shade_evsm_mips), [`shade_convolution_mips`](convolution::shade_convolution_mips), [`shade_convolution_8_mips`](convolution::shade_convolution_8_mips), [`shade_moments_4_mips`](moment_maps::shade_moments_4_mips), [`shade_moments_4_compensated_mips`](moment_maps::shade_moments_4_compensated_mips), [`shade_moments_6_mips`](moment_maps::shade_moments_6_mips), [`shade_moments_6_compensated_mips`](moment_maps::shade_moments_6_compensated_mips), [`shade_moments_8_mips`](moment_maps::shade_moments_8_mips), [`shade_moments_8_compensated_mips`](moment_maps::shade_moments_8_compensated_mips), [`shade_moments_10_mips`](moment_maps::shade_moments_10_mips), [`shade_moments_10_compensated_mips`](moment_maps::shade_moments_10_compensated_mips) |
 //! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march), [`scatter_march_spot`](scattering::scatter_march_spot) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
 //!
-//! Kernels for depths with one sample in each texel are called `resolve_single_…` and `shade_single_…`.
+//! Kernels that look at samples have a counterpart for textures of one sample in each texel, with `_single` after the
+//! first word of the name: `resolve_single_unit`, `shade_single_pcf`.
 //!
 //! Passes that give a texel for each index have a fragment form, too, if their `#[kernel]` says `forms(fragment)`:
 //! `NAME_fragment`, one for all formats.
@@ -39,6 +40,8 @@ extern crate std;
 
 #[macro_use]
 mod filtered;
+#[macro_use]
+mod samples;
 
 pub mod blur;
 pub mod bounds;
@@ -120,6 +123,7 @@ hankel_dsl::kernels![
     shade::shade_pcf,
     shade::shade_single_pcf,
     shade::shade_pcf_gaussian,
+    shade::shade_single_pcf_gaussian,
     shade::sum_lights,
     six::shade_hamburger_6,
     trigonometric::shade_trigonometric,
@@ -155,7 +159,9 @@ hankel_dsl::kernels![
     moment_maps::shade_moments_10_mips,
     moment_maps::shade_moments_10_compensated_mips,
     soft::resolve_summed,
+    soft::resolve_single_summed,
     soft::resolve_summed_6,
+    soft::resolve_single_summed_6,
     soft::halve_summed,
     soft::halve_summed_6,
     soft::prefix_sums,
@@ -163,24 +169,44 @@ hankel_dsl::kernels![
     soft::shade_soft,
     soft::shade_soft_6,
     soft::shade_vssm,
+    soft::shade_single_vssm,
     soft::shade_pcss,
+    soft::shade_single_pcss,
     tiles::tile_depths,
+    tiles::tile_single_depths,
     tiles::tile_list,
     tiles::resolve_symmetric_tiles,
+    tiles::resolve_single_symmetric_tiles,
     tiles::blur_tiles,
     tiles::shade_hamburger_tiles,
     tiles::shade_pcf_gaussian_tiles,
+    tiles::shade_single_pcf_gaussian_tiles,
     translucent::translucent,
     translucent::translucent_moments,
-    translucent::resolve_translucent,
+    translucent::resolve_translucent_unit,
+    translucent::resolve_single_translucent_unit,
+    translucent::resolve_translucent_symmetric,
+    translucent::resolve_single_translucent_symmetric,
+    translucent::resolve_translucent_plain,
+    translucent::resolve_single_translucent_plain,
     translucent::translucent_moments_6,
-    translucent::resolve_translucent_6,
+    translucent::resolve_translucent_symmetric_6,
+    translucent::resolve_single_translucent_symmetric_6,
+    translucent::resolve_translucent_plain_6,
+    translucent::resolve_single_translucent_plain_6,
+    translucent::resolve_translucent_packed_10,
+    translucent::resolve_single_translucent_packed_10,
+    translucent::resolve_translucent_packed_16,
+    translucent::resolve_single_translucent_packed_16,
     translucent::stochastic_depths,
     translucent::shade_stochastic,
+    translucent::shade_single_stochastic,
     translucent::tint,
     translucent::tinted,
     scattering::scatter_march,
+    scattering::scatter_single_march,
     scattering::scatter_march_spot,
+    scattering::scatter_single_march_spot,
     scattering::rectify,
     scattering::prefix_means,
     scattering::scatter_prefiltered,

@@ -6,10 +6,10 @@
 use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
-use hankel_dsl::{Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_dsl::{Sampler, Texture2d, kernel};
 use hankel_moments::{MAX_MOMENTS, bias_target, bound, bound_compensated, mix_bias};
 
-use crate::resolve::{Depths, resolves};
+use crate::samples::Samples;
 use crate::shade::Light;
 
 /// A texel of each texture.
@@ -58,31 +58,45 @@ fn powers(z: f32) -> Texels {
 
 /// Means of a texel's eight moments.
 #[inline(always)]
-fn mean_8(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
-    let texels = depth.mean(at, samples, powers);
+fn mean_8(depth: impl Samples, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let texels = depth.mean_of_depths(at, samples, powers);
     (texels.odd, texels.even)
 }
 
 /// Means of a texel's ten moments.
 #[inline(always)]
-fn mean_10(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4, Vec4) {
-    let texels = depth.mean(at, samples, powers);
+fn mean_10(depth: impl Samples, at: UVec2, samples: u32) -> (Vec4, Vec4, Vec4) {
+    let texels = depth.mean_of_depths(at, samples, powers);
     (texels.odd, texels.even, texels.last)
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's eight moments, depths moved to [-1, 1], as they are.
-    resolve_plain_8, resolve_single_plain_8, mean_8() -> (Vec4, Vec4),
-    outputs(rgba32float, rgba32float),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba32float, rgba32float),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths
+    )]
+    resolve_plain_8,
+    resolve_single_plain_8,
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth; samples| { mean_8(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's ten moments, depths moved to [-1, 1], as they are.
-    resolve_plain_10, resolve_single_plain_10, mean_10() -> (Vec4, Vec4, Vec4),
-    outputs(rgba32float, rgba32float, rgba32float),
-    inputs = crate::inputs::maps::depths
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba32float, rgba32float, rgba32float),
+        inputs = crate::inputs::maps::depths
+    )]
+    resolve_plain_10,
+    resolve_single_plain_10,
+    (#[index] at: UVec2,) -> (Vec4, Vec4, Vec4),
+    |depth; samples| { mean_10(depth, at, samples) }
 }
 
 /// The least shadow that moments 0 to 2N allow for a receiver's depth from 0 to 1. The bias mixes in

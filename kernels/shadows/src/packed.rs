@@ -4,7 +4,7 @@
 //! write them, unlike textures of 16-bit channels.
 
 use hankel_dsl::glam::{IVec2, UVec2, UVec4, Vec2, Vec3, Vec4};
-use hankel_dsl::{Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
+use hankel_dsl::{Real, Texture2d, kernel, to_i32};
 use hankel_moments::{
     Moments6, Quantized6, dequantize_symmetric_6, hamburger_6, pack_10, pack_16, unpack_10,
     unpack_16,
@@ -12,7 +12,7 @@ use hankel_moments::{
 
 use crate::blur::Taps;
 use crate::grid::within;
-use crate::resolve::{Depths, resolves};
+use crate::samples::Samples;
 use crate::shade::{Light, shade_with};
 use crate::six::quantized;
 
@@ -41,12 +41,12 @@ fn second_16(words: UVec4) -> Vec4 {
 }
 
 #[inline(always)]
-fn words_10(first: Vec4, second: Vec4) -> UVec2 {
+pub(crate) fn words_10(first: Vec4, second: Vec4) -> UVec2 {
     UVec2::new(pack_10(first.truncate()), pack_10(second.truncate()))
 }
 
 #[inline(always)]
-fn words_16(first: Vec4, second: Vec4) -> (u32, u32, u32) {
+pub(crate) fn words_16(first: Vec4, second: Vec4) -> (u32, u32, u32) {
     (
         pack_16(Vec2::new(first.x, first.y)),
         pack_16(Vec2::new(first.z, second.x)),
@@ -56,36 +56,50 @@ fn words_16(first: Vec4, second: Vec4) -> (u32, u32, u32) {
 
 /// Means of a texel's six moments in words of three channels with 10 bits.
 #[inline(always)]
-fn mean_10(depth: impl Depths, at: UVec2, samples: u32) -> UVec2 {
+fn mean_10(depth: impl Samples, at: UVec2, samples: u32) -> UVec2 {
     let texels = quantized(depth, at, samples);
     words_10(texels.first, texels.second)
 }
 
 /// The same in words of two channels with 16 bits.
 #[inline(always)]
-fn mean_16(depth: impl Depths, at: UVec2, samples: u32) -> (u32, u32, u32) {
+fn mean_16(depth: impl Samples, at: UVec2, samples: u32) -> (u32, u32, u32) {
     let texels = quantized(depth, at, samples);
     words_16(texels.first, texels.second)
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis: two words of three
     /// channels with 10 bits.
-    resolve_packed_10, resolve_single_packed_10, mean_10() -> UVec2,
-    texture(rg32uint),
-    forms(fragment),
-    pinned,
-    inputs = crate::inputs::maps::depths
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rg32uint),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::maps::depths
+    )]
+    resolve_packed_10,
+    resolve_single_packed_10,
+    (#[index] at: UVec2,) -> UVec2,
+    |depth; samples| { mean_10(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis: three words of two
     /// channels with 16 bits.
-    resolve_packed_16, resolve_single_packed_16, mean_16() -> (u32, u32, u32),
-    outputs(r32uint, r32uint, r32uint),
-    forms(fragment),
-    pinned,
-    inputs = crate::inputs::maps::depths
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(r32uint, r32uint, r32uint),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::maps::depths
+    )]
+    resolve_packed_16,
+    resolve_single_packed_16,
+    (#[index] at: UVec2,) -> (u32, u32, u32),
+    |depth; samples| { mean_16(depth, at, samples) }
 }
 
 /// One pass of a symmetric separable filter over two words of three channels with 10 bits: see

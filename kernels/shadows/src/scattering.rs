@@ -30,6 +30,7 @@ use hankel_moments::{
 
 use crate::depth::row_times_point;
 use crate::grid::within;
+use crate::samples::Samples;
 use crate::shade::{Light, within_cone};
 use crate::soft::{in_texels, nearest, texel};
 
@@ -121,13 +122,7 @@ impl Ray {
     /// The ray through a pixel's middle. It ends where the pixel's `samples` samples of `surfaces` do, one or
     /// four of them.
     #[inline(always)]
-    fn new(
-        view: &View,
-        medium: &Medium,
-        surfaces: Texture2dMultisampled<'_>,
-        at: UVec2,
-        samples: u32,
-    ) -> Self {
+    fn new(view: &View, medium: &Medium, surfaces: impl Samples, at: UVec2, samples: u32) -> Self {
         let (x, y) = (at.x as f32, at.y as f32);
         let way = |first: f32, right: f32, down: f32| {
             Real::clamp(first + right * x + down * y, -1e6, 1e6)
@@ -141,7 +136,7 @@ impl Ray {
             direction.x * direction.x + direction.y * direction.y + direction.z * direction.z;
         let length = Real::sqrt(Real::max(square, 1e-20));
         let end = |i: u32| {
-            let z = Real::saturate(surfaces.load(at, if i < samples { i } else { 0 }).x);
+            let z = Real::saturate(surfaces.load_sample(at, if i < samples { i } else { 0 }).x);
             1.0 / Real::max(view.eye.w + view.first.w * z, 1e-6)
         };
         let ends = Vec4::new(end(0), end(1), end(2), end(3));
@@ -222,77 +217,77 @@ fn offset(at: UVec2) -> f32 {
     math::fract(52.982_918 * math::fract(x))
 }
 
-/// A picture through a medium that a directional light shines through, by marching along each pixel's ray: `steps`
-/// places as far from each other, from a start that differs from pixel to pixel but not from frame to frame, each
-/// of which is lit or not by the nearest depth of the map. A step counts as much as it scatters towards the camera,
-/// and of each sample of the pixel as far as that sample's surface. Of multisampled texels one sample is looked at,
-/// another one in each step.
-#[kernel(
-    compute,
-    threads(8, 8),
-    texture(rgba16float, rgba32float),
-    pinned,
-    inputs = crate::inputs::scattering::marched,
-    parity(
-        ulp = 1,
-        exact(rgba32float),
-        why = "rounding to 16 bits, up or down: one step"
-    )
-)]
-pub fn scatter_march(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[uniform] view: &View,
-    #[uniform] medium: &Medium,
-    #[uniform] light: &Light,
-    #[texture] picture: Texture2d<'_>,
-    #[texture] surfaces: Texture2dMultisampled<'_>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    let ray = Ray::new(view, medium, surfaces, at, samples);
-    let eye = Vec3::new(view.eye.x, view.eye.y, view.eye.z);
-    let start = |row: Vec4| row_times_point(row, eye);
-    let (u, v, z) = (
-        start(light.row_u),
-        start(light.row_v),
-        start(light.row_depth),
-    );
-    let (du, dv, dz) = (
-        dot(light.row_u, ray.direction),
-        dot(light.row_v, ray.direction),
-        dot(light.row_depth, ray.direction),
-    );
-    let size = depth.size();
-    let step = ray.farthest() / Real::max(medium.steps as f32, 1.0);
-    let per_step = transmittance(medium.extinction, step * ray.length);
-    let offset = offset(at);
-    let (mut passed, mut before, mut share) = (1.0, 1.0, 0.0);
-    let mut i = 0;
-    while i < medium.steps {
-        let t = (i as f32 + offset) * step;
-        let place = in_texels(
-            Vec2::new(
-                Real::clamp(u + du * t, -16.0, 16.0),
-                Real::clamp(v + dv * t, -16.0, 16.0),
-            ),
-            size,
+of_samples! {
+    /// A picture through a medium that a directional light shines through, by marching along each pixel's ray: `steps`
+    /// places as far from each other, from a start that differs from pixel to pixel but not from frame to frame, each
+    /// of which is lit or not by the nearest depth of the map. A step counts as much as it scatters towards the camera,
+    /// and of each sample of the pixel as far as that sample's surface. Of multisampled texels one sample is looked at,
+    /// another one in each step.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba16float, rgba32float),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::scattering::marched,
+        parity(
+            ulp = 1,
+            exact(rgba32float),
+            why = "rounding to 16 bits, up or down: one step"
+        )
+    )]
+    scatter_march,
+    scatter_single_march,
+    (
+        #[index] at: UVec2,
+        #[uniform] view: &View,
+        #[uniform] medium: &Medium,
+        #[uniform] light: &Light,
+        #[texture] picture: Texture2d<'_>,
+    ) -> Vec4,
+    |surfaces, depth; samples| {
+        let ray = Ray::new(view, medium, surfaces, at, samples);
+        let eye = Vec3::new(view.eye.x, view.eye.y, view.eye.z);
+        let start = |row: Vec4| row_times_point(row, eye);
+        let (u, v, z) = (
+            start(light.row_u),
+            start(light.row_v),
+            start(light.row_depth),
         );
-        let found = depth
-            .load(nearest(place, size), i.checked_rem(samples).unwrap_or(0))
-            .x;
-        passed *= per_step;
-        let after = ray.remains(passed);
-        // Nothing is beyond the map's depth.
-        if found >= Real::min(z + dz * t, 1.0) {
-            share += before - after;
+        let (du, dv, dz) = (
+            dot(light.row_u, ray.direction),
+            dot(light.row_v, ray.direction),
+            dot(light.row_depth, ray.direction),
+        );
+        let size = depth.size();
+        let step = ray.farthest() / Real::max(medium.steps as f32, 1.0);
+        let per_step = transmittance(medium.extinction, step * ray.length);
+        let offset = offset(at);
+        let (mut passed, mut before, mut share) = (1.0, 1.0, 0.0);
+        let mut i = 0;
+        while i < medium.steps {
+            let t = (i as f32 + offset) * step;
+            let place = in_texels(
+                Vec2::new(
+                    Real::clamp(u + du * t, -16.0, 16.0),
+                    Real::clamp(v + dv * t, -16.0, 16.0),
+                ),
+                size,
+            );
+            let sample = i.checked_rem(samples).unwrap_or(0);
+            let found = depth.load_sample(nearest(place, size), sample).x;
+            passed *= per_step;
+            let after = ray.remains(passed);
+            // Nothing is beyond the map's depth.
+            if found >= Real::min(z + dz * t, 1.0) {
+                share += before - after;
+            }
+            before = after;
+            i += 1;
         }
-        before = after;
-        i += 1;
+        let added = ray.scattered(medium, light, Real::saturate(share));
+        ray.behind(picture.load(at), light, added)
     }
-    let added = ray.scattered(medium, light, Real::saturate(share));
-    ray.behind(picture.load(at), light, added)
 }
 
 /// A ray that passes a spot light nearer than this share of its own length is taken to pass it so far off, which
@@ -365,93 +360,93 @@ impl Crossing {
     }
 }
 
-/// A picture through a medium that a spot light shines through, by marching along what the light's cone holds of
-/// each pixel's ray: `steps` parts that the light sees by equal angles, a place in each, which is lit or not by the
-/// nearest depth of the map. Where it lies in its part differs from pixel to pixel but not from frame to frame. A
-/// part counts as much as the medium in it scatters towards the camera: transmittance and the fall of the light with
-/// the square of the distance are integrals over the part; cone and phase function are those of its place. Samples
-/// are looked at as by [`scatter_march`].
-#[kernel(
-    compute,
-    threads(8, 8),
-    texture(rgba16float, rgba32float),
-    pinned,
-    inputs = crate::inputs::scattering::marched_spot,
-    parity(
-        ulp = 1,
-        exact(rgba32float),
-        why = "rounding to 16 bits, up or down: one step"
-    )
-)]
-pub fn scatter_march_spot(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[uniform] view: &View,
-    #[uniform] medium: &Medium,
-    #[uniform] light: &Light,
-    #[texture] picture: Texture2d<'_>,
-    #[texture] surfaces: Texture2dMultisampled<'_>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    let ray = Ray::new(view, medium, surfaces, at, samples);
-    let eye = Vec3::new(view.eye.x, view.eye.y, view.eye.z);
-    let way = Vec3::new(
-        ray.direction.x / ray.length,
-        ray.direction.y / ray.length,
-        ray.direction.z / ray.length,
-    );
-    let crossing = Crossing::new(light, eye, way, ray.farthest() * ray.length);
-    let part = (crossing.last - crossing.first) / Real::max(medium.steps as f32, 1.0);
-    // The mean of 1 / d² between two places that are 1 / a and 1 / b off is a b part / sin(part).
-    let wide = Real::min(part, 3.0);
-    let stretch = wide / Real::max(math::sin(wide), 1e-20);
-    let offset = offset(at);
-    let size = depth.size();
-    let (mut start, mut near) = crossing.at(crossing.first);
-    let mut before = ray.remains(transmittance(medium.extinction, start));
-    let mut share = 0.0;
-    let mut i = 0;
-    while i < medium.steps {
-        let (end, far) = crossing.at(crossing.first + (i as f32 + 1.0) * part);
-        let s = start + (end - start) * offset;
-        let world = Vec3::new(eye.x + s * way.x, eye.y + s * way.y, eye.z + s * way.z);
-        // All places are before the light; the floor keeps what is beside it finite.
-        let w = Real::max(row_times_point(light.row_w, world), 1e-6);
-        let place = in_texels(
-            Vec2::new(
-                Real::clamp(row_times_point(light.row_u, world) / w, -16.0, 16.0),
-                Real::clamp(row_times_point(light.row_v, world) / w, -16.0, 16.0),
-            ),
-            size,
+of_samples! {
+    /// A picture through a medium that a spot light shines through, by marching along what the light's cone holds of
+    /// each pixel's ray: `steps` parts that the light sees by equal angles, a place in each, which is lit or not by the
+    /// nearest depth of the map. Where it lies in its part differs from pixel to pixel but not from frame to frame. A
+    /// part counts as much as the medium in it scatters towards the camera: transmittance and the fall of the light with
+    /// the square of the distance are integrals over the part; cone and phase function are those of its place. Samples
+    /// are looked at as by [`scatter_march`].
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba16float, rgba32float),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::scattering::marched_spot,
+        parity(
+            ulp = 1,
+            exact(rgba32float),
+            why = "rounding to 16 bits, up or down: one step"
+        )
+    )]
+    scatter_march_spot,
+    scatter_single_march_spot,
+    (
+        #[index] at: UVec2,
+        #[uniform] view: &View,
+        #[uniform] medium: &Medium,
+        #[uniform] light: &Light,
+        #[texture] picture: Texture2d<'_>,
+    ) -> Vec4,
+    |surfaces, depth; samples| {
+        let ray = Ray::new(view, medium, surfaces, at, samples);
+        let eye = Vec3::new(view.eye.x, view.eye.y, view.eye.z);
+        let way = Vec3::new(
+            ray.direction.x / ray.length,
+            ray.direction.y / ray.length,
+            ray.direction.z / ray.length,
         );
-        let found = depth
-            .load(nearest(place, size), i.checked_rem(samples).unwrap_or(0))
-            .x;
-        let toward = Vec3::new(
-            light.position.x - world.x,
-            light.position.y - world.y,
-            light.position.z - world.z,
-        );
-        let square = toward.x * toward.x + toward.y * toward.y + toward.z * toward.z;
-        let distance = Real::max(Real::sqrt(square), 1e-20);
-        let cosine = (toward.x * way.x + toward.y * way.y + toward.z * way.z) / distance;
-        let phase = henyey_greenstein(medium.anisotropy, cosine);
-        let fall = 1.0 - light.colour.w + light.colour.w * (near * far * stretch);
-        let within = within_cone(light, toward, distance);
-        let unshaded = (within * within) * fall * phase;
-        let after = ray.remains(transmittance(medium.extinction, end));
-        // Nothing is beyond the map's depth.
-        if found >= Real::min(row_times_point(light.row_depth, world) / w, 1.0) {
-            share += (before - after) * unshaded;
+        let crossing = Crossing::new(light, eye, way, ray.farthest() * ray.length);
+        let part = (crossing.last - crossing.first) / Real::max(medium.steps as f32, 1.0);
+        // The mean of 1 / d² between two places that are 1 / a and 1 / b off is a b part / sin(part).
+        let wide = Real::min(part, 3.0);
+        let stretch = wide / Real::max(math::sin(wide), 1e-20);
+        let offset = offset(at);
+        let size = depth.size();
+        let (mut start, mut near) = crossing.at(crossing.first);
+        let mut before = ray.remains(transmittance(medium.extinction, start));
+        let mut share = 0.0;
+        let mut i = 0;
+        while i < medium.steps {
+            let (end, far) = crossing.at(crossing.first + (i as f32 + 1.0) * part);
+            let s = start + (end - start) * offset;
+            let world = Vec3::new(eye.x + s * way.x, eye.y + s * way.y, eye.z + s * way.z);
+            // All places are before the light; the floor keeps what is beside it finite.
+            let w = Real::max(row_times_point(light.row_w, world), 1e-6);
+            let place = in_texels(
+                Vec2::new(
+                    Real::clamp(row_times_point(light.row_u, world) / w, -16.0, 16.0),
+                    Real::clamp(row_times_point(light.row_v, world) / w, -16.0, 16.0),
+                ),
+                size,
+            );
+            let sample = i.checked_rem(samples).unwrap_or(0);
+            let found = depth.load_sample(nearest(place, size), sample).x;
+            let toward = Vec3::new(
+                light.position.x - world.x,
+                light.position.y - world.y,
+                light.position.z - world.z,
+            );
+            let square = toward.x * toward.x + toward.y * toward.y + toward.z * toward.z;
+            let distance = Real::max(Real::sqrt(square), 1e-20);
+            let cosine = (toward.x * way.x + toward.y * way.y + toward.z * way.z) / distance;
+            let phase = henyey_greenstein(medium.anisotropy, cosine);
+            let fall = 1.0 - light.colour.w + light.colour.w * (near * far * stretch);
+            let within = within_cone(light, toward, distance);
+            let unshaded = (within * within) * fall * phase;
+            let after = ray.remains(transmittance(medium.extinction, end));
+            // Nothing is beyond the map's depth.
+            if found >= Real::min(row_times_point(light.row_depth, world) / w, 1.0) {
+                share += (before - after) * unshaded;
+            }
+            start = end;
+            near = far;
+            before = after;
+            i += 1;
         }
-        start = end;
-        near = far;
-        before = after;
-        i += 1;
+        ray.behind(picture.load(at), light, medium.source * share)
     }
-    ray.behind(picture.load(at), light, medium.source * share)
 }
 
 /// What lies between two texels of four numbers each.

@@ -2,14 +2,16 @@
 //! same light. Here are those of four power moments and of the depths themselves, and what all share.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Buffer, Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
 use hankel_moments::{
     Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
     hausdorff_4, hausdorff_4_symmetric, variance_2,
 };
 
+use crate::blur::Taps;
 use crate::depth::{Transform, row_times_point};
 use crate::library::lookups::{percentage_closer, percentage_closer_weighted};
+use crate::samples::{Samples, mean_of};
 
 /// How the map holds moments: values of the specialisation constant `encoding`.
 pub mod encoding {
@@ -315,98 +317,81 @@ shading! {
 /// [`percentage_closer_weighted`] of the samples of a depth map that are nearer than `z`.
 #[inline(always)]
 pub(crate) fn weighted_nearer(
-    depth: Texture2dMultisampled<'_>,
-    weights: Buffer<'_, f32>,
+    depth: impl Samples,
+    taps: &Taps,
     samples: u32,
     uv: Vec2,
     z: f32,
 ) -> f32 {
-    let weight = |i: u32| weights.get(i);
-    percentage_closer_weighted(depth.size(), weights.len(), uv, weight, |at| {
-        let mut nearer = 0.0;
-        let mut i = 0;
-        while i < samples {
-            nearer += if depth.load(at, i).x < z { 1.0 } else { 0.0 };
-            i += 1;
-        }
-        nearer / samples as f32
+    let weight = |i: u32| taps.weight(i);
+    percentage_closer_weighted(depth.size(), taps.count, uv, weight, |at| {
+        let is_nearer = |i: u32| {
+            if depth.load_sample(at, i).x < z {
+                1.0
+            } else {
+                0.0
+            }
+        };
+        mean_of(samples, is_nearer)
     })
 }
 
-/// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
-/// the receiver, the first sample of each texel. The reference for the others.
-#[kernel(fragment, inputs = crate::inputs::maps::shaded_depths)]
-pub fn shade_pcf(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    shade_by(light, world, normal, colour, |uv, z| {
-        percentage_closer(depth.size(), light.filter_radius, uv, |at| {
-            if depth.load(at, 0).x < z { 1.0 } else { 0.0 }
+of_samples! {
+    /// Shading with percentage-closer filtering: the share of a square of depths that is nearer than
+    /// the receiver, the first sample of each texel. The reference for the others.
+    #[kernel(fragment, inputs = crate::inputs::maps::shaded_depths)]
+    shade_pcf,
+    shade_single_pcf,
+    (
+        #[varying] world: Vec3,
+        #[varying]
+        #[unit_vector]
+        normal: Vec3,
+        #[varying]
+        #[range(0.0..=1.0)]
+        colour: Vec3,
+        #[uniform] light: &Light,
+    ) -> Vec4,
+    |depth| {
+        shade_by(light, world, normal, colour, |uv, z| {
+            percentage_closer(depth.size(), light.filter_radius, uv, |at| {
+                if depth.load_sample(at, 0).x < z { 1.0 } else { 0.0 }
+            })
         })
-    })
+    }
 }
 
-/// As [`shade_pcf`], with a map of one sample of depth in each texel: GLSL ES 3.00 has no other ones.
-#[kernel(fragment, inputs = crate::inputs::maps::shaded_single_depths)]
-pub fn shade_single_pcf(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] depth: Texture2d<'_>,
-) -> Vec4 {
-    shade_by(light, world, normal, colour, |uv, z| {
-        percentage_closer(depth.size(), light.filter_radius, uv, |at| {
-            if depth.load(at).x < z { 1.0 } else { 0.0 }
+of_samples! {
+    /// Shading with percentage-closer filtering that has the weights of a separable filter and of
+    /// bilinear lookup, over all samples of each texel: what a filtered shadow map approximates, and
+    /// what lower bounds are never darker than. `taps` are those of [`crate::blur::blur`]; their step is not used.
+    #[kernel(
+        fragment,
+        inputs = crate::inputs::maps::weighted_depths,
+        parity(
+            ulp = 0,
+            absolute = 4e-5,
+            why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
+        )
+    )]
+    shade_pcf_gaussian,
+    shade_single_pcf_gaussian,
+    (
+        #[varying] world: Vec3,
+        #[varying]
+        #[unit_vector]
+        normal: Vec3,
+        #[varying]
+        #[range(0.0..=1.0)]
+        colour: Vec3,
+        #[uniform] light: &Light,
+        #[uniform] taps: &Taps,
+    ) -> Vec4,
+    |depth; samples| {
+        shade_by(light, world, normal, colour, |uv, z| {
+            weighted_nearer(depth, taps, samples, uv, z)
         })
-    })
-}
-
-/// Shading with percentage-closer filtering that has the weights of a separable filter and of
-/// bilinear lookup, over all samples of each texel: what a filtered shadow map approximates, and
-/// what lower bounds are never darker than. `weights` are those of [`crate::blur::blur`].
-#[kernel(
-    fragment,
-    inputs = crate::inputs::maps::weighted_depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-5,
-        why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
-    )
-)]
-pub fn shade_pcf_gaussian(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-) -> Vec4 {
-    shade_by(light, world, normal, colour, |uv, z| {
-        weighted_nearer(depth, weights, samples, uv, z)
-    })
+    }
 }
 
 /// The sum of two pictures, which two lights make of the same surfaces; each channel in [0, 65504].

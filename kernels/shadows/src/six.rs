@@ -4,14 +4,14 @@
 use core::ops::{AddAssign, Div};
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
-use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
 use hankel_moments::{
     Bounds, Moments6, Quantized6, cut_leak, dequantize_symmetric_6, hamburger_6,
     hamburger_6_compensated, quantize_symmetric_6,
 };
 
 use crate::bounds::Shadow;
-use crate::resolve::{Depths, resolves};
+use crate::samples::Samples;
 use crate::shade::{Light, encoding};
 
 /// How six moments are turned into a shadow.
@@ -136,10 +136,10 @@ fn symmetric(z: f32) -> Moments6<f32> {
 
 /// Means of a texel's six moments, depths moved to [-1, 1], in the optimised basis.
 #[inline(always)]
-pub(crate) fn quantized(depth: impl Depths, at: UVec2, samples: u32) -> Texels {
+pub(crate) fn quantized(depth: impl Samples, at: UVec2, samples: u32) -> Texels {
     // Half by half: glslang takes minutes for pinned sums of a structure in a loop (it looks for what
     // has to be `precise` through each member again).
-    let sum = |half: usize| depth.mean(at, samples, |z| halves(z)[half]);
+    let sum = |half: usize| depth.mean_of_depths(at, samples, |z| halves(z)[half]);
     Texels {
         first: sum(0),
         second: sum(1),
@@ -147,43 +147,54 @@ pub(crate) fn quantized(depth: impl Depths, at: UVec2, samples: u32) -> Texels {
 }
 
 #[inline(always)]
-fn mean_symmetric(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+fn mean_symmetric(depth: impl Samples, at: UVec2, samples: u32) -> (Vec4, Vec4) {
     let texels = quantized(depth, at, samples);
     (texels.first, texels.second)
 }
 
 /// Means of a texel's six moments, depths moved to [-1, 1], as they are.
 #[inline(always)]
-fn mean_plain(depth: impl Depths, at: UVec2, samples: u32) -> (Vec4, Vec4) {
-    let texels = depth.mean(at, samples, |z| {
-        let m = symmetric(z);
-        Texels {
-            first: Vec4::new(m.b1, m.b3, m.b5, 0.0),
-            second: Vec4::new(m.b2, m.b4, m.b6, 0.0),
-        }
+fn mean_plain(depth: impl Samples, at: UVec2, samples: u32) -> (Vec4, Vec4) {
+    let texels = depth.mean_of_depths(at, samples, |z| {
+        let [first, second] = plain_halves(z);
+        Texels { first, second }
     });
     (texels.first, texels.second)
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's six moments, depths moved to [-1, 1], in the basis optimised for 16 bits.
-    resolve_symmetric_6, resolve_single_symmetric_6, mean_symmetric() -> (Vec4, Vec4),
-    outputs(rgba16unorm, rgba16unorm),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba16unorm, rgba16unorm),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_symmetric_6,
+    resolve_single_symmetric_6,
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth; samples| { mean_symmetric(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Means of a texel's six moments, depths moved to [-1, 1], as they are, for 32-bit maps.
-    resolve_plain_6, resolve_single_plain_6, mean_plain() -> (Vec4, Vec4),
-    outputs(rgba32float, rgba32float),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba32float, rgba32float),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths
+    )]
+    resolve_plain_6,
+    resolve_single_plain_6,
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth; samples| { mean_plain(depth, at, samples) }
 }
 
 shading! {
@@ -244,5 +255,15 @@ pub(crate) fn halves(z: f32) -> [Vec4; 2] {
     [
         Vec4::new(q.r0, q.g0, q.b0, 0.0),
         Vec4::new(q.r1, q.g1, q.b1, 0.0),
+    ]
+}
+
+/// Moments of a depth in [0, 1] as they are: the odd ones, and the even ones.
+#[inline(always)]
+pub(crate) fn plain_halves(z: f32) -> [Vec4; 2] {
+    let m = symmetric(z);
+    [
+        Vec4::new(m.b1, m.b3, m.b5, 0.0),
+        Vec4::new(m.b2, m.b4, m.b6, 0.0),
     ]
 }

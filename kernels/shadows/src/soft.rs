@@ -17,7 +17,7 @@
 
 use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    Buffer, Element, Real, Shared, StorageMut, Texture2dMultisampled, barrier, kernel, to_i32,
+    Buffer, Element, Real, Shared, StorageMut, array_element, barrier, kernel, to_i32,
 };
 use hankel_moments::{
     Blockers, Fixed4, Fixed6, FixedPoint, Moments4, Moments6, Quantized4, Quantized6, Region, Span,
@@ -28,6 +28,7 @@ use hankel_moments::{
 use crate::grid::within;
 use crate::library::store::symmetric_depth;
 use crate::resolve::mean_symmetric;
+use crate::samples::Samples;
 use crate::shade::{Light, biased, shade_with};
 use crate::six::quantized;
 
@@ -446,54 +447,56 @@ fn inside(at: UVec2, size: UVec2) -> UVec2 {
     UVec2::new(within(at.x as i32, size.x), within(at.y as i32, size.y))
 }
 
-/// Mean of a texel's four moments, depths moved to [-1, 1], in the optimised basis, as integers: the first level of
-/// a pyramid, before [`halve_summed`] makes the others and [`prefix_sums`] their sums.
-#[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved)]
-pub fn resolve_summed(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[uniform] size: &UVec2,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[storage] table: StorageMut<'_, UVec4>,
-) {
-    let q = mean_symmetric(depth, inside(at, depth.size()), samples);
-    let q = Quantized4 {
-        r: q.x,
-        g: q.y,
-        b: q.z,
-        a: q.w,
-    };
-    let place = at.y * size.x + at.x;
-    if place < table.len() {
-        table.set(place, vector(Fixed4::of(q, POINT)));
+of_samples! {
+    /// Mean of a texel's four moments, depths moved to [-1, 1], in the optimised basis, as integers: the first level of
+    /// a pyramid, before [`halve_summed`] makes the others and [`prefix_sums`] their sums.
+    #[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved)]
+    resolve_summed,
+    resolve_single_summed,
+    (
+        #[index] at: UVec2,
+        #[uniform] size: &UVec2,
+        #[storage] table: StorageMut<'_, UVec4>,
+    ),
+    |depth; samples| {
+        let q = mean_symmetric(depth, inside(at, depth.size()), samples);
+        let q = Quantized4 {
+            r: q.x,
+            g: q.y,
+            b: q.z,
+            a: q.w,
+        };
+        let place = at.y * size.x + at.x;
+        if place < table.len() {
+            table.set(place, vector(Fixed4::of(q, POINT)));
+        }
     }
 }
 
-/// Mean of a texel's six moments, as [`resolve_summed`] has it of four.
-#[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved_6)]
-pub fn resolve_summed_6(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[uniform] size: &UVec2,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[storage] table: StorageMut<'_, Fixed6>,
-) {
-    let texels = quantized(depth, inside(at, depth.size()), samples);
-    let q = Quantized6 {
-        r0: texels.first.x,
-        g0: texels.first.y,
-        b0: texels.first.z,
-        r1: texels.second.x,
-        g1: texels.second.y,
-        b1: texels.second.z,
-    };
-    let place = at.y * size.x + at.x;
-    if place < table.len() {
-        table.set(place, Fixed6::of(q, POINT));
+of_samples! {
+    /// Mean of a texel's six moments, as [`resolve_summed`] has it of four.
+    #[kernel(compute, threads(8, 8), range(size), pinned, inputs = crate::inputs::soft::resolved_6)]
+    resolve_summed_6,
+    resolve_single_summed_6,
+    (
+        #[index] at: UVec2,
+        #[uniform] size: &UVec2,
+        #[storage] table: StorageMut<'_, Fixed6>,
+    ),
+    |depth; samples| {
+        let texels = quantized(depth, inside(at, depth.size()), samples);
+        let q = Quantized6 {
+            r0: texels.first.x,
+            g0: texels.first.y,
+            b0: texels.first.z,
+            r1: texels.second.x,
+            g1: texels.second.y,
+            b1: texels.second.z,
+        };
+        let place = at.y * size.x + at.x;
+        if place < table.len() {
+            table.set(place, Fixed6::of(q, POINT));
+        }
     }
 }
 
@@ -798,154 +801,194 @@ pub(crate) fn nearest(place: Vec2, size: UVec2) -> UVec2 {
     UVec2::new(within(place.x, size.x), within(place.y, size.y))
 }
 
-/// Shading with variance soft shadow mapping (\[VSSM\]): as moment soft shadow mapping, by mean and variance.
-/// They bound nothing where the mean is not before the receiver. So a region is divided into `parts` by
-/// `parts` smaller ones; in those where that is so, 2 x 2 depths of the map are compared instead. The
-/// moments are as they are: against rounding, `moment_bias` is the least variance.
-#[kernel(fragment, pinned, inputs = crate::inputs::soft::shaded_parts)]
-pub fn shade_vssm(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] area: &Area,
-    #[uniform] pyramid: &Pyramid,
-    #[storage]
-    #[length(512)]
-    table: Buffer<'_, UVec4>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[constant(id = 0, default = 3)]
-    #[values(1, 2, 3, 4)]
-    parts: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        let table = Table {
-            entries: table,
-            pyramid,
-        };
-        let place = in_texels(uv, pyramid.size);
-        let per_part = 1.0 / parts as f32;
-        look_up(area, z, 0.0, 2, |reach, z| {
-            let (mut share, mut moment) = (0.0, 0.0);
-            let half = Vec2::new(reach.x * per_part, reach.y * per_part);
-            let turn = |k: u32| (2 * k + 1) as f32 * per_part - 1.0;
-            let mut part = UVec2::ZERO;
-            while part.y < parts {
-                let middle = Vec2::new(
-                    place.x + reach.x * turn(part.x),
-                    place.y + reach.y * turn(part.y),
-                );
-                let m = table.around(middle, half);
-                if m.b1 < symmetric_depth(z) {
-                    let found = blockers_2(m.b1, m.b2, symmetric_depth(z), light.moment_bias);
-                    share += found.share;
-                    moment += found.moment;
-                } else {
-                    let mut k = 0;
-                    while k < 4 {
-                        let side = |k: u32| if k == 0 { -0.5 } else { 0.5 };
-                        let at = Vec2::new(
-                            middle.x + half.x * side(k & 1),
-                            middle.y + half.y * side(k >> 1),
-                        );
-                        let found = depth.load(nearest(at, depth.size()), 0).x;
-                        if found < z {
-                            share += 0.25;
-                            // Depths in [-1, 1] are twice as far apart.
-                            moment += 0.5 * (z - found);
+of_samples! {
+    /// Shading with variance soft shadow mapping (\[VSSM\]): as moment soft shadow mapping, by mean and variance.
+    /// They bound nothing where the mean is not before the receiver. So a region is divided into `parts` by
+    /// `parts` smaller ones; in those where that is so, 2 x 2 depths of the map are compared instead. The
+    /// moments are as they are: against rounding, `moment_bias` is the least variance.
+    #[kernel(fragment, pinned, inputs = crate::inputs::soft::shaded_parts)]
+    shade_vssm,
+    shade_single_vssm,
+    (
+        #[varying] world: Vec3,
+        #[varying]
+        #[unit_vector]
+        normal: Vec3,
+        #[varying]
+        #[range(0.0..=1.0)]
+        colour: Vec3,
+        #[uniform] light: &Light,
+        #[uniform] area: &Area,
+        #[uniform] pyramid: &Pyramid,
+        #[storage]
+        #[length(512)]
+        table: Buffer<'_, UVec4>,
+        #[constant(id = 0, default = 3)]
+        #[values(1, 2, 3, 4)]
+        parts: u32,
+    ) -> Vec4,
+    |depth| {
+        shade_with(light, world, normal, colour, |uv, z| {
+            let table = Table {
+                entries: table,
+                pyramid,
+            };
+            let place = in_texels(uv, pyramid.size);
+            let per_part = 1.0 / parts as f32;
+            look_up(area, z, 0.0, 2, |reach, z| {
+                let (mut share, mut moment) = (0.0, 0.0);
+                let half = Vec2::new(reach.x * per_part, reach.y * per_part);
+                let turn = |k: u32| (2 * k + 1) as f32 * per_part - 1.0;
+                let mut part = UVec2::ZERO;
+                while part.y < parts {
+                    let middle = Vec2::new(
+                        place.x + reach.x * turn(part.x),
+                        place.y + reach.y * turn(part.y),
+                    );
+                    let m = table.around(middle, half);
+                    if m.b1 < symmetric_depth(z) {
+                        let found = blockers_2(m.b1, m.b2, symmetric_depth(z), light.moment_bias);
+                        share += found.share;
+                        moment += found.moment;
+                    } else {
+                        let mut k = 0;
+                        while k < 4 {
+                            let side = |k: u32| if k == 0 { -0.5 } else { 0.5 };
+                            let at = Vec2::new(
+                                middle.x + half.x * side(k & 1),
+                                middle.y + half.y * side(k >> 1),
+                            );
+                            let found = depth.load_sample(nearest(at, depth.size()), 0).x;
+                            if found < z {
+                                share += 0.25;
+                                // Depths in [-1, 1] are twice as far apart.
+                                moment += 0.5 * (z - found);
+                            }
+                            k += 1;
                         }
-                        k += 1;
+                    }
+                    part.x += 1;
+                    if part.x >= parts {
+                        part = UVec2::new(0, part.y + 1);
                     }
                 }
-                part.x += 1;
-                if part.x >= parts {
-                    part = UVec2::new(0, part.y + 1);
+                let scale = per_part * per_part;
+                Blockers {
+                    share: share * scale,
+                    moment: moment * scale,
                 }
-            }
-            let scale = per_part * per_part;
-            Blockers {
-                share: share * scale,
-                moment: moment * scale,
-            }
+            })
+            .share
         })
-        .share
-    })
+    }
 }
 
-/// Shading with percentage-closer soft shadows: the mean distance of the blockers among some depths, and the
-/// share of blockers among others, within the penumbra. `search` and `filter` are where to look: points of
-/// the light, in units of its half width. Each is compared with what the steepest surface that does not shade
-/// itself has there. Of multisampled texels, one sample is looked at, another one for each point.
-#[kernel(fragment, pinned, inputs = crate::inputs::soft::searched)]
-pub fn shade_pcss(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[uniform] area: &Area,
-    #[storage]
-    #[length(1..=40)]
+/// The most points that percentage-closer soft shadows look at, for either purpose.
+pub const MOST_POINTS: usize = 512;
+
+/// Where percentage-closer soft shadows look: points of the light, in units of its half width.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct Points {
+    /// How many are looked at for blockers.
+    #[range(1..=40)]
+    pub search: u32,
+    /// How many are looked at for the shadow.
+    #[range(1..=40)]
+    pub filter: u32,
+    /// Fills the structure up.
+    pub padding: UVec2,
+    /// Where for blockers (x, y), and where for the shadow (z, w).
     #[range(-1.0..=1.0)]
-    search: Buffer<'_, Vec2>,
-    #[storage]
-    #[length(1..=40)]
-    #[range(-1.0..=1.0)]
-    filter: Buffer<'_, Vec2>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-) -> Vec4 {
-    shade_with(light, world, normal, colour, |uv, z| {
-        let size = depth.size();
-        let place = in_texels(uv, size);
-        let steepest = area.seen_from(area.slack, z);
-        // The depth at a point, and what it is less than if it blocks: the surface's own slope allowed for.
-        let behind = |i: u32, offset: Vec2, distance: f32| {
-            let reach = area.reach(distance);
-            let at = Vec2::new(place.x + offset.x * reach.x, place.y + offset.y * reach.y);
-            let width = Real::sqrt(offset.x * offset.x + offset.y * offset.y);
-            let slack = steepest * width * distance;
-            (
-                depth
-                    .load(nearest(at, size), i.checked_rem(samples).unwrap_or(0))
-                    .x,
-                z - slack,
-            )
-        };
-        let (mut distances, mut blockers) = (0.0, 0.0);
-        let mut i = 0;
-        while i < search.len() {
-            let (found, limit) = behind(i, search.get(i), z);
-            if found < limit {
-                distances += z - found;
-                blockers += 1.0;
+    pub places: [Vec4; MOST_POINTS],
+}
+
+impl Points {
+    /// Those of a search and of a filter.
+    ///
+    /// # Panics
+    /// With more than [`MOST_POINTS`].
+    #[cfg(not(target_arch = "spirv"))]
+    #[must_use]
+    pub fn new(search: &[Vec2], filter: &[Vec2]) -> Self {
+        let mut places = [Vec4::ZERO; MOST_POINTS];
+        for (i, point) in search.iter().enumerate() {
+            (places[i].x, places[i].y) = (point.x, point.y);
+        }
+        for (i, point) in filter.iter().enumerate() {
+            (places[i].z, places[i].w) = (point.x, point.y);
+        }
+        Self {
+            search: search.len() as u32,
+            filter: filter.len() as u32,
+            padding: UVec2::ZERO,
+            places,
+        }
+    }
+}
+
+of_samples! {
+    /// Shading with percentage-closer soft shadows: the mean distance of the blockers among some depths, and the
+    /// share of blockers among others, within the penumbra. `points` are where to look. Each depth is compared with
+    /// what the steepest surface that does not shade itself has there. Of multisampled texels, one sample is looked
+    /// at, another one for each point.
+    #[kernel(fragment, pinned, inputs = crate::inputs::soft::searched)]
+    shade_pcss,
+    shade_single_pcss,
+    (
+        #[varying] world: Vec3,
+        #[varying]
+        #[unit_vector]
+        normal: Vec3,
+        #[varying]
+        #[range(0.0..=1.0)]
+        colour: Vec3,
+        #[uniform] light: &Light,
+        #[uniform] area: &Area,
+        #[uniform] points: &Points,
+    ) -> Vec4,
+    |depth; samples| {
+        shade_with(light, world, normal, colour, |uv, z| {
+            let size = depth.size();
+            let place = in_texels(uv, size);
+            let steepest = area.seen_from(area.slack, z);
+            // The depth at a point, and what it is less than if it blocks: the surface's own slope allowed for.
+            let behind = |i: u32, offset: Vec2, distance: f32| {
+                let reach = area.reach(distance);
+                let at = Vec2::new(place.x + offset.x * reach.x, place.y + offset.y * reach.y);
+                let width = Real::sqrt(offset.x * offset.x + offset.y * offset.y);
+                let slack = steepest * width * distance;
+                let sample = i.checked_rem(samples).unwrap_or(0);
+                (depth.load_sample(nearest(at, size), sample).x, z - slack)
+            };
+            let (mut distances, mut blockers) = (0.0, 0.0);
+            let mut i = 0;
+            while i < points.search {
+                let point = array_element(&points.places, i);
+                let (found, limit) = behind(i, Vec2::new(point.x, point.y), z);
+                if found < limit {
+                    distances += z - found;
+                    blockers += 1.0;
+                }
+                i += 1;
             }
-            i += 1;
-        }
-        let distance = distances / Real::max(blockers, 1.0);
-        let mut shadowed = 0.0;
-        let mut i = 0;
-        while i < filter.len() {
-            let (found, limit) = behind(i, filter.get(i), distance);
-            if found < limit {
-                shadowed += 1.0;
+            let distance = distances / Real::max(blockers, 1.0);
+            let mut shadowed = 0.0;
+            let mut i = 0;
+            while i < points.filter {
+                let point = array_element(&points.places, i);
+                let (found, limit) = behind(i, Vec2::new(point.z, point.w), distance);
+                if found < limit {
+                    shadowed += 1.0;
+                }
+                i += 1;
             }
-            i += 1;
-        }
-        // Without blockers all is light, as published: what the filter finds was not to be found.
-        if blockers > 0.0 {
-            shadowed / filter.len() as f32
-        } else {
-            0.0
-        }
-    })
+            // Without blockers all is light, as published: what the filter finds was not to be found.
+            if blockers > 0.0 {
+                shadowed / points.filter as f32
+            } else {
+                0.0
+            }
+        })
+    }
 }

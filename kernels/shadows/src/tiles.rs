@@ -9,14 +9,15 @@
 use hankel_dsl::format::Rgba16Unorm;
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    Atomics, Buffer, Element, Real, Sampler, StorageMut, StorageTexture2d, Texture2d,
-    Texture2dMultisampled, kernel, to_i32,
+    Atomics, Buffer, Element, Real, Sampler, StorageMut, StorageTexture2d, Texture2d, kernel,
+    to_i32,
 };
 use hankel_moments::hamburger_4;
 
 use crate::blur::{Taps, filtered};
 use crate::grid::within;
 use crate::resolve::mean_symmetric;
+use crate::samples::Samples;
 use crate::shade::{
     Light, biased, encoding, in_range, look_up, shade_by, shade_with, weighted_nearer,
 };
@@ -85,30 +86,36 @@ fn from_middle(i: u32) -> f32 {
     i as f32 - 0.5 * (EDGE - 1) as f32
 }
 
-/// What the depths of each tile lie between, of all samples; tiles follow each other row by row. The
-/// plane's slope is that of the depths between opposite edges of the tile.
-#[kernel(
-    compute,
-    threads(8, 8),
-    range(tiles.across),
-    inputs = crate::inputs::tiles::depths,
-    parity(
-        ulp = 0,
-        absolute = 1e-6,
-        non_finite,
-        why = "drivers may contract products and sums, once in each of three terms of a plane's depth; absurd depths overflow"
-    )
-)]
-pub fn tile_depths(
-    #[index] tile: UVec2,
-    #[uniform] tiles: &Tiles,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-) -> Bounds {
-    // It says the range.
-    let _ = tiles;
+of_samples! {
+    /// What the depths of each tile lie between, of all samples; tiles follow each other row by row. The
+    /// plane's slope is that of the depths between opposite edges of the tile.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        range(tiles.across),
+        inputs = crate::inputs::tiles::depths,
+        parity(
+            ulp = 0,
+            absolute = 1e-6,
+            why = "drivers may contract products and sums, once in each of three terms of a plane's depth"
+        )
+    )]
+    tile_depths,
+    tile_single_depths,
+    (
+        #[index] tile: UVec2,
+        #[uniform] tiles: &Tiles,
+    ) -> Bounds,
+    |depth; samples| {
+        // It says the range.
+        let _ = tiles;
+        bounds(depth, tile, samples)
+    }
+}
+
+/// What the depths of a tile lie between; depths beyond [0, 1] are moved to its ends.
+#[inline(always)]
+fn bounds(depth: impl Samples, tile: UVec2, samples: u32) -> Bounds {
     let size = depth.size();
     let (left, top) = (EDGE * tile.x, EDGE * tile.y);
     let load = |x: u32, y: u32, sample: u32| {
@@ -116,7 +123,7 @@ pub fn tile_depths(
             within((left + x) as i32, size.x),
             within((top + y) as i32, size.y),
         );
-        depth.load(at, sample).x
+        Real::saturate(depth.load_sample(at, sample).x)
     };
     let last = EDGE - 1;
     let width = last as f32;
@@ -221,34 +228,35 @@ fn texel(at: UVec2, listed: &Listed, list: Buffer<'_, u32>, map: UVec2) -> UVec2
     texel
 }
 
-/// [`crate::resolve::resolve_symmetric`] for listed tiles.
-#[kernel(
-    compute,
-    threads(64, 1),
-    range(listed.size),
-    inputs = crate::inputs::tiles::listed_depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_symmetric_tiles(
-    #[index] at: UVec2,
-    #[uniform] listed: &Listed,
-    #[storage]
-    #[distinct]
-    list: Buffer<'_, u32>,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[texture] map: StorageTexture2d<'_, Rgba16Unorm>,
-) {
-    let size = depth.size();
-    let texel = texel(at, listed, list, size);
-    if (texel.x < size.x) & (texel.y < size.y) {
-        map.store(texel, mean_symmetric(depth, texel, samples));
+of_samples! {
+    /// [`crate::resolve::resolve_symmetric`] for listed tiles.
+    #[kernel(
+        compute,
+        threads(64, 1),
+        range(listed.size),
+        inputs = crate::inputs::tiles::listed_depths,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_symmetric_tiles,
+    resolve_single_symmetric_tiles,
+    (
+        #[index] at: UVec2,
+        #[uniform] listed: &Listed,
+        #[storage]
+        #[distinct]
+        list: Buffer<'_, u32>,
+        #[texture] map: StorageTexture2d<'_, Rgba16Unorm>,
+    ),
+    |depth; samples| {
+        let size = depth.size();
+        let texel = texel(at, listed, list, size);
+        if (texel.x < size.x) & (texel.y < size.y) {
+            map.store(texel, mean_symmetric(depth, texel, samples));
+        }
     }
 }
 
@@ -346,38 +354,36 @@ pub fn shade_hamburger_tiles(
     })
 }
 
-/// [`crate::shade::shade_pcf_gaussian`] where a tile's depths do not decide.
-#[kernel(
-    fragment,
-    inputs = crate::inputs::tiles::weighted_depths,
-    parity(
-        ulp = 0,
-        absolute = 4e-5,
-        why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
-    )
-)]
-pub fn shade_pcf_gaussian_tiles(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[storage] between: Buffer<'_, Bounds>,
-    #[storage]
-    #[length(1..=7)]
-    #[range(0.0..=0.15)]
-    weights: Buffer<'_, f32>,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-) -> Vec4 {
-    shade_by(light, world, normal, colour, |uv, z| {
-        unless_settled(depth.size(), between, 0.0, uv, z, || {
-            weighted_nearer(depth, weights, samples, uv, z)
+of_samples! {
+    /// [`crate::shade::shade_pcf_gaussian`] where a tile's depths do not decide.
+    #[kernel(
+        fragment,
+        inputs = crate::inputs::tiles::weighted_depths,
+        parity(
+            ulp = 0,
+            absolute = 4e-5,
+            why = "drivers may contract products and sums: a place in a map of 61 texels is then off by 4e-6 texels, and so are the weights of the light, whose strength is 2.5"
+        )
+    )]
+    shade_pcf_gaussian_tiles,
+    shade_single_pcf_gaussian_tiles,
+    (
+        #[varying] world: Vec3,
+        #[varying]
+        #[unit_vector]
+        normal: Vec3,
+        #[varying]
+        #[range(0.0..=1.0)]
+        colour: Vec3,
+        #[uniform] light: &Light,
+        #[uniform] taps: &Taps,
+        #[storage] between: Buffer<'_, Bounds>,
+    ) -> Vec4,
+    |depth; samples| {
+        shade_by(light, world, normal, colour, |uv, z| {
+            unless_settled(depth.size(), between, 0.0, uv, z, || {
+                weighted_nearer(depth, taps, samples, uv, z)
+            })
         })
-    })
+    }
 }

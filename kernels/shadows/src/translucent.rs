@@ -7,18 +7,21 @@
 //! 2016; lecture, "Translucent occluders").
 //!
 //! Four moments and an opacity are five channels. [`translucent_moments`] draws them in two halves, each with the
-//! opacity as its alpha; [`resolve_translucent`] puts them before the opaque surfaces, sample by sample. Six moments
-//! are two halves of three channels: [`translucent_moments_6`], [`resolve_translucent_6`].
+//! opacity as its alpha. Six moments are two halves of three channels: [`translucent_moments_6`]. What stores them in a
+//! map puts them before the opaque surfaces, sample by sample: `resolve_translucent_unit`, for example, is
+//! [`resolve_unit`](crate::resolve::resolve_unit) with translucent casters.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Real, Texture2d, Texture2dMultisampled, kernel, to_i32};
-use hankel_moments::{Moments4, Quantized4, quantize_symmetric_4, quantize_unit_4};
+use hankel_dsl::{Real, Texture2d, kernel, to_i32};
+use hankel_moments::{Moments4, quantize_symmetric_4, quantize_unit_4};
 
 use crate::depth::Transform;
 use crate::library::lookups::percentage_closer;
-use crate::resolve::mean_of;
-use crate::shade::{Light, encoding, shade_by};
-use crate::six::halves;
+use crate::library::store::channels;
+use crate::packed::{words_10, words_16};
+use crate::samples::{Samples, mean_of};
+use crate::shade::{Light, encoding, in_range, shade_by};
+use crate::six::{halves, plain_halves};
 
 /// A vertex of a translucent surface: position; colour with opacity; position in clip space once more.
 #[kernel(
@@ -47,17 +50,30 @@ fn divided(place: Vec4) -> Vec3 {
     Vec3::new(place.x / w, place.y / w, place.z / w)
 }
 
-/// A depth's four moments in the optimised basis.
+/// A depth's four moments as a map has them.
 #[inline(always)]
-fn quantized(z: f32, how: u32) -> Quantized4<f32> {
+fn four(z: f32, how: u32) -> Vec4 {
+    let m = Moments4::of_depth(in_range(z, how));
     if how == encoding::UNIT {
-        quantize_unit_4(Moments4::of_depth(z))
+        channels(quantize_unit_4(m))
+    } else if how == encoding::SYMMETRIC {
+        channels(quantize_symmetric_4(m))
     } else {
-        quantize_symmetric_4(Moments4::of_depth(2.0 * z - 1.0))
+        Vec4::new(m.b1, m.b2, m.b3, m.b4)
     }
 }
 
-/// Half of a translucent fragment's four moments in the optimised basis, for alpha blending into zeros:
+/// A depth's six moments as maps have them: the odd ones, and the even ones.
+#[inline(always)]
+fn six(z: f32, how: u32) -> [Vec4; 2] {
+    if how == encoding::SYMMETRIC {
+        halves(z)
+    } else {
+        plain_halves(z)
+    }
+}
+
+/// Half of a translucent fragment's four moments as `encoding` says, for alpha blending into zeros:
 /// the first two channels with `part` 0, the other two with 1. Alpha is the opacity.
 #[kernel(
     fragment,
@@ -74,63 +90,23 @@ pub fn translucent_moments(
     surface: Vec4,
     #[varying] place: Vec4,
     #[constant(id = 0, default = 2)]
-    #[values(encoding::UNIT, encoding::SYMMETRIC)]
+    #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
     encoding: u32,
     #[constant(id = 1, default = 0)]
     #[values(0, 1)]
     part: u32,
 ) -> Vec4 {
-    let q = quantized(Real::saturate(divided(place).z), encoding);
+    let m = four(Real::saturate(divided(place).z), encoding);
     let half = if part == 0 {
-        Vec2::new(q.r, q.g)
+        Vec2::new(m.x, m.y)
     } else {
-        Vec2::new(q.b, q.a)
+        Vec2::new(m.z, m.w)
     };
     Vec4::new(half.x, half.y, 0.0, Real::saturate(surface.w))
 }
 
-/// Mean of a texel's moments: in each sample, what [`translucent_moments`] has blended, before the moments of
-/// the depth of the opaque surface.
-#[kernel(
-    compute,
-    threads(8, 8),
-    texture(rgba16unorm),
-    forms(fragment),
-    inputs = crate::inputs::translucent::blended,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_translucent(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
-    samples: u32,
-    #[constant(id = 1, default = 2)]
-    #[values(encoding::UNIT, encoding::SYMMETRIC)]
-    encoding: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[texture] first: Texture2dMultisampled<'_>,
-    #[texture] second: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    let sample = |i: u32| {
-        let q = quantized(Real::saturate(depth.load(at, i).x), encoding);
-        let (front, back) = (first.load(at, i), second.load(at, i));
-        let passes = 1.0 - front.w;
-        Vec4::new(
-            front.x + passes * q.r,
-            front.y + passes * q.g,
-            back.x + passes * q.b,
-            back.y + passes * q.a,
-        )
-    };
-    mean_of(samples, sample)
-}
-
-/// Half of a translucent fragment's six moments in the optimised basis, depths moved to [-1, 1], for alpha blending
-/// into zeros: the odd ones with `part` 0, the even ones with 1. Alpha is the opacity.
+/// Half of a translucent fragment's six moments as `encoding` says, depths moved to [-1, 1], for alpha blending into
+/// zeros: the odd ones with `part` 0, the even ones with 1. Alpha is the opacity.
 #[kernel(
     fragment,
     inputs = crate::inputs::translucent::places,
@@ -145,46 +121,60 @@ pub fn translucent_moments_6(
     #[range(0.0..=1.0)]
     surface: Vec4,
     #[varying] place: Vec4,
-    #[constant(id = 0, default = 0)]
+    #[constant(id = 0, default = 2)]
+    #[values(encoding::PLAIN, encoding::SYMMETRIC)]
+    encoding: u32,
+    #[constant(id = 1, default = 0)]
     #[values(0, 1)]
     part: u32,
 ) -> Vec4 {
-    let [odd, even] = halves(Real::saturate(divided(place).z));
+    let [odd, even] = six(Real::saturate(divided(place).z), encoding);
     let half = if part == 0 { odd } else { even };
     Vec4::new(half.x, half.y, half.z, Real::saturate(surface.w))
 }
 
-/// Means of a texel's six moments: in each sample, what [`translucent_moments_6`] has blended, before the moments of
-/// the depth of the opaque surface.
-#[kernel(
-    compute,
-    threads(8, 8),
-    outputs(rgba16unorm, rgba16unorm),
-    forms(fragment),
-    inputs = crate::inputs::translucent::blended_6,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
-)]
-pub fn resolve_translucent_6(
-    #[index] at: UVec2,
-    #[constant(id = 0, default = 4)]
-    #[values(1, 4)]
+/// The mean of a texel's four moments as `how` says: in each sample, what is blended in two halves, before the moments
+/// of the depth of the opaque surface.
+#[inline(always)]
+fn mean_4(
+    depth: impl Samples,
+    first: impl Samples,
+    second: impl Samples,
+    at: UVec2,
     samples: u32,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[texture] first: Texture2dMultisampled<'_>,
-    #[texture] second: Texture2dMultisampled<'_>,
+    how: u32,
+) -> Vec4 {
+    mean_of(samples, |i| {
+        let opaque = four(Real::saturate(depth.load_sample(at, i).x), how);
+        let (front, back) = (first.load_sample(at, i), second.load_sample(at, i));
+        let passes = 1.0 - front.w;
+        Vec4::new(
+            front.x + passes * opaque.x,
+            front.y + passes * opaque.y,
+            back.x + passes * opaque.z,
+            back.y + passes * opaque.w,
+        )
+    })
+}
+
+/// The same of six moments: the odd ones, and the even ones.
+#[inline(always)]
+fn mean_6(
+    depth: impl Samples,
+    first: impl Samples,
+    second: impl Samples,
+    at: UVec2,
+    samples: u32,
+    how: u32,
 ) -> (Vec4, Vec4) {
     (
         mean_of(samples, |i| {
-            let opaque = halves(Real::saturate(depth.load(at, i).x));
-            before(first.load(at, i), opaque[0])
+            let opaque = six(Real::saturate(depth.load_sample(at, i).x), how);
+            before(first.load_sample(at, i), opaque[0])
         }),
         mean_of(samples, |i| {
-            let opaque = halves(Real::saturate(depth.load(at, i).x));
-            before(second.load(at, i), opaque[1])
+            let opaque = six(Real::saturate(depth.load_sample(at, i).x), how);
+            before(second.load_sample(at, i), opaque[1])
         }),
     )
 }
@@ -199,6 +189,148 @@ fn before(blended: Vec4, opaque: Vec4) -> Vec4 {
         blended.z + passes * opaque.z,
         0.0,
     )
+}
+
+of_samples! {
+    /// Mean of a texel's moments, depths in [0, 1], in the basis optimised for 16 bits: in each sample, what
+    /// [`translucent_moments`] has blended, before the opaque surface.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba16unorm),
+        forms(fragment),
+        inputs = crate::inputs::translucent::blended_unit,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_translucent_unit,
+    resolve_single_translucent_unit,
+    (#[index] at: UVec2,) -> Vec4,
+    |depth, first, second; samples| {
+        mean_4(depth, first, second, at, samples, encoding::UNIT)
+    }
+}
+
+of_samples! {
+    /// The same, depths moved to [-1, 1].
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba16unorm),
+        forms(fragment),
+        inputs = crate::inputs::translucent::blended_symmetric,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_translucent_symmetric,
+    resolve_single_translucent_symmetric,
+    (#[index] at: UVec2,) -> Vec4,
+    |depth, first, second; samples| {
+        mean_4(depth, first, second, at, samples, encoding::SYMMETRIC)
+    }
+}
+
+of_samples! {
+    /// The same, depths moved to [-1, 1], moments as they are, for a 32-bit map.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba32float),
+        forms(fragment),
+        inputs = crate::inputs::translucent::blended_plain,
+        parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+    )]
+    resolve_translucent_plain,
+    resolve_single_translucent_plain,
+    (#[index] at: UVec2,) -> Vec4,
+    |depth, first, second; samples| {
+        mean_4(depth, first, second, at, samples, encoding::PLAIN)
+    }
+}
+
+of_samples! {
+    /// Means of a texel's six moments, depths moved to [-1, 1], in the basis optimised for 16 bits: in each sample, what
+    /// [`translucent_moments_6`] has blended, before the opaque surface.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba16unorm, rgba16unorm),
+        forms(fragment),
+        inputs = crate::inputs::translucent::blended_symmetric_6,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_translucent_symmetric_6,
+    resolve_single_translucent_symmetric_6,
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth, first, second; samples| {
+        mean_6(depth, first, second, at, samples, encoding::SYMMETRIC)
+    }
+}
+
+of_samples! {
+    /// The same as they are, for 32-bit maps.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(rgba32float, rgba32float),
+        forms(fragment),
+        inputs = crate::inputs::translucent::blended_plain_6,
+        parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+    )]
+    resolve_translucent_plain_6,
+    resolve_single_translucent_plain_6,
+    (#[index] at: UVec2,) -> (Vec4, Vec4),
+    |depth, first, second; samples| {
+        mean_6(depth, first, second, at, samples, encoding::PLAIN)
+    }
+}
+
+of_samples! {
+    /// As [`resolve_translucent_symmetric_6`], in two words of three channels with 10 bits.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rg32uint),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::translucent::blended_symmetric_6
+    )]
+    resolve_translucent_packed_10,
+    resolve_single_translucent_packed_10,
+    (#[index] at: UVec2,) -> UVec2,
+    |depth, first, second; samples| {
+        let (first, second) = mean_6(depth, first, second, at, samples, encoding::SYMMETRIC);
+        words_10(first, second)
+    }
+}
+
+of_samples! {
+    /// As [`resolve_translucent_symmetric_6`], in three words of two channels with 16 bits.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        outputs(r32uint, r32uint, r32uint),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::translucent::blended_symmetric_6
+    )]
+    resolve_translucent_packed_16,
+    resolve_single_translucent_packed_16,
+    (#[index] at: UVec2,) -> (u32, u32, u32),
+    |depth, first, second; samples| {
+        let (first, second) = mean_6(depth, first, second, at, samples, encoding::SYMMETRIC);
+        words_16(first, second)
+    }
 }
 
 /// What a fragment lets through of what is seen behind it, for multiplicative blending: each channel loses
@@ -293,31 +425,34 @@ pub fn stochastic_depths(
     kept_depths(texel, Real::saturate(place.z), surface.w)
 }
 
-/// Shading with percentage-closer filtering, all four samples of each texel: of each the nearer one of the
-/// opaque surface's depth and of one that [`stochastic_depths`] has kept.
-#[kernel(fragment, inputs = crate::inputs::translucent::shaded)]
-pub fn shade_stochastic(
-    #[varying] world: Vec3,
-    #[varying]
-    #[unit_vector]
-    normal: Vec3,
-    #[varying]
-    #[range(0.0..=1.0)]
-    colour: Vec3,
-    #[uniform] light: &Light,
-    #[texture] depth: Texture2dMultisampled<'_>,
-    #[texture] kept: Texture2dMultisampled<'_>,
-) -> Vec4 {
-    shade_by(light, world, normal, colour, |uv, z| {
-        percentage_closer(depth.size(), light.filter_radius, uv, |at| {
-            let sample = |i: u32, kept: f32| {
-                let nearest = Real::min(depth.load(at, i).x, kept);
-                if nearest < z { 0.25 } else { 0.0 }
-            };
-            sample(0, kept.load(at, 0).x)
-                + sample(1, kept.load(at, 1).y)
-                + sample(2, kept.load(at, 2).z)
-                + sample(3, kept.load(at, 3).w)
+of_samples! {
+    /// Shading with percentage-closer filtering by what [`stochastic_depths`] has kept: of each texel four depths, each
+    /// the nearer one of a kept one and of the opaque surface's depth, which is that of another sample for each.
+    #[kernel(fragment, inputs = crate::inputs::translucent::shaded)]
+    shade_stochastic,
+    shade_single_stochastic,
+    (
+        #[varying] world: Vec3,
+        #[varying]
+        #[unit_vector]
+        normal: Vec3,
+        #[varying]
+        #[range(0.0..=1.0)]
+        colour: Vec3,
+        #[uniform] light: &Light,
+    ) -> Vec4,
+    |depth, kept| {
+        shade_by(light, world, normal, colour, |uv, z| {
+            percentage_closer(depth.size(), light.filter_radius, uv, |at| {
+                let sample = |i: u32, kept: f32| {
+                    let nearest = Real::min(depth.load_sample(at, i).x, kept);
+                    if nearest < z { 0.25 } else { 0.0 }
+                };
+                sample(0, kept.load_sample(at, 0).x)
+                    + sample(1, kept.load_sample(at, 1).y)
+                    + sample(2, kept.load_sample(at, 2).z)
+                    + sample(3, kept.load_sample(at, 3).w)
+            })
         })
-    })
+    }
 }

@@ -1,13 +1,13 @@
 //! Trigonometric moment shadow mapping: as maps over rows of moments, and from depths to shading.
 
 use hankel_dsl::glam::{UVec2, Vec3, Vec4};
-use hankel_dsl::{Element, Real, Sampler, Texture2d, Texture2dMultisampled, kernel};
+use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
 use hankel_moments::{
     Bounds, HalfAngle, TrigonometricMoments, cut_leak, trigonometric_4, trigonometric_4_compensated,
 };
 
 use crate::bounds::Shadow;
-use crate::resolve::{Depths, resolves};
+use crate::samples::Samples;
 use crate::shade::Light;
 
 /// How a map holds trigonometric moments: values of the specialisation constant `encoding`.
@@ -127,40 +127,54 @@ fn moments(z: f32) -> Vec4 {
 
 /// Mean of a texel's moments, as they are.
 #[inline(always)]
-fn mean_plain(depth: impl Depths, at: UVec2, samples: u32) -> Vec4 {
-    depth.mean(at, samples, moments)
+fn mean_plain(depth: impl Samples, at: UVec2, samples: u32) -> Vec4 {
+    depth.mean_of_depths(at, samples, moments)
 }
 
 /// Mean of a texel's moments, moved to [0, 1].
 #[inline(always)]
-fn mean_unorm(depth: impl Depths, at: UVec2, samples: u32) -> Vec4 {
-    depth.mean(at, samples, |z| moments(z) * 0.5 + Vec4::splat(0.5))
+fn mean_unorm(depth: impl Samples, at: UVec2, samples: u32) -> Vec4 {
+    depth.mean_of_depths(at, samples, |z| moments(z) * 0.5 + Vec4::splat(0.5))
 }
 
-resolves! {
+of_samples! {
     /// Mean of a texel's two complex trigonometric moments, depths in [0, 1], as they are, for a 32-bit map.
-    resolve_trigonometric_plain, resolve_single_trigonometric_plain, mean_plain() -> Vec4,
-    texture(rgba32float),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1e-6,
-        why = "drivers may contract products and sums: sine and cosine of half the angle are within 2.4e-7 either way, and doubling the angle twice makes four times that"
-    )
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba32float),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 1e-6,
+            why = "drivers may contract products and sums: sine and cosine of half the angle are within 2.4e-7 either way, and doubling the angle twice makes four times that"
+        )
+    )]
+    resolve_trigonometric_plain,
+    resolve_single_trigonometric_plain,
+    (#[index] at: UVec2,) -> Vec4,
+    |depth; samples| { mean_plain(depth, at, samples) }
 }
 
-resolves! {
+of_samples! {
     /// Mean of a texel's two complex trigonometric moments, depths in [0, 1], moved to [0, 1] for 16 bits.
-    resolve_trigonometric_unorm, resolve_single_trigonometric_unorm, mean_unorm() -> Vec4,
-    texture(rgba16unorm),
-    forms(fragment),
-    inputs = crate::inputs::maps::depths,
-    parity(
-        ulp = 0,
-        absolute = 1.6e-5,
-        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
-    )
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rgba16unorm),
+        forms(fragment),
+        inputs = crate::inputs::maps::depths,
+        parity(
+            ulp = 0,
+            absolute = 1.6e-5,
+            why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+        )
+    )]
+    resolve_trigonometric_unorm,
+    resolve_single_trigonometric_unorm,
+    (#[index] at: UVec2,) -> Vec4,
+    |depth; samples| { mean_unorm(depth, at, samples) }
 }
 
 shading! {

@@ -31,6 +31,7 @@ fn rows_hold_moments_of_distributions() {
     let request = Request {
         seed: 3,
         constants: Vec::new(),
+        multisampled: Vec::new(),
     };
     for (n, given) in [
         (1, rows_1::<f64>(&request)),

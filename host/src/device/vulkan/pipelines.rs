@@ -783,9 +783,19 @@ impl VulkanDevice {
             }
             if *blend != Blend::Off && !shape.format.is_blendable() {
                 return Err(bad(format!(
-                    "colour target {i} is {}, which not every device can blend: use floats or normalised \
-                     integers of at most 16 bits",
+                    "colour target {i} is {}, which no device can blend: use floats or normalised integers",
                     shape.format.name()
+                )));
+            }
+            let blends_floats = self
+                .device
+                .features()
+                .contains(wgpu::Features::FLOAT32_BLENDABLE);
+            if *blend != Blend::Off && shape.format.has_32_bit_floats() && !blends_floats {
+                return Err(bad(format!(
+                    "colour target {i} is {}, and {} cannot blend 32-bit floats: use 16 bits",
+                    shape.format.name(),
+                    self.name
                 )));
             }
             if let Some(id) = resolve {

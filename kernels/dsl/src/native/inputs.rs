@@ -13,7 +13,7 @@
 //!     keys.sort_by(f32::total_cmp);
 //!     vec![Given::new("sorted keys").buffer("keys", &keys)]
 //! }
-//! # let request = Request { seed: 7, constants: Vec::new() };
+//! # let request = Request { seed: 7, constants: Vec::new(), multisampled: Vec::new() };
 //! # assert_eq!(sorted(&request), sorted(&request));
 //! ```
 
@@ -34,9 +34,22 @@ pub struct Request {
     pub seed: u64,
     /// Names and values of the kernel's specialisation constants.
     pub constants: Vec<(String, u32)>,
+    /// Names of the kernel's multisampled textures.
+    pub multisampled: Vec<String>,
 }
 
 impl Request {
+    /// How many samples each texel of a texture has to have: 4 if it is multisampled, else 1. For functions that make the
+    /// inputs of kernels of both kinds.
+    #[must_use]
+    pub fn samples(&self, texture: &str) -> u32 {
+        if self.multisampled.iter().any(|name| name == texture) {
+            4
+        } else {
+            1
+        }
+    }
+
     /// The value of a specialisation constant.
     #[must_use]
     pub fn constant(&self, name: &str) -> Option<u32> {

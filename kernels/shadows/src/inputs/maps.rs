@@ -625,41 +625,32 @@ pub fn shaded_warps(request: &Request) -> Vec<Given> {
         .collect()
 }
 
+/// The map of depths, with as many samples in each texel as the kernel's `depth` has.
+pub(super) fn with_depth(request: &Request, given: Given) -> Given {
+    with_samples(request, given, "depth", &samples())
+}
+
+/// A texture of one channel, with as many of these samples in each texel as the kernel's texture of that name has.
+pub(super) fn with_samples(request: &Request, given: Given, name: &str, all: &[f64]) -> Given {
+    let samples = request.samples(name);
+    let texels = all
+        .iter()
+        .step_by(SAMPLES / samples as usize)
+        .map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0));
+    given.texture(name, SIZE, samples, TexelFormat::R32Float, texels)
+}
+
 /// What shading with a map of depths reads.
 #[must_use]
 pub fn shaded_depths(request: &Request) -> Vec<Given> {
-    shaded_by(SAMPLES, request)
-}
-
-/// The same with one sample in each texel.
-#[must_use]
-pub fn shaded_single_depths(request: &Request) -> Vec<Given> {
-    shaded_by(1, request)
-}
-
-fn shaded_by(count: usize, request: &Request) -> Vec<Given> {
     let mut s = Source::new(request.seed);
-    let map = samples();
     [(0, false), (1, false), (3, false), (1, true)]
         .into_iter()
         .map(|(radius, is_spot)| {
-            let [world, normals, colours] = fragments(&mut s);
             let light = light(&SYMMETRIC_4_32, 0.0, 1e-3, radius);
             let light = if is_spot { spot(&light) } else { light };
-            Given::new("a map of depths")
-                .buffer("world", &world)
-                .buffer("normal", &normals)
-                .buffer("colour", &colours)
-                .uniform("light", &light)
-                .texture(
-                    "depth",
-                    SIZE,
-                    count as u32,
-                    TexelFormat::R32Float,
-                    map.iter()
-                        .step_by(SAMPLES / count)
-                        .map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
-                )
+            let given = fragments_in_light(&mut s, "a map of depths", &light);
+            with_depth(request, given)
         })
         .collect()
 }
@@ -675,22 +666,14 @@ pub fn weighted_depths(request: &Request) -> Vec<Given> {
     ];
     let given = shaded_depths(request).into_iter().zip(all);
     given
-        .map(|(given, weights)| given.buffer("weights", weights))
+        .map(|(given, weights)| given.uniform("taps", &Taps::new(IVec2::ZERO, weights)))
         .collect()
 }
 
-/// Depths of several samples; of one, for a kernel that does not ask how many there are.
+/// A map of depths.
 #[must_use]
 pub fn depths(request: &Request) -> Vec<Given> {
-    let count = match request.constant("samples") {
-        Some(_) => SAMPLES,
-        None => 1,
-    };
-    let texels = samples();
-    let texels = texels.iter().step_by(SAMPLES / count);
-    let texels = texels.map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0));
-    let given = Given::new("a map of depths");
-    [given.texture("depth", SIZE, count as u32, TexelFormat::R32Float, texels)].into()
+    [with_depth(request, Given::new("a map of depths"))].into()
 }
 
 /// [`depths`], and an exponent.

@@ -106,7 +106,7 @@ impl Camera {
     }
 
     /// The depth of each sample of each pixel.
-    fn surfaces(&self) -> Vec<Vec4> {
+    fn surfaces(&self) -> Vec<f64> {
         let [width, height] = SIZE.map(f64::from);
         let [near, far] = RANGE;
         let mut all = Vec::new();
@@ -118,7 +118,7 @@ impl Camera {
                     let y = (f64::from(y) + 0.5) / height * 2.0 - 1.0;
                     let end = self.end(self.way(x, y));
                     let z = (1.0 / end - 1.0 / near) / (1.0 / far - 1.0 / near);
-                    all.push(Vec4::new(z as f32, 0.0, 0.0, 0.0));
+                    all.push(z);
                 }
             }
         }
@@ -253,35 +253,17 @@ fn lit(
                 .uniform("view", &camera.view())
                 .uniform("medium", &medium)
                 .uniform("light", light)
-                .texture("picture", SIZE, 1, TexelFormat::Rgba32Float, picture)
-                .texture(
-                    "surfaces",
-                    SIZE,
-                    SAMPLES as u32,
-                    TexelFormat::R32Float,
-                    camera.surfaces(),
-                );
+                .texture("picture", SIZE, 1, TexelFormat::Rgba32Float, picture);
+            let given = maps::with_samples(request, given, "surfaces", &camera.surfaces());
             of(given, camera, &medium)
         })
         .collect()
 }
 
-/// With the map's samples.
-fn with_depth(given: Given) -> Given {
-    let map = maps::samples();
-    given.texture(
-        "depth",
-        SIZE,
-        SAMPLES as u32,
-        TexelFormat::R32Float,
-        map.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0)),
-    )
-}
-
 /// What marching along rays reads.
 #[must_use]
 pub fn marched(request: &Request) -> Vec<Given> {
-    pictures(request, |given, _, _| with_depth(given))
+    pictures(request, |given, _, _| maps::with_depth(request, given))
 }
 
 /// The same with a spot light: one above the map, one that does not fall off with the distance, and one that the
@@ -298,7 +280,7 @@ pub fn marched_spot(request: &Request) -> Vec<Given> {
         ..above
     };
     lit(request, &[above, even, near], |given, _, _| {
-        with_depth(given)
+        maps::with_depth(request, given)
     })
 }
 

@@ -4,14 +4,13 @@
 use std::vec;
 use std::vec::Vec;
 
-use hankel_dsl::glam::{UVec2, Vec2, Vec4};
-use hankel_dsl::native::describe::TexelFormat;
+use hankel_dsl::glam::{UVec2, Vec2};
 use hankel_dsl::native::inputs::{Given, Request, Source};
 use hankel_moments::bias::{SYMMETRIC_4_16_LECTURE, SYMMETRIC_6_16};
 use hankel_moments::{Moments4, Moments6, quantize_symmetric_4, quantize_symmetric_6};
 
 use super::maps::{self, SAMPLES, SIZE};
-use crate::soft::{Area, Halving, Level, POINT, Pyramid, PyramidLines};
+use crate::soft::{Area, Halving, Level, POINT, Points, Pyramid, PyramidLines};
 
 /// Lights from hardly more than a point to one whose penumbrae fill half of the map, the second and the third
 /// spot lights.
@@ -204,7 +203,7 @@ pub fn halved_6(_: &Request) -> Vec<Given> {
     to_halve(six)
 }
 
-/// Depths of several samples, and an empty table of `N` channels.
+/// Depths, and an empty table of `N` channels.
 fn to_resolve<const N: usize>(request: &Request) -> Vec<Given> {
     let empty = vec![[0_u32; N]; (SIZE[0] * SIZE[1]) as usize];
     let given = maps::depths(request).into_iter();
@@ -217,13 +216,13 @@ fn to_resolve<const N: usize>(request: &Request) -> Vec<Given> {
         .collect()
 }
 
-/// Depths of several samples, for four moments.
+/// Depths, for four moments.
 #[must_use]
 pub fn resolved(request: &Request) -> Vec<Given> {
     to_resolve::<4>(request)
 }
 
-/// Depths of several samples, for six.
+/// Depths, for six.
 #[must_use]
 pub fn resolved_6(request: &Request) -> Vec<Given> {
     to_resolve::<6>(request)
@@ -276,14 +275,9 @@ pub fn shaded_6(request: &Request) -> Vec<Given> {
 /// What variance soft shadow mapping reads.
 #[must_use]
 pub fn shaded_parts(request: &Request) -> Vec<Given> {
-    shaded_by(request, 2e-5, |given| with_depths(with_tables(given)))
-}
-
-/// Depths of several samples.
-fn with_depths(given: Given) -> Given {
-    let texels = maps::samples();
-    let texels = texels.iter().map(|&z| Vec4::new(z as f32, 0.0, 0.0, 0.0));
-    given.texture("depth", SIZE, SAMPLES as u32, TexelFormat::R32Float, texels)
+    shaded_by(request, 2e-5, |given| {
+        maps::with_depth(request, with_tables(given))
+    })
 }
 
 /// What percentage-closer soft shadows read.
@@ -295,11 +289,8 @@ pub fn searched(request: &Request) -> Vec<Given> {
             .map(|i| Vec2::new(part(i, 0.754_877_67) as f32, part(i, 0.569_840_3) as f32))
             .collect::<Vec<_>>()
     };
+    let points = Points::new(&points(16), &points(31));
     shaded_by(request, 0.0, |given| {
-        with_depths(
-            given
-                .buffer("search", &points(16))
-                .buffer("filter", &points(31)),
-        )
+        maps::with_depth(request, given).uniform("points", &points)
     })
 }

@@ -53,7 +53,7 @@ fn tiles(reach: i32) -> Vec<Bounds> {
         .collect()
 }
 
-/// Depths of several samples.
+/// Depths.
 #[must_use]
 pub fn depths(request: &Request) -> Vec<Given> {
     let across = across();
@@ -123,7 +123,7 @@ fn with_list(given: Given) -> Given {
         .texture("map", SIZE, 1, TexelFormat::Rgba16Unorm, texels)
 }
 
-/// A list of tiles and depths of several samples.
+/// A list of tiles and depths.
 #[must_use]
 pub fn listed_depths(request: &Request) -> Vec<Given> {
     maps::depths(request).into_iter().map(with_list).collect()

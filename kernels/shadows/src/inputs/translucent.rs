@@ -5,9 +5,7 @@ use std::vec::Vec;
 use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source};
-use hankel_moments::{
-    Moments4, Moments6, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
-};
+use hankel_moments::{Moments6, quantize_symmetric_6};
 
 use super::maps::{self, SAMPLES, SIZE};
 use crate::shade::encoding;
@@ -26,40 +24,67 @@ fn panes() -> impl Iterator<Item = impl Iterator<Item = [f64; 3]>> {
     })
 }
 
-fn texture(given: Given, name: &str, texels: impl IntoIterator<Item = Vec4>) -> Given {
-    given.texture(name, SIZE, SAMPLES as u32, TexelFormat::Rgba16Float, texels)
+/// A texture of these samples, as many in each texel as the kernel's texture of that name has.
+fn texture(
+    request: &Request,
+    given: Given,
+    name: &str,
+    all: impl IntoIterator<Item = Vec4>,
+) -> Given {
+    let samples = request.samples(name);
+    let texels = all.into_iter().step_by(SAMPLES / samples as usize);
+    given.texture(name, SIZE, samples, TexelFormat::Rgba16Float, texels)
 }
 
-/// Depths of opaque surfaces, and what is blended before them, for the kernel's `encoding`.
-#[must_use]
-pub fn blended(request: &Request) -> Vec<Given> {
-    let is_unit = request.constant("encoding") == Some(encoding::UNIT);
-    let of = |z: f64| {
-        if is_unit {
-            quantize_unit_4(Moments4::of_depth(z))
-        } else {
-            quantize_symmetric_4(Moments4::of_depth(2.0 * z - 1.0))
-        }
-    };
+/// Depths of opaque surfaces, and four moments that are blended before them, as a map has them that is stored as `how`
+/// says.
+fn blended(request: &Request, how: u32) -> Vec<Given> {
     halves(request, |second, z| {
-        let q = of(z);
-        if second {
-            [q.b, q.a, 0.0]
-        } else {
-            [q.r, q.g, 0.0]
-        }
+        let [x, y, z, w] = maps::channels(how, z);
+        if second { [z, w, 0.0] } else { [x, y, 0.0] }
     })
 }
 
-/// The same with six moments.
+/// Of depths in [0, 1], in the optimised basis.
 #[must_use]
-pub fn blended_6(request: &Request) -> Vec<Given> {
+pub fn blended_unit(request: &Request) -> Vec<Given> {
+    blended(request, encoding::UNIT)
+}
+
+/// Of depths in [-1, 1], in the optimised basis.
+#[must_use]
+pub fn blended_symmetric(request: &Request) -> Vec<Given> {
+    blended(request, encoding::SYMMETRIC)
+}
+
+/// Of depths in [-1, 1], as they are.
+#[must_use]
+pub fn blended_plain(request: &Request) -> Vec<Given> {
+    blended(request, encoding::PLAIN)
+}
+
+/// Six moments in the optimised basis.
+#[must_use]
+pub fn blended_symmetric_6(request: &Request) -> Vec<Given> {
     halves(request, |second, z| {
         let q = quantize_symmetric_6(Moments6::of_depth(2.0 * z - 1.0));
         if second {
             [q.r1, q.g1, q.b1]
         } else {
             [q.r0, q.g0, q.b0]
+        }
+    })
+}
+
+/// Six moments as they are.
+#[must_use]
+pub fn blended_plain_6(request: &Request) -> Vec<Given> {
+    halves(request, |second, z| {
+        let m = Moments6::of_depth(2.0 * z - 1.0);
+        if second {
+            [m.b2, m.b4, m.b6]
+        } else {
+            [m.b1, m.b3, m.b5]
         }
     })
 }
@@ -79,8 +104,8 @@ fn halves(request: &Request, of: impl Fn(bool, f64) -> [f64; 3]) -> Vec<Given> {
     };
     maps::depths(request)
         .into_iter()
-        .map(|given| texture(given, "first", half(false)))
-        .map(|given| texture(given, "second", half(true)))
+        .map(|given| texture(request, given, "first", half(false)))
+        .map(|given| texture(request, given, "second", half(true)))
         .collect()
 }
 
@@ -137,6 +162,6 @@ pub fn shaded(request: &Request) -> Vec<Given> {
     let kept: Vec<Vec4> = kept.collect();
     maps::shaded_depths(request)
         .into_iter()
-        .map(|given| texture(given, "kept", kept.iter().copied()))
+        .map(|given| texture(request, given, "kept", kept.iter().copied()))
         .collect()
 }

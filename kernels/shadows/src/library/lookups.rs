@@ -8,7 +8,7 @@ use hankel_moments::{FixedPoint, Moments4, quantize_symmetric_4};
 use super::store::{channels, fixed, moments_of_depth, quantize_symmetric_four, symmetric_depth};
 use crate::grid::within;
 use crate::mips::Footprint;
-use crate::resolve::mean_of;
+use crate::samples::mean_of;
 use crate::soft::{Area, region};
 
 /// A texel of a map of moments (\[BHS\], lecture, "Generate a moment shadow map"): the mean of the first four

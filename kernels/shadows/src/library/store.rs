@@ -15,7 +15,7 @@ fn moments(m: Moments4<f32>) -> Vec4 {
 }
 
 #[inline(always)]
-pub(super) fn channels(q: Quantized4<f32>) -> Vec4 {
+pub(crate) fn channels(q: Quantized4<f32>) -> Vec4 {
     Vec4::new(q.r, q.g, q.b, q.a)
 }
 
