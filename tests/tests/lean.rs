@@ -44,6 +44,21 @@ fn kernels_have_the_branches_of_their_source() {
     }
 }
 
+/// A `for` loop over a range costs what the same loop by `while` does.
+#[test]
+fn for_costs_what_while_costs() {
+    let iteration = Crate::iteration();
+    for name in ["counted", "window"] {
+        let cost = |by: &str| of(&iteration, &format!("{name}_by_{by}"));
+        let (by_for, by_while) = (cost("for"), cost("while"));
+        println!("{name}: for {by_for:?}, while {by_while:?}");
+        assert!(
+            by_for.operations <= by_while.operations && by_for.branches <= by_while.branches,
+            "{name}: for {by_for:?}, while {by_while:?}"
+        );
+    }
+}
+
 /// NaN tests and bounds checks would show in the text.
 #[test]
 fn generated_texts_test_nothing_but_the_guard() {

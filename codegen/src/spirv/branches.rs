@@ -15,6 +15,9 @@ use super::{id, op};
 /// How many operations back a value is looked for.
 const DEPTH: u32 = 8;
 
+/// How many blocks in a row a branch is looked back from.
+const MOST_BLOCKS: usize = 8;
+
 /// What is known of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Known {
@@ -443,12 +446,11 @@ impl<'a> Graph<'a> {
         facts
     }
 
-    /// A value behind the edge from `from` to `to`, or at the end of `from`.
+    /// A value at the end of a way through some blocks, each of which leads to the next one.
     fn value(
         &self,
         value: Word,
-        from: usize,
-        to: Option<usize>,
+        way: &[usize],
         facts: &HashMap<Word, Known>,
         depth: u32,
     ) -> Option<Known> {
@@ -457,17 +459,19 @@ impl<'a> Graph<'a> {
         }
         let depth = depth.checked_sub(1)?;
         let (block, it) = *self.made.get(&value)?;
-        let operand = |place| self.value(id(it, place)?, from, to, facts, depth);
+        let operand = |place| self.value(id(it, place)?, way, facts, depth);
         let truth = |place| match operand(place)? {
             Known::Truth(truth) => Some(truth),
             Known::Number(_) => None,
         };
         let is_equal = || Some(operand(0)? == operand(1)?);
         match op(it) {
-            Op::Phi if Some(block) == to => {
-                let coming = incoming(it, self.function.blocks[from].label_id()?)?;
-                // What comes along the edge was there at the end of `from`.
-                self.value(coming, from, None, facts, depth)
+            Op::Phi => {
+                let place = way.iter().position(|it| *it == block)?;
+                let before = *way.get(place.checked_sub(1)?)?;
+                let coming = incoming(it, self.function.blocks[before].label_id()?)?;
+                // What comes from there was there at its end.
+                self.value(coming, &way[..place], facts, depth)
             }
             Op::CopyObject => operand(0),
             Op::LogicalNot => Some(Known::Truth(!truth(0)?)),
@@ -494,48 +498,59 @@ impl<'a> Graph<'a> {
             let End::Conditional(condition, yes, no) = *end else {
                 continue;
             };
-            let through = self.row_to(number);
-            let into = through[0];
-            let before = &self.before[into];
-            let mut instructions = self.instructions(&through);
-            if yes == no || before.len() < 2 || !instructions.all(may_be_left_out) {
+            if yes == no {
                 continue;
             }
-            let Some(found) = self.loop_of(into) else {
-                continue;
-            };
-            for from in before.iter().copied() {
-                let is_alike = self
-                    .loop_of(from)
-                    .is_some_and(|it| it.header == found.header);
-                if !is_alike
-                    || self.dominates(found.continues, from)
-                    || self.before[found.merge].contains(&from)
-                    || matches!(self.ends[from], End::Other)
-                    || self.is_in_switch(found, from)
-                {
+            let mut rows = vec![self.row_to(number)];
+            while let Some(through) = rows.pop() {
+                let into = through[0];
+                let before = &self.before[into];
+                let mut instructions = self.instructions(&through);
+                if before.len() < 2 || !instructions.all(may_be_left_out) {
                     continue;
                 }
-                let facts = self.facts(from, Some(into));
-                let Some(Known::Truth(truth)) =
-                    self.value(condition, from, Some(into), &facts, DEPTH)
-                else {
+                let Some(found) = self.loop_of(into) else {
                     continue;
                 };
-                let (last, to) = self.behind(number, if truth { yes } else { no });
-                if to != found.merge {
-                    continue;
-                }
-                let blocks = 0..self.function.blocks.len();
-                let exit = Exit {
-                    from,
-                    through: through.clone(),
-                    last,
-                    to,
-                    inside: blocks.filter(|block| self.is_in(found, *block)).collect(),
-                };
-                if self.can_be_made(&exit) {
-                    return Some(exit);
+                for from in before.iter().copied() {
+                    let is_alike = self
+                        .loop_of(from)
+                        .is_some_and(|it| it.header == found.header);
+                    if !is_alike
+                        || self.dominates(found.continues, from)
+                        || self.before[found.merge].contains(&from)
+                        || matches!(self.ends[from], End::Other)
+                        || self.is_in_switch(found, from)
+                    {
+                        continue;
+                    }
+                    let facts = self.facts(from, Some(into));
+                    let way: Vec<usize> = [from].into_iter().chain(through.clone()).collect();
+                    let Some(Known::Truth(truth)) = self.value(condition, &way, &facts, DEPTH)
+                    else {
+                        // It may be known where ways come together before.
+                        let is_joint = self.before[from].len() > 1
+                            && matches!(self.ends[from], End::Branch(_));
+                        if is_joint && way.len() <= MOST_BLOCKS && !through.contains(&from) {
+                            rows.push(way);
+                        }
+                        continue;
+                    };
+                    let (last, to) = self.behind(found, number, if truth { yes } else { no });
+                    if to != found.merge {
+                        continue;
+                    }
+                    let blocks = 0..self.function.blocks.len();
+                    let exit = Exit {
+                        from,
+                        through: through.clone(),
+                        last,
+                        to,
+                        inside: blocks.filter(|block| self.is_in(found, *block)).collect(),
+                    };
+                    if self.can_be_made(&exit) {
+                        return Some(exit);
+                    }
                 }
             }
         }
@@ -562,7 +577,17 @@ impl<'a> Graph<'a> {
             let Some((block, it)) = self.made.get(&value) else {
                 continue;
             };
-            if !exit.through.contains(block) || op(it) == Op::Phi || !seen.insert(value) {
+            let Some(place) = exit.through.iter().position(|it| it == block) else {
+                continue;
+            };
+            if !seen.insert(value) {
+                continue;
+            }
+            if op(it) == Op::Phi {
+                // From the first block's phis comes what was made before.
+                let before = place.checked_sub(1).map(|it| exit.through[it]);
+                let label = before.and_then(|it| blocks[it].label_id());
+                left.extend(label.and_then(|label| incoming(it, label)));
                 continue;
             }
             if !may_be_repeated(it) {
@@ -605,11 +630,12 @@ impl<'a> Graph<'a> {
             .flat_map(|block| &function.blocks[*block].instructions)
     }
 
-    /// Where a way leads that goes on through blocks that do nothing, and the block before.
-    fn behind(&self, mut last: usize, mut to: usize) -> (usize, usize) {
+    /// Where a way leads that goes on through blocks that do nothing, up to the end of a loop, and the block before.
+    fn behind(&self, found: &Loop, mut last: usize, mut to: usize) -> (usize, usize) {
         for _ in 0..self.ends.len() {
+            let is_empty = self.function.blocks[to].instructions.len() == 1;
             match self.ends[to] {
-                End::Branch(next) if self.function.blocks[to].instructions.len() == 1 => {
+                End::Branch(next) if is_empty && to != found.merge => {
                     last = to;
                     to = next;
                 }
@@ -634,7 +660,7 @@ impl<'a> Graph<'a> {
                 return None;
             };
             let found = self.loop_of(block)?;
-            let leaves = |to| self.behind(block, to).1 == found.merge;
+            let leaves = |to| self.behind(found, block, to).1 == found.merge;
             let on = match (leaves(yes), leaves(no)) {
                 (true, false) => no,
                 (false, true) => yes,
@@ -676,7 +702,7 @@ impl<'a> Graph<'a> {
                     } else if here.is_empty() {
                         None
                     } else {
-                        self.value(value, block, None, &here, DEPTH)
+                        self.value(value, &[block], &here, DEPTH)
                     };
                     if let Some(Known::Truth(truth)) = known {
                         settled.push((block, place, operand, truth));
@@ -693,8 +719,8 @@ impl<'a> Graph<'a> {
         let mut before = self.before[block].iter().copied();
         let from = before.find(|it| self.function.blocks[*it].label_id() == Some(label))?;
         let facts = self.facts(from, Some(block));
-        // `to` is no place for values of other phis here: they are those of the turn before.
-        self.value(value, from, None, &facts, DEPTH)
+        // Values of other phis here are those of the turn before.
+        self.value(value, &[from], &facts, DEPTH)
     }
 }
 
@@ -778,10 +804,14 @@ fn leave(module: &mut Module, number: usize, exit: &Exit) {
     let label = |block: usize| function.blocks[block].label_id().unwrap_or_default();
     let into = exit.through[0];
     let [from, through, last, to] = [exit.from, into, exit.last, exit.to].map(label);
-    let blocks = exit.through.iter().map(|block| &function.blocks[*block]);
+    // Each block with the label of the one before it.
+    let before = [exit.from].into_iter().chain(exit.through.iter().copied());
+    let blocks = before.zip(&exit.through).flat_map(|(before, block)| {
+        let instructions = function.blocks[*block].instructions.iter();
+        instructions.map(move |it| (label(before), it.clone()))
+    });
     let mut copies = Copies {
-        instructions: blocks.flat_map(|it| it.instructions.clone()).collect(),
-        from,
+        instructions: blocks.collect(),
         bound,
         known: HashMap::new(),
         made: Vec::new(),
@@ -790,7 +820,7 @@ fn leave(module: &mut Module, number: usize, exit: &Exit) {
     let own: Vec<(Word, Option<Word>)> = copies
         .instructions
         .iter()
-        .filter_map(|it| Some((it.result_id?, it.result_type)))
+        .filter_map(|(_, it)| Some((it.result_id?, it.result_type)))
         .collect();
     let before: Vec<Word> = function
         .blocks
@@ -875,8 +905,8 @@ fn replace(it: &mut Instruction, value: Word, new: Word, outside: &HashSet<Word>
 
 /// What some blocks make, made at the end of one that comes before them.
 struct Copies {
-    instructions: Vec<Instruction>,
-    from: Word,
+    /// Each with the block that comes before its own.
+    instructions: Vec<(Word, Instruction)>,
     bound: Word,
     known: HashMap<Word, Word>,
     made: Vec<Instruction>,
@@ -894,11 +924,11 @@ impl Copies {
             return *found;
         }
         let mut made = self.instructions.iter();
-        let Some(it) = made.find(|it| it.result_id == Some(value)).cloned() else {
+        let Some((before, it)) = made.find(|(_, it)| it.result_id == Some(value)).cloned() else {
             return value;
         };
         let found = if op(&it) == Op::Phi {
-            incoming(&it, self.from).unwrap_or(value)
+            incoming(&it, before).map_or(value, |coming| self.of(coming))
         } else {
             let mut copy = it;
             for operand in &mut copy.operands {
@@ -988,6 +1018,46 @@ mod tests {
         );
         assert_eq!(count(&all, Op::BranchConditional), 1, "{all:?}");
         assert_eq!(count(&all, Op::BitwiseXor), 1, "{all:?}");
+    }
+
+    #[test]
+    fn a_break_leaves_a_loop_over_a_range_at_once() {
+        // As rust-gpu has it: whether the loop goes on is chosen in two branches, one within the other.
+        let all = optimised(
+            "var next = 0u;
+             loop {
+                 var on = false;
+                 if next < n {
+                     let here = sum ^ next;
+                     if here != 7u { sum = here * 3u; on = true; }
+                     next = next + 1u;
+                 }
+                 if !on { break; }
+             }",
+        );
+        assert_eq!(count(&all, Op::BranchConditional), 2, "{all:?}");
+        assert_eq!(count(&all, Op::LogicalNot), 0, "{all:?}");
+    }
+
+    #[test]
+    fn a_loop_within_a_loop_ends_where_its_range_does() {
+        // Behind the inner loop there is nothing but the next turn of the outer one.
+        let all = optimised(
+            "for (var row = 0u; row < n; row++) {
+                 var next = 0u;
+                 loop {
+                     var on = false;
+                     if next < row {
+                         let here = sum ^ next;
+                         if here != 7u { sum = here * 3u; on = true; }
+                         next = next + 1u;
+                     }
+                     if !on { break; }
+                 }
+             }",
+        );
+        assert_eq!(count(&all, Op::BranchConditional), 3, "{all:?}");
+        assert_eq!(count(&all, Op::LogicalNot), 0, "{all:?}");
     }
 
     #[test]

@@ -14,10 +14,12 @@ use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
 mod adapters;
 mod idioms;
 mod integers;
+mod loops;
 
 use adapters::*;
 use idioms::*;
 use integers::*;
+use loops::*;
 
 hankel_dsl::kernels![
     walked,
@@ -62,6 +64,10 @@ hankel_dsl::kernels![
     again,
     sieved,
     in_bytes,
+    counted_by_for,
+    counted_by_while,
+    window_by_for,
+    window_by_while,
 ];
 
 /// Four numbers four times: by reference in two ways, by value, and from the end.
