@@ -57,7 +57,12 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     widths::mend(&mut module);
     narrow::widen(&mut module, name).map_err(placed)?;
     // What is left may be resolved by spirv-opt, unless it is invalid.
-    let (has_references, left) = references::resolve(&mut module, name);
+    let (mut has_references, mut left) = references::resolve(&mut module, name);
+    while references::forward_stores(&mut module) {
+        let (has_more, still) = references::resolve(&mut module, name);
+        has_references |= has_more;
+        left = still;
+    }
     validate(&spirv::store(&module), name).map_err(|invalid| left.map_or(invalid, placed))?;
     refused::check(&module, name).map_err(placed)?;
     canonical::order(&mut module);

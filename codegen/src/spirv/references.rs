@@ -45,6 +45,97 @@ pub fn resolve(module: &mut Module, kernel: &str) -> (bool, Option<Failure>) {
     (changed, left)
 }
 
+/// Forwards stores to loads, of variables that hold a pointer and are written once: rust-gpu keeps them
+/// where one closure holds another one that holds a reference. A shader's variables hold no pointers. Tells whether there
+/// was one.
+pub fn forward_stores(module: &mut Module) -> bool {
+    let mut holders: HashSet<Word> = HashSet::new();
+    for it in module
+        .types_global_values
+        .iter()
+        .filter(|it| op(it) == Op::TypePointer)
+    {
+        let pointee = id(it, 1).and_then(|ty| super::global(module, ty));
+        let is_pointer = pointee.is_some_and(|it| op(it) == Op::TypePointer);
+        if let (true, Some(ty)) = (is_pointer, it.result_id) {
+            holders.insert(ty);
+        }
+    }
+    let mut removed: HashSet<Word> = HashSet::new();
+    for function in &mut module.functions {
+        // The variable that each name stands for, and what is written to it.
+        let mut variables: HashMap<Word, Word> = HashMap::new();
+        let mut written: HashMap<Word, Vec<Word>> = HashMap::new();
+        for it in function.all_inst_iter() {
+            let (Some(result), Some(ty)) = (it.result_id, it.result_type) else {
+                continue;
+            };
+            match op(it) {
+                Op::Variable if holders.contains(&ty) && it.operands.len() == 1 => {
+                    variables.insert(result, result);
+                    written.insert(result, Vec::new());
+                }
+                Op::CopyObject => {
+                    let variable = id(it, 0).and_then(|of| variables.get(&of).copied());
+                    variables.extend(variable.map(|variable| (result, variable)));
+                }
+                _ => {}
+            }
+        }
+        for it in function.all_inst_iter() {
+            for (place, operand) in it.operands.iter().enumerate() {
+                let Some(variable) = operand.id_ref_any().and_then(|it| variables.get(&it)) else {
+                    continue;
+                };
+                match (op(it), place) {
+                    (Op::Load | Op::CopyObject, 0) => {}
+                    (Op::Store, 0) => {
+                        let all = written.get_mut(variable).into_iter();
+                        all.for_each(|all| all.extend(id(it, 1)));
+                    }
+                    _ => {
+                        written.remove(variable);
+                    }
+                }
+            }
+        }
+        written.retain(|_, values| values.len() == 1);
+        if written.is_empty() {
+            continue;
+        }
+        let held = |it: &Instruction| {
+            let variable = variables.get(&id(it, 0)?)?;
+            written.get(variable)?.first().copied()
+        };
+        for block in &mut function.blocks {
+            block.instructions.retain_mut(|it| {
+                let is_gone = match op(it) {
+                    Op::Variable | Op::CopyObject => it
+                        .result_id
+                        .and_then(|name| variables.get(&name))
+                        .is_some_and(|variable| written.contains_key(variable)),
+                    Op::Store => held(it).is_some(),
+                    Op::Load => {
+                        if let Some(value) = held(it) {
+                            let (ty, result) = (it.result_type, it.result_id);
+                            let value = vec![Operand::IdRef(value)];
+                            *it = Instruction::new(Op::CopyObject, ty, result, value);
+                        }
+                        false
+                    }
+                    _ => false,
+                };
+                removed.extend(it.result_id.filter(|_| is_gone));
+                !is_gone
+            });
+        }
+    }
+    let is_there = |it: &Instruction| id(it, 0).is_none_or(|of| !removed.contains(&of));
+    module.debug_names.retain(is_there);
+    module.annotations.retain(is_there);
+    !removed.is_empty()
+}
+
 /// Makes each pointer into a variable of the function in the block where it is used: one of several blocks would be a
 /// variable of its own to naga, which cannot hold a pointer.
 pub fn near(module: &mut Module) {
@@ -660,6 +751,37 @@ mod tests {
         validate(&store(&taken), "k").unwrap();
         // That of the structures is left to spirv-opt.
         assert_eq!(count(&taken, Op::Phi), 2);
+    }
+
+    #[test]
+    fn a_variable_that_holds_a_pointer_is_what_was_written_to_it() {
+        let mut held = module(
+            [&|b, it| element(b, it, 0, it.one), &|b, it| {
+                element(b, it, 0, it.index)
+            }],
+            |it| it.pointer,
+            |b, it, both| {
+                let ty = b.type_pointer(None, StorageClass::Function, it.pointer);
+                let holder = b.variable(ty, None, StorageClass::Function, None);
+                b.name(holder, "closure");
+                b.store(holder, both, None, []).unwrap();
+                let same = b.copy_object(ty, None, holder).unwrap();
+                b.load(it.pointer, None, same, None, []).unwrap()
+            },
+        );
+        // A variable has to be in the first block.
+        let blocks = &mut held.functions[0].blocks;
+        let all = &mut blocks[3].instructions;
+        let place = all.iter().position(|it| op(it) == Op::Variable).unwrap();
+        let holder = all.remove(place);
+        blocks[0].instructions.insert(0, holder);
+        resolve(&mut held, "k");
+        assert!(forward_stores(&mut held));
+        assert!(!forward_stores(&mut held));
+        resolve(&mut held, "k");
+        validate(&store(&held), "k").unwrap();
+        assert_eq!(count(&held, Op::Variable), 2);
+        assert_eq!(count(&held, Op::Store), 1);
     }
 
     #[test]

@@ -118,6 +118,7 @@ hankel_dsl::kernels![
     texels::faces_lit,
     texels::sample_count,
     sampling::behind_an_index,
+    sampling::held_twice,
     sampling::levels,
     sampling::level_count,
     sampling::trilinear,

@@ -156,6 +156,39 @@ pub fn behind_an_index(
     source.sample(sampler, uv) * tint
 }
 
+/// What `of` gives for the numbers below `count`, which is 1 at least.
+fn sum(count: u32, of: impl Fn(u32) -> Vec4) -> Vec4 {
+    let mut sum = of(0);
+    let mut i = 1;
+    while i < count {
+        sum += of(i);
+        i += 1;
+    }
+    sum
+}
+
+/// A closure that looks a texture up, held by two others.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    parity(non_finite, why = "sums of absurd colours overflow")
+)]
+pub fn held_twice(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(16, 16)]
+    source: Texture2d<'_>,
+) -> Vec4 {
+    let texel = |i: u32| {
+        let texel = source.load(UVec2::new((at.x ^ i) & 15, at.y & 15));
+        [texel, texel * 2.0]
+    };
+    let even = sum((at.x & 3) + 1, |i| texel(2 * i)[0]);
+    let odd = sum(3, |i| texel(2 * i + 1)[1]);
+    even + odd
+}
+
 /// A texture by the level that neighbouring fragments make, and by the next one.
 #[kernel(fragment)]
 pub fn receding(
