@@ -182,7 +182,7 @@ pub fn held_twice(
 ) -> Vec4 {
     let texel = |i: u32| {
         let texel = source.load(UVec2::new((at.x ^ i) & 15, at.y & 15));
-        [texel, texel * 2.0]
+        [texel, Vec4::new(texel.w, texel.z, texel.y, texel.x)]
     };
     let even = sum((at.x & 3) + 1, |i| texel(2 * i)[0]);
     let odd = sum(3, |i| texel(2 * i + 1)[1]);
