@@ -7,7 +7,7 @@ use hankel_dsl::glam::{IVec2, UVec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::layout::Element;
 use hankel_dsl::native::{Address, Filter, Sampler};
-use hankel_host::device::Blend;
+use hankel_host::device::{Blend, Format};
 use hankel_moments::Fixed6;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32, UNIT_4_16};
 use hankel_shadows::blur::Taps;
@@ -349,7 +349,7 @@ pub fn resolve<'g>(
     kernel: impl Into<Cow<'static, str>>,
 ) -> AddCompute<'g> {
     let format = given.shadow.map.format;
-    if !format.is_integer() && format.bytes() == 4 * format.channels() {
+    if Format::Texel(format).has_32_bit_floats() {
         graph.omit("quantisation", "32 bits hold what is filtered as it is");
     }
     graph.compute("resolve", kernel)

@@ -455,7 +455,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Whether every device can blend into a target of so many samples, and whether the depth before which that is done
+    /// Whether devices can blend into a target of so many samples, and whether the depth before which that is done
     /// is one of its own samples.
     pub(super) fn check_blend(
         &self,
