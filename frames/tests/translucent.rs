@@ -466,7 +466,7 @@ fn darker(picture: &Arriving, truth: &Arriving) -> f32 {
 /// Also of glass, moments give lower bounds: nowhere darker than the same filter over lists of all surfaces in
 /// each sample, but for the bias, which may be all shadow, and what rounding does to the bound. Hausdorff bounds of
 /// depths in [0, 1] jump where a surface of few lies at the receiver, whatever the bias: of four samples, what rounding to
-/// 16 bits makes of that is measured (0.0099). Of one sample it is 0.31, also without glass: docs/frames.md says so, and
+/// 16 bits makes of that is measured (0.0099). Of one sample it is more, also without glass: docs/frames.md says so, and
 /// that map is not among these.
 #[test]
 fn blended_moments_are_nowhere_darker_than_all_surfaces_filtered() {
