@@ -301,8 +301,12 @@ impl Ir {
         let name = kernel.name.as_str();
         let dropped = Dropped::of(&spirv);
         let bytes = spirv::bytes(&spirv::store(&spirv));
-        let mut module = guarded(|| parse(&bytes, name), name, Step::Parse)?;
-        cleanup::restore_sampling(&mut module, &dropped.sampling);
+        let read = || {
+            let mut module = parse(&bytes, name)?;
+            cleanup::restore_sampling(&mut module, &dropped.sampling);
+            Ok(module)
+        };
+        let mut module = guarded(read, name, Step::Parse)?;
         let check = || {
             let info = validate(&module, name)?;
             extent::split_expressions(&mut module, &info);
@@ -433,14 +437,14 @@ impl Ir {
         if let Some(reason) = self.unsupported(language, kernel, options) {
             return Ok(Written::Unsupported(reason));
         }
-        let ir = self.in_words_of(language, kernel)?;
+        let step = Step::Write(language);
+        let ir = guarded(|| self.in_words_of(language, kernel), &self.kernel, step)?;
         let job = Job {
             ir: &ir,
             kernel,
             options,
             language,
         };
-        let step = Step::Write(language);
         let mut written = guarded(
             || match language {
                 Language::Spirv => Ok(Written::Unsupported("SPIR-V is not written again".into())),

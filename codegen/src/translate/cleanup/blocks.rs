@@ -2,7 +2,7 @@
 
 use naga::{AddressSpace, Expression, GlobalVariable, Handle, Module, Statement, Type, TypeInner};
 
-use super::walk::{each_statement, functions, functions_mut, mend_emits};
+use super::walk::{each_statement, functions, functions_mut, mend_emits, replace_type};
 
 /// Buffers whose type is a structure with one member become that member.
 pub fn unwrap_blocks(module: &mut Module) {
@@ -45,7 +45,7 @@ pub fn unwrap_blocks(module: &mut Module) {
                 name: Some(name),
                 ..module.types[content].clone()
             };
-            module.types.replace(content, named);
+            replace_type(module, content, named);
         }
     }
 }

@@ -5,6 +5,8 @@
 use hankel_dsl::native::layout::COLUMNS;
 use naga::{Handle, Module, Scalar, Type, TypeInner, VectorSize};
 
+use super::walk::replace_type;
+
 /// Replaces the structures. What accesses a member accesses a column by the same number then.
 pub fn matrix_types(module: &mut Module) {
     let found: Vec<Handle<Type>> = module
@@ -24,7 +26,7 @@ pub fn matrix_types(module: &mut Module) {
                 scalar: Scalar::F32,
             },
         };
-        module.types.replace(columns, matrix);
+        replace_type(module, columns, matrix);
     }
 }
 

@@ -3,6 +3,8 @@
 use naga::valid::FunctionInfo;
 use naga::{Expression, FunctionResult, Handle, ImageQuery, Module, Type, TypeInner};
 
+use super::walk::replace_type;
+
 /// Names the structure that a vertex or fragment stage with several outputs returns.
 pub fn name_result(module: &mut Module, name: &str, members: &[String]) {
     let Some(FunctionResult { ty, .. }) = module
@@ -26,7 +28,7 @@ pub fn name_result(module: &mut Module, name: &str, members: &[String]) {
         field.name = Some(member.clone());
     }
     named.name = Some(name.into());
-    module.types.replace(ty, named);
+    replace_type(module, ty, named);
 }
 
 /// Names loaded values after the member, structure, variable or texture that they come from.

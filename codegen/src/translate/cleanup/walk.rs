@@ -1,6 +1,6 @@
 //! Ways through naga's trees that every step of the clean-up takes.
 
-use naga::{Arena, Block, Expression, Handle, LocalVariable, Module, Range, Statement};
+use naga::{Arena, Block, Expression, Handle, LocalVariable, Module, Range, Statement, Type};
 
 /// Visits every statement of a block, and of the blocks within it.
 pub(crate) fn each_statement(block: &Block, visit: &mut impl FnMut(&Statement)) {
@@ -31,6 +31,18 @@ pub(crate) fn each_within(statement: &Statement, visit: &mut impl FnMut(&Stateme
         }
         _ => {}
     }
+}
+
+/// Puts one type into another's place. naga has each type once, and its own `replace` panics where the module has the
+/// new one already: that gets another name here.
+pub fn replace_type(module: &mut Module, old: Handle<Type>, mut new: Type) {
+    if module.types[old] == new {
+        return;
+    }
+    while module.types.get(&new).is_some() {
+        new.name.get_or_insert_default().push('_');
+    }
+    module.types.replace(old, new);
 }
 
 /// Expressions that stand for a declaration are not emitted: takes those out of the ranges that
