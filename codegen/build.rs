@@ -17,6 +17,9 @@ const TOOLS: [&str; 4] = [
     "spirv-tools-sys",
 ];
 
+/// The ends of the names of what becomes a part of the program.
+const COMPILED: [&str; 4] = [".rs", ".hlsl", ".patch", ".txt"];
+
 fn main() {
     let here = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
     let lock = here
@@ -58,7 +61,7 @@ fn main() {
     }
 }
 
-/// Every Rust file and patch below a folder, by its path with `/`, with `\n` at the ends of lines.
+/// Every file that is compiled below a folder, by its path with `/`, with `\n` at the ends of lines.
 fn sources(root: &Path) -> BTreeMap<String, String> {
     fn walk(folder: &Path, prefix: &str, found: &mut BTreeMap<String, String>) {
         for entry in std::fs::read_dir(folder).expect("src can be read") {
@@ -67,8 +70,7 @@ fn sources(root: &Path) -> BTreeMap<String, String> {
             let path = entry.path();
             if path.is_dir() {
                 walk(&path, &format!("{prefix}{name}/"), found);
-            } else if (name.ends_with(".rs") || name.ends_with(".patch")) && !name.starts_with('.')
-            {
+            } else if COMPILED.iter().any(|end| name.ends_with(end)) && !name.starts_with('.') {
                 let text = std::fs::read_to_string(&path).expect("sources can be read");
                 found.insert(format!("{prefix}{name}"), text.replace("\r\n", "\n"));
             }

@@ -3,6 +3,7 @@
 //! This crate parses arguments and prints; the work is done by `hankel-codegen`, `hankel-host` and
 //! `hankel-toolchain`.
 
+mod ahead;
 mod args;
 mod commands;
 mod depfile;

@@ -13,7 +13,7 @@ use std::process::Command;
 use std::str::FromStr;
 use std::time::Duration;
 
-use hankel_codegen::build::{Modules, Request};
+use hankel_codegen::build::{Generated, Modules, Request, generate, generate_kept};
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
 use hankel_codegen::diff;
@@ -23,14 +23,17 @@ use hankel_codegen::manifest::WriteOptions;
 use hankel_codegen::placement::Placement;
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
-use hankel_codegen::{Error, Language};
+use hankel_codegen::{Error, Language, translated};
 use hankel_dsl::native::describe::Kernel;
 use hankel_dsl::native::lanes;
 use hankel_host::crates::{KernelCrate, KernelEntry, Native};
 use hankel_host::inputs::{self, Case};
 use hankel_host::worker::Worker;
+use hankel_toolchain::Toolchain;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
+use serde::Deserialize;
 
+use crate::ahead::Ahead;
 use crate::args::{Generate, Placed};
 use crate::failure::{Failure, Result};
 use crate::print;
@@ -61,6 +64,8 @@ pub struct Session {
     linked: bool,
     /// Its Cargo.toml; `None` for the built-in kernels outside of a checkout.
     manifest: Option<PathBuf>,
+    /// Its SPIR-V, if that is being compiled.
+    ahead: RefCell<Option<Ahead>>,
     quiet: bool,
 }
 
@@ -72,12 +77,23 @@ impl Session {
             krate: built_in(),
             linked: true,
             manifest: None,
+            ahead: RefCell::new(None),
             quiet,
         }
     }
 
     /// Opens the crate at `manifest`, or else the built-in one.
     pub fn open(manifest: Option<&Path>, quiet: bool) -> Result<Self> {
+        Self::begin(manifest, false, quiet)
+    }
+
+    /// The same, to generate all kernels, or those that fit one of `filter`. All are compiled to SPIR-V while the crate
+    /// is asked what they are, where it is known that both must be done.
+    pub fn to_generate(manifest: Option<&Path>, filter: &[String], quiet: bool) -> Result<Self> {
+        Self::begin(manifest, filter.is_empty(), quiet)
+    }
+
+    fn begin(manifest: Option<&Path>, all: bool, quiet: bool) -> Result<Self> {
         let manifest = match manifest {
             Some(path) if path.is_dir() => Some(path.join("Cargo.toml")),
             Some(path) => Some(path.to_owned()),
@@ -93,11 +109,15 @@ impl Session {
             ));
         }
         let linked = is_linked(&manifest);
+        let mut ahead = None;
         let krate = if linked {
             built_in()
         } else {
             let progress = Progress::new(quiet);
             progress.begin(&format!("Reading the kernels of {}", manifest.display()));
+            if all {
+                ahead = Ahead::start(&manifest, checkout().map(|root| root.join(COMMITTED)));
+            }
             KernelCrate::load(
                 &manifest,
                 Native::Descriptions,
@@ -109,6 +129,7 @@ impl Session {
             krate,
             linked,
             manifest: Some(manifest),
+            ahead: RefCell::new(ahead),
             quiet,
         })
     }
@@ -260,6 +281,19 @@ impl Session {
         }
     }
 
+    /// Every file of a request, in memory. Where the crate has a target folder, what earlier builds made of kernels that
+    /// are the same is taken from there.
+    pub fn generate(&self, request: &Request) -> Result<Generated> {
+        let modules = self.modules(request)?;
+        Ok(match &self.manifest {
+            Some(manifest) => {
+                let kept = translated::folder(&Package::of(manifest)?.target, &self.krate.name);
+                generate_kept(request, &modules, &kept)?
+            }
+            None => generate(request, &modules)?,
+        })
+    }
+
     /// Final SPIR-V of the entry points that a request is for, at least.
     pub fn modules(&self, request: &Request) -> Result<Modules> {
         Ok(Modules::Final(self.bundle(&chosen(request)?)?.modules))
@@ -335,8 +369,8 @@ impl Session {
         {
             return Ok(bundle);
         }
-        let target = target_folder(manifest)?;
-        let kept = target.join("hankel/final").join(&self.krate.name);
+        let target = Package::of(manifest)?.target;
+        let kept = final_folder(&target, &self.krate.name);
         let some = target.join("hankel/some").join(&self.krate.name);
         let toolchain = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
         let known = toolchain
@@ -401,11 +435,7 @@ impl Session {
                 Some("`hankel toolchain install` installs one; `hankel toolchain status` says what it takes.".into()),
             )
         })?;
-        let compiler = Compiler {
-            backend: toolchain.backend,
-            bin: toolchain.bin,
-            channel: toolchain.channel,
-        };
+        let compiler = compiler(toolchain);
         let is_all = names.len() == self.krate.entries.len();
         let (what, wanted) = if is_all {
             (self.krate.name.clone(), Wanted::All(names))
@@ -416,10 +446,30 @@ impl Session {
         progress.begin(&format!(
             "Compiling {what} to SPIR-V (half a minute the first time, then seconds)"
         ));
+        if is_all
+            && let Some(ahead) = self.ahead.take()
+            && let Some(compiled) = ahead.finish(&compiler, names)
+        {
+            return Ok(compiled);
+        }
         // Called from another thread: only the text is handed over.
         let line = |line: &str| progress.detail(line);
         Ok(compile(manifest, &compiler, target, wanted, &mut { line })?)
     }
+}
+
+/// What [`hankel_toolchain`] found, as [`compile`] takes it.
+pub fn compiler(toolchain: Toolchain) -> Compiler {
+    Compiler {
+        backend: toolchain.backend,
+        bin: toolchain.bin,
+        channel: toolchain.channel,
+    }
+}
+
+/// Where the final SPIR-V of all kernels of a crate is kept, within cargo's target folder.
+pub fn final_folder(target: &Path, crate_name: &str) -> PathBuf {
+    target.join("hankel/final").join(crate_name)
 }
 
 /// The names of the entry points that a request is for.
@@ -473,7 +523,7 @@ fn is_linked(manifest: &Path) -> bool {
 }
 
 /// The folder that a Cargo.toml lies in.
-fn folder_of(manifest: &Path) -> &Path {
+pub fn folder_of(manifest: &Path) -> &Path {
     match manifest.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -516,28 +566,64 @@ fn is_ours(path: &Path) -> bool {
     path.exists()
 }
 
-/// cargo's target folder for a crate.
-fn target_folder(manifest: &Path) -> Result<PathBuf> {
-    let fail = |problem: String| Failure::machine(problem, None);
-    let output = Command::new("cargo")
-        .args([
-            "metadata",
-            "--no-deps",
-            "--format-version",
-            "1",
-            "--manifest-path",
-        ])
-        .arg(manifest)
-        .output()
-        .map_err(|e| fail(format!("cannot run `cargo`: {e}")))?;
-    if !output.status.success() {
-        let text = String::from_utf8_lossy(&output.stderr);
-        return Err(fail(format!("{}: {}", manifest.display(), text.trim())));
+/// A package, as cargo describes it.
+pub struct Package {
+    /// Its name.
+    pub name: String,
+    /// cargo's target folder for it.
+    pub target: PathBuf,
+}
+
+/// What is read of `cargo metadata`.
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<Described>,
+    target_directory: PathBuf,
+}
+
+#[derive(Deserialize)]
+struct Described {
+    name: String,
+    manifest_path: PathBuf,
+}
+
+impl Package {
+    /// The one whose Cargo.toml is `manifest`.
+    pub fn of(manifest: &Path) -> Result<Self> {
+        let fail = |problem: String| Failure::machine(problem, None);
+        let output = Command::new("cargo")
+            .args([
+                "metadata",
+                "--no-deps",
+                "--format-version",
+                "1",
+                "--manifest-path",
+            ])
+            .arg(manifest)
+            .output()
+            .map_err(|e| fail(format!("cannot run `cargo`: {e}")))?;
+        if !output.status.success() {
+            let text = String::from_utf8_lossy(&output.stderr);
+            return Err(fail(format!("{}: {}", manifest.display(), text.trim())));
+        }
+        let unread = |what: &str| fail(format!("{}: {what}", manifest.display()));
+        let metadata: Metadata = serde_json::from_slice(&output.stdout)
+            .map_err(|e| unread(&format!("`cargo metadata` cannot be read: {e}")))?;
+        // cargo names it without links on the way.
+        let place = manifest.canonicalize();
+        let is_it = |it: &Described| {
+            let other = it.manifest_path.canonicalize();
+            matches!((&place, other), (Ok(place), Ok(other)) if *place == other)
+        };
+        let mut packages = metadata.packages.into_iter();
+        let package = packages
+            .find(is_it)
+            .ok_or_else(|| unread("`cargo metadata` does not name this package"))?;
+        Ok(Self {
+            name: package.name,
+            target: metadata.target_directory,
+        })
     }
-    serde_json::from_slice::<serde_json::Value>(&output.stdout)
-        .ok()
-        .and_then(|v| v.get("target_directory")?.as_str().map(PathBuf::from))
-        .ok_or_else(|| fail("`cargo metadata` names no target folder".into()))
 }
 
 /// Where bindings are.

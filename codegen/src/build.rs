@@ -31,6 +31,7 @@ use crate::manifest::{
 };
 use crate::spirv;
 use crate::translate::{Ir, Options, Place, Written};
+use crate::translated::Translated;
 
 pub use crate::folder::is_own;
 
@@ -294,7 +295,21 @@ pub(crate) fn collect<T, C: FromIterator<T>>(results: Vec<Result<T, Failure>>) -
 pub fn generate(request: &Request, modules: &Modules) -> Result<Generated> {
     let chosen = request.chosen()?;
     let jobs = request.jobs(&chosen);
-    assemble(request, &chosen, &jobs, modules, |_| Ok(Files::new()))
+    assemble(request, &chosen, &jobs, modules, None, |_| Ok(Files::new()))
+}
+
+/// The same. What was written of a kernel by an earlier build is taken from the folder `kept`, if nothing that it
+/// follows from has changed since; else it is put there.
+///
+/// # Errors
+///
+/// As for [`generate`]. What cannot be kept is made again by the next build.
+pub fn generate_kept(request: &Request, modules: &Modules, kept: &Path) -> Result<Generated> {
+    let chosen = request.chosen()?;
+    let jobs = request.jobs(&chosen);
+    assemble(request, &chosen, &jobs, modules, Some(kept), |_| {
+        Ok(Files::new())
+    })
 }
 
 /// Makes the files of `jobs`, which are copies of the kernels `chosen`, and what `beside` makes of their
@@ -304,29 +319,40 @@ pub(crate) fn assemble(
     chosen: &[&Kernel],
     jobs: &[Variant],
     modules: &Modules,
+    kept: Option<&Path>,
     beside: impl FnOnce(&BTreeMap<String, KernelEntry>) -> Result<Files>,
 ) -> Result<Generated> {
     let all: Vec<Kernel> = chosen.iter().map(|kernel| (*kernel).clone()).collect();
     let layouts = Layouts::of(&all);
     let targets = request.targets();
+    let kept = kept.map(|folder| Translated::within(folder, &targets, &layouts));
     let results: Vec<Result<_, Failure>> = jobs
         .par_iter()
-        .map(|job| one(job, modules, &targets, &layouts))
+        .map(|job| {
+            let make = || one(job, modules, &targets, &layouts);
+            match &kept {
+                Some(kept) => kept.get(job, modules, make),
+                None => make(),
+            }
+        })
         .collect();
-    let made: Vec<(KernelEntry, Files, String)> = collect(results)?;
+    let made: Vec<Made> = collect(results)?;
+    if let Some(kept) = kept.filter(|_| request.filter.is_empty()) {
+        kept.sweep();
+    }
     let mut files = BTreeMap::new();
     let mut kernels = BTreeMap::new();
     let mut spirv = BTreeMap::new();
     let mut in_wgsl = InWgsl::new();
-    for (job, (entry, texts, hash)) in jobs.iter().zip(made) {
+    for (job, it) in jobs.iter().zip(made) {
         let name = job.kernel.name.as_str();
         if targets.contains(&Language::Wgsl) {
             let places = job.options.placement.in_wgsl(&job.kernel)?;
             in_wgsl.insert(name.to_owned(), places);
         }
-        spirv.insert(name, hash);
-        kernels.insert(name.to_owned(), entry);
-        files.extend(texts);
+        spirv.insert(name, it.spirv);
+        kernels.insert(name.to_owned(), it.entry);
+        files.extend(it.files);
     }
     for (path, text) in headers::files(&layouts, &kernels, &in_wgsl) {
         files.insert(path.into(), text.into_bytes());
@@ -358,6 +384,16 @@ pub(crate) fn assemble(
 /// Paths and contents.
 pub(crate) type Files = Vec<(String, Vec<u8>)>;
 
+/// What is made of one kernel.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Made {
+    /// What the manifest says of it.
+    pub entry: KernelEntry,
+    pub files: Files,
+    /// Hash of its SPIR-V.
+    pub spirv: String,
+}
+
 /// A kernel as naga reads it, as often as it is asked for.
 struct Readings<'a> {
     kernel: &'a Kernel,
@@ -386,13 +422,13 @@ impl Readings<'_> {
     }
 }
 
-/// One kernel in every language, and the hash of its SPIR-V.
+/// One kernel in every language.
 fn one(
     job: &Variant,
     modules: &Modules,
     targets: &BTreeSet<Language>,
     layouts: &Layouts,
-) -> Result<(KernelEntry, Files, String), Failure> {
+) -> Result<Made, Failure> {
     let Variant {
         of,
         kernel,
@@ -488,7 +524,11 @@ fn one(
             }
         }
     }
-    Ok((entry, files, sha256(&open.spirv)))
+    Ok(Made {
+        entry,
+        files,
+        spirv: sha256(&open.spirv),
+    })
 }
 
 fn defaults(kernel: &Kernel) -> BTreeMap<String, u32> {

@@ -676,7 +676,7 @@ pub fn generate(request: &Request, draft: &Draft, modules: &Modules) -> Result<G
         }
     }
     chosen.sort_by(|a, b| a.name.cmp(&b.name));
-    assemble(request, &chosen, &jobs, modules, |entries| {
+    assemble(request, &chosen, &jobs, modules, None, |entries| {
         let mut frame = draft.frame.clone();
         frame.made_by = Versions::with(&request.rust_gpu);
         for (name, frozen) in &draft.shaders {

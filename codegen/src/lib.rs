@@ -43,6 +43,7 @@ mod registers;
 pub mod scaffold;
 pub mod spirv;
 pub mod translate;
+pub mod translated;
 
 pub use error::{Error, Failure, Result, Step};
 pub use language::Language;

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use hankel_codegen::Language;
-use hankel_codegen::build::{MANIFEST_FILE, Report, build, check_output, is_own};
+use hankel_codegen::build::{MANIFEST_FILE, Report, check_output, is_own, write};
 use hankel_codegen::functions::api;
 use hankel_system::output::Output;
 
@@ -161,11 +161,15 @@ fn touch(file: &Path) -> Result<()> {
 /// Writes shaders. Gives what they follow from, if that was asked for.
 fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     check_output(&args.out)?;
-    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
+    let session = Session::to_generate(
+        args.generate.source.manifest_path.as_deref(),
+        &args.generate.kernels,
+        quiet,
+    )?;
     let request = session.request(&args.generate)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
-    let report = build(&request, &session.modules(&request)?, &args.out, args.force)?;
+    let report = write(&session.generate(&request)?, &args.out, args.force)?;
     let inputs = match args.watch || args.depfile.is_some() {
         true => [session.inputs(&request)?, places(args)?].concat(),
         false => Vec::new(),

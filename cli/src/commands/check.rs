@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use hankel_codegen::build::{Generated, generate};
+use hankel_codegen::build::Generated;
 use hankel_codegen::check::{Config, check};
 
 use super::functions;
@@ -76,9 +76,13 @@ fn expected(args: &Check, quiet: bool) -> Result<Generated> {
         }
         super::frame::refuse_without_scene(args)?;
     }
-    let session = Session::open(args.generate.source.manifest_path.as_deref(), quiet)?;
+    let session = Session::to_generate(
+        args.generate.source.manifest_path.as_deref(),
+        &args.generate.kernels,
+        quiet,
+    )?;
     let request = session.request_again(&args.generate, &args.folder)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
-    Ok(generate(&request, &session.modules(&request)?)?)
+    session.generate(&request)
 }

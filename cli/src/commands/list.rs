@@ -1,5 +1,4 @@
 use hankel_codegen::Language;
-use hankel_codegen::build::generate;
 use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::describe::{
@@ -12,13 +11,13 @@ use crate::print::{self, say};
 use crate::session::Session;
 
 pub fn run(args: &List, quiet: bool) -> Result<Outcome> {
-    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let session = Session::to_generate(args.source.manifest_path.as_deref(), &args.kernels, quiet)?;
     let request = session.request_for(
         args.kernels.clone(),
         vec![Language::Spirv],
         Options::default(),
     );
-    let generated = generate(&request, &session.modules(&request)?)?;
+    let generated = session.generate(&request)?;
     if args.format == Format::Json {
         print::json(&generated.manifest.kernels);
         return Ok(Outcome::Fine);

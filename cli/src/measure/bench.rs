@@ -1,7 +1,6 @@
 use std::io::{stdin, stdout};
 
 use hankel_codegen::Language;
-use hankel_codegen::build::generate;
 use hankel_codegen::lint::Construct;
 use hankel_codegen::translate::Options;
 use hankel_numerics::accuracy::table_1;
@@ -94,7 +93,7 @@ fn instructions(quiet: bool) -> Result<Table> {
         vec![Language::Spirv, Language::Wgsl, Language::Glsl],
         Options::default(),
     );
-    let generated = generate(&request, &session.modules(&request)?)?;
+    let generated = session.generate(&request)?;
     let mut table = Table::new(
         "instructions",
         "Instructions of the shaders, counted in their SPIR-V (`hankel list`): what computes, \

@@ -5,7 +5,6 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use hankel_codegen::Language;
-use hankel_codegen::build::generate;
 use hankel_codegen::diff::{bound_otherwise, shaders};
 use hankel_codegen::manifest::Manifest;
 use hankel_codegen::translate::Options;
@@ -136,7 +135,7 @@ fn own(session: &Session, scene: &Scene) -> Result<Manifest> {
         vec![Language::Spirv],
         Options::default(),
     );
-    Ok(generate(&request, &session.modules(&request)?)?.manifest)
+    Ok(session.generate(&request)?.manifest)
 }
 
 /// Those kernels of `own` that the folder has. Each must be bound as this program binds it.
