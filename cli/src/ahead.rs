@@ -4,24 +4,29 @@
 use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
 
+use hankel_codegen::build::matches;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
 
-use crate::session::{Package, compiler, final_folder, folder_of};
+use crate::session::{Package, compiler, final_folder, folder_of, some_folder};
 
 /// What is being compiled. It ends before this is gone.
 pub struct Ahead {
     compiler: Compiler,
+    /// Whether it is all of the crate.
+    is_all: bool,
     thread: Option<JoinHandle<Option<Compiled>>>,
 }
 
 impl Ahead {
-    /// Begins, if the crate at `manifest` was compiled before and has been edited since. The entry points are taken to be
-    /// those of that time. `committed` is a folder with SPIR-V that may be the crate's.
-    pub fn start(manifest: &Path, committed: Option<PathBuf>) -> Option<Self> {
+    /// Begins, if the crate at `manifest` was compiled before and has been edited since: all entry points, or those that
+    /// fit one of `filter`. They are taken to be those of that time. `committed` is a folder with SPIR-V that may be the
+    /// crate's.
+    pub fn start(manifest: &Path, filter: &[String], committed: Option<PathBuf>) -> Option<Self> {
         let package = Package::of(manifest).ok()?;
-        let kept = final_folder(&package.target, &package.name);
-        let made: Vec<Bundle> = [Some(kept), committed]
+        let all = final_folder(&package.target, &package.name);
+        let some = some_folder(&package.target, &package.name);
+        let made: Vec<Bundle> = [Some(all), committed, Some(some)]
             .into_iter()
             .flatten()
             .filter_map(|folder| Bundle::read(&folder).ok())
@@ -31,7 +36,13 @@ impl Ahead {
         if made.iter().any(|it| it.check_inputs(folder).is_ok()) {
             return None;
         }
-        let names: Vec<String> = made.first()?.modules.keys().cloned().collect();
+        let is_all = filter.is_empty();
+        let is_wanted = |name: &&String| is_all || filter.iter().any(|it| matches(it, name));
+        let names = made.first()?.modules.keys().filter(is_wanted);
+        let names: Vec<String> = names.cloned().collect();
+        if names.is_empty() {
+            return None;
+        }
         // One that is not installed yet is installed when it is known to be needed.
         let found = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
         let compiler = compiler(found.ok()??);
@@ -39,20 +50,29 @@ impl Ahead {
         let thread = thread::Builder::new().spawn(move || {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             // What fails is compiled again, to tell why.
-            let all = Wanted::All(&names);
-            compile(&manifest, &by, &package.target, all, &mut |_| {}).ok()
+            let wanted = match is_all {
+                true => Wanted::All(&names),
+                false => Wanted::Only(&names),
+            };
+            compile(&manifest, &by, &package.target, wanted, &mut |_| {}).ok()
         });
         Some(Self {
             compiler,
+            is_all,
             thread: Some(thread.ok()?),
         })
     }
 
-    /// What came of it, if it is what `compiler` makes of these entry points.
-    pub fn finish(mut self, compiler: &Compiler, names: &[&str]) -> Option<Compiled> {
+    /// What came of it, if it is what `compiler` makes of `wanted`.
+    pub fn finish(mut self, compiler: &Compiler, wanted: Wanted<'_>) -> Option<Compiled> {
         let compiled = self.thread.take()?.join().ok()??;
-        let has_all = names.iter().all(|it| compiled.modules.contains_key(*it));
-        (has_all && self.compiler == *compiler).then_some(compiled)
+        let (is_all, names) = match wanted {
+            Wanted::All(names) => (true, names),
+            Wanted::Only(names) => (false, names),
+        };
+        let has_each = names.iter().all(|it| compiled.modules.contains_key(*it));
+        let is_it = self.is_all == is_all && has_each && self.compiler == *compiler;
+        is_it.then_some(compiled)
     }
 }
 

@@ -84,16 +84,16 @@ impl Session {
 
     /// Opens the crate at `manifest`, or else the built-in one.
     pub fn open(manifest: Option<&Path>, quiet: bool) -> Result<Self> {
-        Self::begin(manifest, false, quiet)
+        Self::begin(manifest, None, quiet)
     }
 
-    /// The same, to generate all kernels, or those that fit one of `filter`. All are compiled to SPIR-V while the crate
+    /// The same, to generate all kernels, or those that fit one of `filter`. They are compiled to SPIR-V while the crate
     /// is asked what they are, where it is known that both must be done.
     pub fn to_generate(manifest: Option<&Path>, filter: &[String], quiet: bool) -> Result<Self> {
-        Self::begin(manifest, filter.is_empty(), quiet)
+        Self::begin(manifest, Some(filter), quiet)
     }
 
-    fn begin(manifest: Option<&Path>, all: bool, quiet: bool) -> Result<Self> {
+    fn begin(manifest: Option<&Path>, filter: Option<&[String]>, quiet: bool) -> Result<Self> {
         let manifest = match manifest {
             Some(path) if path.is_dir() => Some(path.join("Cargo.toml")),
             Some(path) => Some(path.to_owned()),
@@ -115,8 +115,9 @@ impl Session {
         } else {
             let progress = Progress::new(quiet);
             progress.begin(&format!("Reading the kernels of {}", manifest.display()));
-            if all {
-                ahead = Ahead::start(&manifest, checkout().map(|root| root.join(COMMITTED)));
+            if let Some(filter) = filter {
+                let committed = checkout().map(|root| root.join(COMMITTED));
+                ahead = Ahead::start(&manifest, filter, committed);
             }
             KernelCrate::load(
                 &manifest,
@@ -371,7 +372,7 @@ impl Session {
         }
         let target = Package::of(manifest)?.target;
         let kept = final_folder(&target, &self.krate.name);
-        let some = target.join("hankel/some").join(&self.krate.name);
+        let some = some_folder(&target, &self.krate.name);
         let toolchain = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
         let known = toolchain
             .as_ref()
@@ -446,9 +447,8 @@ impl Session {
         progress.begin(&format!(
             "Compiling {what} to SPIR-V (half a minute the first time, then seconds)"
         ));
-        if is_all
-            && let Some(ahead) = self.ahead.take()
-            && let Some(compiled) = ahead.finish(&compiler, names)
+        if let Some(ahead) = self.ahead.take()
+            && let Some(compiled) = ahead.finish(&compiler, wanted)
         {
             return Ok(compiled);
         }
@@ -470,6 +470,11 @@ pub fn compiler(toolchain: Toolchain) -> Compiler {
 /// Where the final SPIR-V of all kernels of a crate is kept, within cargo's target folder.
 pub fn final_folder(target: &Path, crate_name: &str) -> PathBuf {
     target.join("hankel/final").join(crate_name)
+}
+
+/// Where the final SPIR-V of the kernels is kept that were asked for last, within cargo's target folder.
+pub fn some_folder(target: &Path, crate_name: &str) -> PathBuf {
+    target.join("hankel/some").join(crate_name)
 }
 
 /// The names of the entry points that a request is for.
