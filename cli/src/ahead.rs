@@ -7,8 +7,9 @@ use std::thread::{self, JoinHandle};
 use hankel_codegen::build::matches;
 use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
+use hankel_host::crates::Package;
 
-use crate::session::{Package, compiler, final_folder, folder_of, some_folder};
+use crate::session::{compiler, final_folder, folder_of, some_folder};
 
 /// What is being compiled. It ends before this is gone.
 pub struct Ahead {
@@ -23,9 +24,9 @@ impl Ahead {
     /// fit one of `filter`. They are taken to be those of that time. `committed` is a folder with SPIR-V that may be the
     /// crate's.
     pub fn start(manifest: &Path, filter: &[String], committed: Option<PathBuf>) -> Option<Self> {
-        let package = Package::of(manifest).ok()?;
-        let all = final_folder(&package.target, &package.name);
-        let some = some_folder(&package.target, &package.name);
+        let package = Package::find(manifest).ok()?;
+        let all = final_folder(&package.target_dir, &package.name);
+        let some = some_folder(&package.target_dir, &package.name);
         let made: Vec<Bundle> = [Some(all), committed, Some(some)]
             .into_iter()
             .flatten()
@@ -54,7 +55,7 @@ impl Ahead {
                 true => Wanted::All(&names),
                 false => Wanted::Only(&names),
             };
-            compile(&manifest, &by, &package.target, wanted, &mut |_| {}).ok()
+            compile(&manifest, &by, &package.target_dir, wanted, &mut |_| {}).ok()
         });
         Some(Self {
             compiler,

@@ -9,7 +9,6 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -26,12 +25,11 @@ use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language, translated};
 use hankel_dsl::native::describe::Kernel;
 use hankel_dsl::native::lanes;
-use hankel_host::crates::{KernelCrate, KernelEntry, Native};
+use hankel_host::crates::{KernelCrate, KernelEntry, Native, Package};
 use hankel_host::inputs::{self, Case};
 use hankel_host::worker::Worker;
 use hankel_toolchain::Toolchain;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
-use serde::Deserialize;
 
 use crate::ahead::Ahead;
 use crate::args::{Generate, Placed};
@@ -286,9 +284,11 @@ impl Session {
     /// are the same is taken from there.
     pub fn generate(&self, request: &Request) -> Result<Generated> {
         let modules = self.modules(request)?;
-        Ok(match &self.manifest {
-            Some(manifest) => {
-                let kept = translated::folder(&Package::of(manifest)?.target, &self.krate.name);
+        // The built-in kernels need no cargo: where there is none, nothing is kept.
+        let manifest = self.manifest.as_ref();
+        Ok(match manifest.and_then(|it| Package::find(it).ok()) {
+            Some(package) => {
+                let kept = translated::folder(&package.target_dir, &package.name);
                 generate_kept(request, &modules, &kept)?
             }
             None => generate(request, &modules)?,
@@ -370,7 +370,7 @@ impl Session {
         {
             return Ok(bundle);
         }
-        let target = Package::of(manifest)?.target;
+        let target = Package::find(manifest)?.target_dir;
         let kept = final_folder(&target, &self.krate.name);
         let some = some_folder(&target, &self.krate.name);
         let toolchain = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
@@ -569,66 +569,6 @@ fn is_ours(path: &Path) -> bool {
 #[cfg(not(unix))]
 fn is_ours(path: &Path) -> bool {
     path.exists()
-}
-
-/// A package, as cargo describes it.
-pub struct Package {
-    /// Its name.
-    pub name: String,
-    /// cargo's target folder for it.
-    pub target: PathBuf,
-}
-
-/// What is read of `cargo metadata`.
-#[derive(Deserialize)]
-struct Metadata {
-    packages: Vec<Described>,
-    target_directory: PathBuf,
-}
-
-#[derive(Deserialize)]
-struct Described {
-    name: String,
-    manifest_path: PathBuf,
-}
-
-impl Package {
-    /// The one whose Cargo.toml is `manifest`.
-    pub fn of(manifest: &Path) -> Result<Self> {
-        let fail = |problem: String| Failure::machine(problem, None);
-        let output = Command::new("cargo")
-            .args([
-                "metadata",
-                "--no-deps",
-                "--format-version",
-                "1",
-                "--manifest-path",
-            ])
-            .arg(manifest)
-            .output()
-            .map_err(|e| fail(format!("cannot run `cargo`: {e}")))?;
-        if !output.status.success() {
-            let text = String::from_utf8_lossy(&output.stderr);
-            return Err(fail(format!("{}: {}", manifest.display(), text.trim())));
-        }
-        let unread = |what: &str| fail(format!("{}: {what}", manifest.display()));
-        let metadata: Metadata = serde_json::from_slice(&output.stdout)
-            .map_err(|e| unread(&format!("`cargo metadata` cannot be read: {e}")))?;
-        // cargo names it without links on the way.
-        let place = manifest.canonicalize();
-        let is_it = |it: &Described| {
-            let other = it.manifest_path.canonicalize();
-            matches!((&place, other), (Ok(place), Ok(other)) if *place == other)
-        };
-        let mut packages = metadata.packages.into_iter();
-        let package = packages
-            .find(is_it)
-            .ok_or_else(|| unread("`cargo metadata` does not name this package"))?;
-        Ok(Self {
-            name: package.name,
-            target: metadata.target_directory,
-        })
-    }
 }
 
 /// Where bindings are.

@@ -290,10 +290,12 @@ impl KernelCrate {
 }
 
 /// A package with a library, as cargo describes it.
-struct Package {
-    name: String,
+pub struct Package {
+    /// Its name.
+    pub name: String,
     manifest: PathBuf,
-    target_dir: PathBuf,
+    /// cargo's target folder for it.
+    pub target_dir: PathBuf,
 }
 
 /// What is read of `cargo metadata`.
@@ -400,7 +402,11 @@ fn without_prefix(stderr: &str) -> String {
 }
 
 impl Package {
-    fn find(manifest: &Path) -> Result<Self, CrateError> {
+    /// The package of a Cargo.toml, or of the folder that has it.
+    ///
+    /// # Errors
+    /// There is no such file, cargo does not run or refuses it, or it has no library.
+    pub fn find(manifest: &Path) -> Result<Self, CrateError> {
         let path = if manifest.is_dir() {
             manifest.join("Cargo.toml")
         } else {
