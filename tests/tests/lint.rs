@@ -56,13 +56,13 @@ fn maps_over_rows_are_clean() {
             "moment_bound",
             "moment_bound_adjoint",
             "moment_bound_compensated",
+            "moment_bound_adjoint_compensated",
         ];
         kinds.map(|kind| format!("{kind}_n{n}"))
     });
     let points =
         (1..=6).flat_map(|n| ["canonical", "canonical_adjoint"].map(|kind| format!("{kind}_n{n}")));
     let others = [
-        "moment_bound_adjoint_compensated_n3",
         "hamburger_6msm_compensated",
         "hamburger_4msm",
         "hausdorff_4msm",

@@ -16,7 +16,7 @@
 
 use hankel_dsl::{Element, Real, lit};
 
-use crate::moments::within;
+use crate::moments::within_one;
 use crate::orthogonal::{Recurrence, positive_root};
 use crate::sparse::{TwoPoints, sparse_2};
 use crate::{Moments4, Moments6};
@@ -117,14 +117,13 @@ pub fn degenerate_6<R: Real>(m: Moments6<R>) -> Degenerate6<R> {
 
     let w1 = weight(c1, c2, from_low + down, (reach + down) * down);
     let w3 = weight(c1, c2, from_high + up, (reach + up) * up).min(one - w1);
-    let unit = |z: R| within(z, -one, one);
-    let z1 = unit(z1);
-    let z2 = unit(z2).max(z1);
+    let z1 = within_one(z1);
+    let z2 = within_one(z2).max(z1);
     Degenerate6 {
         points: ThreePoints {
             z1,
             z2,
-            z3: unit(z3).max(z2),
+            z3: within_one(z3).max(z2),
             w1,
             w2: one - w1 - w3,
             w3,

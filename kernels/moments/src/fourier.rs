@@ -9,7 +9,7 @@
 
 use hankel_dsl::{Real, lit};
 
-use crate::moments::within;
+use crate::moments::{within, within_one};
 use crate::trigonometric::HalfAngle;
 
 /// Cosine and sine of c_k z for four k in sequence.
@@ -62,8 +62,7 @@ impl<R: Real> OddHarmonics<R> {
         let [ms0, ms1, ms2, ms3] = mean.sin;
         let [w0, w1, w2, w3] = weights;
         let term = |w: R, sin: R, c: R, cos: R, s: R| {
-            let clamped = |x: R| within(x, -one, one);
-            within(w, lit!(0.0), one) * (clamped(sin) * c - clamped(cos) * s)
+            within(w, lit!(0.0), one) * (within_one(sin) * c - within_one(cos) * s)
         };
         let low = term(w0, ms0, c0, mc0, s0) + term(w1, ms1, c1, mc1, s1);
         let high = term(w2, ms2, c2, mc2, s2) + term(w3, ms3, c3, mc3, s3);

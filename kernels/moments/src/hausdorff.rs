@@ -175,17 +175,17 @@ fn compensated<R: Real, const SYMMETRIC: bool>(m: Moments4<R>, z: R) -> R {
     let moment = other.times(length);
     let by_start = moment.over(from_start.at_least(least));
     let by_end = moment.over(from_end.at_least(least));
-    let from_z = |end: R| Twofold::of(z).minus(Twofold::of(end)).at_least(least);
+    let to_start = less(z, low).at_least(least);
     let to_end = less(one, z).at_least(least);
     let own_by_end = own.over(to_end);
     let (at_start, at_end) = if SYMMETRIC {
         (
-            less(one, b1).minus(own.over(from_z(-one))),
+            less(one, b1).minus(own.over(to_start)),
             fine_one.plus(Twofold::of(b1)).minus(own_by_end),
         )
     } else {
         (
-            less(one, b1).minus(own.over(from_z(zero))),
+            less(one, b1).minus(own.over(to_start)),
             Twofold::of(b1).minus(own_by_end),
         )
     };

@@ -8,6 +8,13 @@ pub(crate) fn within<R: Real>(x: R, low: R, high: R) -> R {
     R::select(x.ge(low), x, low).min(high)
 }
 
+/// `x` between -1 and 1; a NaN becomes -1. A function, since a closure over lanes may be compiled without their
+/// instruction set.
+#[inline(always)]
+pub(crate) fn within_one<R: Real>(x: R) -> R {
+    within(x, lit!(-1.0), lit!(1.0))
+}
+
 /// The first four power moments of a distribution of depths.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
@@ -38,12 +45,11 @@ impl<R: Real> Moments4<R> {
     /// Each moment in [-1, 1], where those of depths in [-1, 1] lie anyway; a NaN becomes -1.
     #[inline(always)]
     pub fn clamped(self) -> Self {
-        let clamp = |b: R| within(b, lit!(-1.0), lit!(1.0));
         Self {
-            b1: clamp(self.b1),
-            b2: clamp(self.b2),
-            b3: clamp(self.b3),
-            b4: clamp(self.b4),
+            b1: within_one(self.b1),
+            b2: within_one(self.b2),
+            b3: within_one(self.b3),
+            b4: within_one(self.b4),
         }
     }
 
@@ -110,14 +116,13 @@ impl<R: Real> Moments6<R> {
     /// Each moment in [-1, 1], where those of depths in [-1, 1] lie anyway; a NaN becomes -1.
     #[inline(always)]
     pub fn clamped(self) -> Self {
-        let clamp = |b: R| within(b, lit!(-1.0), lit!(1.0));
         Self {
-            b1: clamp(self.b1),
-            b2: clamp(self.b2),
-            b3: clamp(self.b3),
-            b4: clamp(self.b4),
-            b5: clamp(self.b5),
-            b6: clamp(self.b6),
+            b1: within_one(self.b1),
+            b2: within_one(self.b2),
+            b3: within_one(self.b3),
+            b4: within_one(self.b4),
+            b5: within_one(self.b5),
+            b6: within_one(self.b6),
         }
     }
 

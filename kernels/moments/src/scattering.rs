@@ -10,7 +10,7 @@
 use hankel_dsl::math::{self, Elementary};
 use hankel_dsl::{Element, Real, lit};
 
-use crate::moments::within;
+use crate::moments::{within, within_one};
 
 /// What of the light is scattered by an angle with that cosine, for each steradian: the phase function of
 /// Henyey and Greenstein (1941). Its mean cosine is `g`, which is clamped to [-0.99, 0.99]: 0 scatters to all
@@ -192,7 +192,7 @@ pub fn row_extinction<R: Elementary>(extinction: R, least: R, largest: R) -> R {
 /// half of their distance.
 #[inline(always)]
 pub fn rectified_depth<R: Real>(inclination: R, middle: R, scale: R) -> R {
-    within((middle - inclination) * scale, lit!(-1.0), lit!(1.0))
+    within_one((middle - inclination) * scale)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use hankel_dsl::{Element, Real, lit};
 
 use crate::Moments4;
-use crate::moments::within;
+use crate::moments::within_one;
 
 /// A distribution of two depths.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -54,8 +54,7 @@ impl<R: Real> TwoPoints<R> {
 pub fn sparse_2<R: Real>(b1: R, b2: R, b3: R) -> TwoPoints<R> {
     let one: R = lit!(1.0);
     let two: R = lit!(2.0);
-    let unit = |b: R| within(b, -one, one);
-    let (b1, b2, b3) = (unit(b1), unit(b2), unit(b3));
+    let (b1, b2, b3) = (within_one(b1), within_one(b2), within_one(b3));
     let variance = (b2 - b1 * b1).max(R::epsilon() * R::epsilon());
     // Depths are within 2 of each other, so the third central moment is within 2 variances of 0.
     let skew = ((b3 - b1 * b2) / variance - b1 * two).clamp(-two, two);

@@ -43,7 +43,7 @@ use hankel_dsl::{Element, Real, lit, unroll};
 pub use compensated::trigonometric_4_compensated;
 
 use crate::bound::Bounds;
-use crate::moments::within;
+use crate::moments::{within, within_one};
 
 /// Half the angle of a depth, πz for depth z, as a unit vector with `sin` >= 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -270,9 +270,8 @@ impl<R: Real> Kernel<R> {
     fn new(m: TrigonometricMoments<R>) -> Self {
         let one: R = lit!(1.0);
         let half: R = lit!(0.5);
-        let unit = |b: R| within(b, -one, one);
-        let (x, y) = (unit(m.c1), unit(m.s1));
-        let (c2, s2) = (unit(m.c2), unit(m.s2));
+        let (x, y) = (within_one(m.c1), within_one(m.s1));
+        let (c2, s2) = (within_one(m.c2), within_one(m.s2));
         let xx = c2 * half + half - x * x;
         let yy = half - c2 * half - y * y;
         let xy = s2 * half - x * y;

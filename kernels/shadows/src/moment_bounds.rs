@@ -1,8 +1,7 @@
 //! Bounds for two, four, six, eight, ten and twelve power moments and a free total, and their derivatives,
 //! as maps over rows of moments: `moment_bound_n2` is for N = 2, moments `m0` to `m4`.
 //!
-//! Compensated derivatives are kernels for up to six moments: there their error is what rounding the row's
-//! numbers once does, whatever the row. For more moments they are functions of the library alone.
+//! Compensated ones are in error by about what rounding the row's numbers once does, whatever the row.
 
 use hankel_dsl::{Element, Real, kernel};
 use hankel_moments::{
@@ -47,8 +46,8 @@ macro_rules! order {
         $Row:ident, $AdjointRow:ident, $Derivative:ident; $rows:ident, $adjoint_rows:ident;
         $(#[$bound_doc:meta])* $bound:ident,
         $(#[$adjoint_doc:meta])* $adjoint:ident,
-        $(#[$compensated_doc:meta])* $compensated:ident
-        $(, $(#[$both_doc:meta])* $both:ident)?
+        $(#[$compensated_doc:meta])* $compensated:ident,
+        $(#[$both_doc:meta])* $both:ident
     ) => {
         /// Moments and a query point.
         #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -166,7 +165,7 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
-            $(compensated = $both,)?
+            compensated = $both,
             inputs = crate::inputs::$adjoint_rows,
             parity(
                 absolute = 1e-12,
@@ -187,34 +186,32 @@ macro_rules! order {
             $Derivative::new(d, settings)
         }
 
-        $(
-            $(#[$both_doc])*
-            #[kernel(
-                compute,
-                threads(64),
-                precision(f32, f64),
-                pinned,
-                scalar,
-                inputs = crate::inputs::$adjoint_rows,
-                parity(
-                    absolute = 1e-12,
-                    why = "factors of derivatives close to 0 may underflow"
-                )
-            )]
-            pub fn $both<R: Real>(
-                #[uniform] settings: &BoundSettings<R>,
-                #[element] row: $AdjointRow<R>,
-            ) -> $Derivative<R> {
-                let m = biased::<R, $n>(row.moments(), settings);
-                let d = bound_adjoint_compensated::<R, $n>(
-                    m,
-                    row.eta,
-                    settings.overestimation,
-                    row.d_bound,
-                );
-                $Derivative::new(d, settings)
-            }
-        )?
+        $(#[$both_doc])*
+        #[kernel(
+            compute,
+            threads(64),
+            precision(f32, f64),
+            pinned,
+            scalar,
+            inputs = crate::inputs::$adjoint_rows,
+            parity(
+                absolute = 1e-12,
+                why = "factors of derivatives close to 0 may underflow"
+            )
+        )]
+        pub fn $both<R: Real>(
+            #[uniform] settings: &BoundSettings<R>,
+            #[element] row: $AdjointRow<R>,
+        ) -> $Derivative<R> {
+            let m = biased::<R, $n>(row.moments(), settings);
+            let d = bound_adjoint_compensated::<R, $n>(
+                m,
+                row.eta,
+                settings.overestimation,
+                row.d_bound,
+            );
+            $Derivative::new(d, settings)
+        }
     };
 }
 
@@ -272,7 +269,10 @@ order! {
     moment_bound_adjoint_n4,
     /// Bound on the amount below a query point, from eight power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
-    moment_bound_compensated_n4
+    moment_bound_compensated_n4,
+    /// Derivatives of the bound from eight power moments and their total, times `d_bound`, with what is
+    /// ill-conditioned in about twice the digits.
+    moment_bound_adjoint_compensated_n4
 }
 
 order! {
@@ -284,7 +284,10 @@ order! {
     moment_bound_adjoint_n5,
     /// Bound on the amount below a query point, from ten power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
-    moment_bound_compensated_n5
+    moment_bound_compensated_n5,
+    /// Derivatives of the bound from ten power moments and their total, times `d_bound`, with what is
+    /// ill-conditioned in about twice the digits.
+    moment_bound_adjoint_compensated_n5
 }
 
 order! {
@@ -296,5 +299,8 @@ order! {
     moment_bound_adjoint_n6,
     /// Bound on the amount below a query point, from twelve power moments and their total, with what
     /// is ill-conditioned in about twice the digits.
-    moment_bound_compensated_n6
+    moment_bound_compensated_n6,
+    /// Derivatives of the bound from twelve power moments and their total, times `d_bound`, with what is
+    /// ill-conditioned in about twice the digits.
+    moment_bound_adjoint_compensated_n6
 }

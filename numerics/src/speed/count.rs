@@ -606,6 +606,9 @@ pub fn per_row(function: &str, n: usize, rows: &[Row<f32>], alone: bool) -> Opti
         moment_bound_adjoint_compensated_n1 1 AdjointRow1 -> Derivative1 { m0 0, m1 1, m2 2 } d_bound;
         moment_bound_adjoint_compensated_n2 2 AdjointRow2 -> Derivative2 { m0 0, m1 1, m2 2, m3 3, m4 4 } d_bound;
         moment_bound_adjoint_compensated_n3 3 AdjointRow3 -> Derivative3 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6 } d_bound;
+        moment_bound_adjoint_compensated_n4 4 AdjointRow4 -> Derivative4 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8 } d_bound;
+        moment_bound_adjoint_compensated_n5 5 AdjointRow5 -> Derivative5 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10 } d_bound;
+        moment_bound_adjoint_compensated_n6 6 AdjointRow6 -> Derivative6 { m0 0, m1 1, m2 2, m3 3, m4 4, m5 5, m6 6, m7 7, m8 8, m9 9, m10 10, m11 11, m12 12 } d_bound;
     };
     let count = (rows.len() / size).max(1) as f64;
     Some(sum.zip(sum, |a, _| a / count))

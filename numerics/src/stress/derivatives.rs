@@ -1,22 +1,15 @@
 //! How exact derivatives are: those of both bounds to a row's numbers, over what rounding each number of the row
 //! once does to them.
 
-use std::ops::RangeInclusive;
-
-use hankel_moments::bound_adjoint_compensated;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::backend::NATIVE;
 use super::gradient::gradients;
 use super::reference::{Rounding, STEP, is_in_range, wide_moments};
 use super::{Backend, BackendError, Map, Solver, StressError};
 use crate::families::{Family, Format, Precision, Row, scaled, validity};
 use crate::numbers::Wide;
 use crate::speed::Quantiles;
-
-/// Orders whose compensated derivatives are functions of the library, and no kernels.
-const OF_LIBRARY: RangeInclusive<usize> = 4..=6;
 
 /// Derivatives above this are left out: the library limits them to ten times that.
 const MOST_F32: f64 = 1e24;
@@ -153,23 +146,6 @@ impl Rounding {
     }
 }
 
-/// The compensated derivatives of rows, from the library's function: to the moments, then to the query point.
-fn by_library<T: Format>(n: usize, rows: &[Row<T>], overestimation: f64) -> Vec<T> {
-    let gradient = match n {
-        4 => bound_adjoint_compensated::<T, 4>,
-        5 => bound_adjoint_compensated::<T, 5>,
-        _ => bound_adjoint_compensated::<T, 6>,
-    };
-    let (overestimation, upstream) = (T::round(overestimation), T::round(1.0));
-    rows.par_iter()
-        .flat_map_iter(|row| {
-            let d = gradient(row.m, row.eta, overestimation, upstream);
-            let of_moments = d.m.into_iter().take(2 * n + 1);
-            of_moments.chain(std::iter::once(d.eta))
-        })
-        .collect()
-}
-
 /// Measures the adjoints of an order on the first `count` rows of a family.
 pub(super) fn measure<T: Format>(
     family: &Family,
@@ -195,15 +171,10 @@ pub(super) fn measure<T: Format>(
         let Some(function) = solver.adjoint(n) else {
             continue;
         };
-        let map = Map::find(&function, T::PRECISION)?;
-        let of_library = solver == Solver::Compensated && OF_LIBRARY.contains(&n);
-        if map.is_none() && !(of_library && backend.name() == NATIVE) {
+        let Some(map) = Map::find(&function, T::PRECISION)? else {
             continue;
-        }
-        let mut run = |overestimation| match &map {
-            Some(map) => map.run(backend, n, &rows, overestimation),
-            None => Ok(by_library(n, &rows, overestimation)),
         };
+        let mut run = |overestimation| map.run(backend, n, &rows, overestimation);
         let (lower, upper) = match run(0.0).and_then(|lower| Ok((lower, run(1.0)?))) {
             Err(StressError::Backend {
                 error: BackendError::Lacks(_),

@@ -24,13 +24,19 @@ impl<R: Real> Quantized4<R> {
     /// Each channel in [0, 1], where those of valid moments lie anyway; a NaN becomes 0.
     #[inline(always)]
     pub fn saturated(self) -> Self {
-        self.map(|x| within(x, lit!(0.0), lit!(1.0)))
+        self.map(
+            #[inline(always)]
+            |x| within(x, lit!(0.0), lit!(1.0)),
+        )
     }
 
     /// What is left of it when each channel is stored in `BITS` bits, see [`to_unorm`].
     #[inline(always)]
     pub fn stored<const BITS: usize>(self) -> Self {
-        self.map(|x| from_unorm::<R, BITS>(to_unorm::<R, BITS>(x)))
+        self.map(
+            #[inline(always)]
+            |x| from_unorm::<R, BITS>(to_unorm::<R, BITS>(x)),
+        )
     }
 
     #[inline(always)]

@@ -15,7 +15,7 @@ use hankel_dsl::{Real, lit};
 
 use super::TrigonometricMoments;
 use crate::bound::{Arithmetic, Bounds, Twofold};
-use crate::moments::within;
+use crate::moments::{within, within_one};
 
 /// A constant in twice the digits: the nearest `f64`, and what that leaves out.
 macro_rules! fine {
@@ -242,10 +242,9 @@ impl<R: Real> Kernel<R> {
     fn new(m: TrigonometricMoments<R>) -> Self {
         let one: R = lit!(1.0);
         let half: R = lit!(0.5);
-        let unit = |b: R| Twofold::of(within(b, -one, one));
         let fine_one = Twofold::of(one);
-        let (x, y) = (unit(m.c1), unit(m.s1));
-        let (c2, s2) = (unit(m.c2), unit(m.s2));
+        let (x, y) = (Twofold::of(within_one(m.c1)), Twofold::of(within_one(m.s1)));
+        let (c2, s2) = (Twofold::of(within_one(m.c2)), Twofold::of(within_one(m.s2)));
         let xx = fine_one.plus(c2).scaled(half).minus(x.times(x));
         let yy = fine_one.minus(c2).scaled(half).minus(y.times(y));
         let xy = s2.scaled(half).minus(x.times(y));

@@ -21,7 +21,7 @@ use crate::{Mask, Real};
 /// A type for each register, not one that is generic over registers: rustc inlines the operations of registers into those
 /// of concrete types, once, where LLVM would do it at each place that uses them.
 macro_rules! lanes {
-    ($(#[$doc:meta])* $name:ident, $mask_name:ident: two of $register:ty) => {
+    ($(#[$doc:meta])* $name:ident, $mask_name:ident: two of $register:ty, $features:literal) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         pub struct $name($register, $register);
@@ -33,20 +33,22 @@ macro_rules! lanes {
         const _: () = {
             type R = $register;
             type Number = <R as Register>::Number;
-            lanes!(@all $name, $mask_name, 2: 0 1);
+            lanes!(@all $features $name, $mask_name, 2: 0 1);
         };
     };
     // `$registers` is how many registers there are, `$i` are the fields that hold them.
-    (@all $name:ident, $mask_name:ident, $registers:literal: $($i:tt)+) => {
-        lanes!(@operator $name Add add AddAssign add_assign: $($i)+);
-        lanes!(@operator $name Sub sub SubAssign sub_assign: $($i)+);
-        lanes!(@operator $name Mul mul MulAssign mul_assign: $($i)+);
+    (@all $features:literal $name:ident, $mask_name:ident, $registers:literal: $($i:tt)+) => {
+        lanes!(@operator $features $name Add add AddAssign add_assign: $($i)+);
+        lanes!(@operator $features $name Sub sub SubAssign sub_assign: $($i)+);
+        lanes!(@operator $features $name Mul mul MulAssign mul_assign: $($i)+);
 
         impl Div for $name {
             type Output = Self;
             #[inline(always)]
             fn div(self, o: Self) -> Self {
-                Self($(R::div(self.$i, o.$i)),+)
+                lanes!(@compiled $features (a: $name = self, b: $name = o) -> $name {
+                    $name($(R::div(a.$i, b.$i)),+)
+                })
             }
         }
 
@@ -54,7 +56,9 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
-                Self($(R::neg(self.$i)),+)
+                lanes!(@compiled $features (a: $name = self) -> $name {
+                    $name($(R::neg(a.$i)),+)
+                })
             }
         }
 
@@ -62,7 +66,9 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn bitand(self, o: Self) -> Self {
-                Self($(R::both(self.$i, o.$i)),+)
+                lanes!(@compiled $features (a: $mask_name = self, b: $mask_name = o) -> $mask_name {
+                    $mask_name($(R::both(a.$i, b.$i)),+)
+                })
             }
         }
 
@@ -70,7 +76,9 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn bitor(self, o: Self) -> Self {
-                Self($(R::either(self.$i, o.$i)),+)
+                lanes!(@compiled $features (a: $mask_name = self, b: $mask_name = o) -> $mask_name {
+                    $mask_name($(R::either(a.$i, b.$i)),+)
+                })
             }
         }
 
@@ -78,18 +86,24 @@ macro_rules! lanes {
             type Output = Self;
             #[inline(always)]
             fn not(self) -> Self {
-                Self($(R::not(self.$i)),+)
+                lanes!(@compiled $features (a: $mask_name = self) -> $mask_name {
+                    $mask_name($(R::not(a.$i)),+)
+                })
             }
         }
 
         impl Mask for $mask_name {
             #[inline(always)]
             fn any(self) -> bool {
-                false $(| R::any(self.$i))+
+                lanes!(@compiled $features (a: $mask_name = self) -> bool {
+                    false $(| R::any(a.$i))+
+                })
             }
             #[inline(always)]
             fn all(self) -> bool {
-                true $(& R::all(self.$i))+
+                lanes!(@compiled $features (a: $mask_name = self) -> bool {
+                    true $(& R::all(a.$i))+
+                })
             }
         }
 
@@ -133,27 +147,33 @@ macro_rules! lanes {
             fn epsilon() -> Self {
                 Self::splat(Number::epsilon())
             }
-            lanes!(@function sqrt = sqrt(): $($i)+);
-            lanes!(@function abs = abs(): $($i)+);
-            lanes!(@function floor = floor(): $($i)+);
-            lanes!(@function min = min(o): $($i)+);
-            lanes!(@function max = max(o): $($i)+);
-            lanes!(@comparison $mask_name lt: $($i)+);
-            lanes!(@comparison $mask_name le: $($i)+);
-            lanes!(@comparison $mask_name eq: $($i)+);
+            lanes!(@function $features $name sqrt = sqrt(): $($i)+);
+            lanes!(@function $features $name abs = abs(): $($i)+);
+            lanes!(@function $features $name floor = floor(): $($i)+);
+            lanes!(@function $features $name min = min(o): $($i)+);
+            lanes!(@function $features $name max = max(o): $($i)+);
+            lanes!(@comparison $features $name $mask_name lt: $($i)+);
+            lanes!(@comparison $features $name $mask_name le: $($i)+);
+            lanes!(@comparison $features $name $mask_name eq: $($i)+);
             #[inline(always)]
             fn select(mask: $mask_name, a: Self, b: Self) -> Self {
-                Self($(R::select(mask.$i, a.$i, b.$i)),+)
+                lanes!(@compiled $features (mask: $mask_name = mask, a: $name = a, b: $name = b) -> $name {
+                    $name($(R::select(mask.$i, a.$i, b.$i)),+)
+                })
             }
             #[inline(always)]
             fn two_sum(self, o: Self) -> (Self, Self) {
-                let both = [$(R::two_sum(self.$i, o.$i)),+];
-                (Self($(both[$i].0),+), Self($(both[$i].1),+))
+                lanes!(@compiled $features (a: $name = self, b: $name = o) -> ($name, $name) {
+                    let both = [$(R::two_sum(a.$i, b.$i)),+];
+                    ($name($(both[$i].0),+), $name($(both[$i].1),+))
+                })
             }
             #[inline(always)]
             fn two_product(self, o: Self) -> (Self, Self) {
-                let both = [$(R::two_product(self.$i, o.$i)),+];
-                (Self($(both[$i].0),+), Self($(both[$i].1),+))
+                lanes!(@compiled $features (a: $name = self, b: $name = o) -> ($name, $name) {
+                    let both = [$(R::two_product(a.$i, b.$i)),+];
+                    ($name($(both[$i].0),+), $name($(both[$i].1),+))
+                })
             }
         }
 
@@ -248,7 +268,7 @@ macro_rules! lanes {
                     Self($(R::add_bits(R::and(from_root.$i, fraction), root)),+),
                 )
             }
-            lanes!(@function power_of_two = power(): $($i)+);
+            lanes!(@function $features $name power_of_two = power(): $($i)+);
             #[inline(always)]
             fn copy_sign(self, sign: Self) -> Self {
                 self.abs().flip_sign(sign)
@@ -313,40 +333,56 @@ macro_rules! lanes {
         }
     };
     (@each $i:tt $value:expr) => { $value };
-    (@operator $name:ident $operator:ident $method:ident $assign:ident $assign_method:ident: $($i:tt)+) => {
+    // A function that has the instruction set, in one that can not say so.
+    (@compiled $features:literal ($($argument:ident: $type:ty = $value:expr),+) -> $result:ty $body:block) => {{
+        #[target_feature(enable = $features)]
+        #[inline]
+        fn compiled($($argument: $type),+) -> $result $body
+        // SAFETY: only `on_lanes` uses these types, on processors that have the instruction set.
+        unsafe { compiled($($value),+) }
+    }};
+    (
+        @operator $features:literal $name:ident
+        $operator:ident $method:ident $assign:ident $assign_method:ident: $($i:tt)+
+    ) => {
         impl $operator for $name {
             type Output = Self;
             #[inline(always)]
             fn $method(self, o: Self) -> Self {
-                Self($(R::$method(self.$i, o.$i)),+)
+                lanes!(@compiled $features (a: $name = self, b: $name = o) -> $name {
+                    $name($(R::$method(a.$i, b.$i)),+)
+                })
             }
         }
         impl $assign for $name {
             #[inline(always)]
             fn $assign_method(&mut self, o: Self) {
-                *self = Self($(R::$method(self.$i, o.$i)),+);
+                *self = $operator::$method(*self, o);
             }
         }
     };
-    (@function $method:ident = $function:ident($($o:ident)?): $($i:tt)+) => {
-        lanes!(@function_of $method $function ($($o)?) $($i)+);
-    };
-    (@function_of $method:ident $function:ident () $($i:tt)+) => {
+    (@function $features:literal $name:ident $method:ident = $function:ident(): $($i:tt)+) => {
         #[inline(always)]
         fn $method(self) -> Self {
-            Self($(R::$function(self.$i)),+)
+            lanes!(@compiled $features (a: $name = self) -> $name {
+                $name($(R::$function(a.$i)),+)
+            })
         }
     };
-    (@function_of $method:ident $function:ident ($o:ident) $($i:tt)+) => {
+    (@function $features:literal $name:ident $method:ident = $function:ident($o:ident): $($i:tt)+) => {
         #[inline(always)]
         fn $method(self, $o: Self) -> Self {
-            Self($(R::$function(self.$i, $o.$i)),+)
+            lanes!(@compiled $features (a: $name = self, b: $name = $o) -> $name {
+                $name($(R::$function(a.$i, b.$i)),+)
+            })
         }
     };
-    (@comparison $mask_name:ident $method:ident: $($i:tt)+) => {
+    (@comparison $features:literal $name:ident $mask_name:ident $method:ident: $($i:tt)+) => {
         #[inline(always)]
         fn $method(self, o: Self) -> $mask_name {
-            $mask_name($(R::$method(self.$i, o.$i)),+)
+            lanes!(@compiled $features (a: $name = self, b: $name = o) -> $mask_name {
+                $mask_name($(R::$method(a.$i, b.$i)),+)
+            })
         }
     };
 }
@@ -354,30 +390,30 @@ macro_rules! lanes {
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX2's `f32`.
-    Avx2F32, Avx2F32Mask: two of super::x86::F32x8
+    Avx2F32, Avx2F32Mask: two of super::x86::F32x8, "avx2,fma"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX2's `f64`.
-    Avx2F64, Avx2F64Mask: two of super::x86::F64x4
+    Avx2F64, Avx2F64Mask: two of super::x86::F64x4, "avx2,fma"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f32`.
-    Avx512F32, Avx512F32Mask: two of super::x86::F32x16
+    Avx512F32, Avx512F32Mask: two of super::x86::F32x16, "avx512f,avx512dq"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f64`.
-    Avx512F64, Avx512F64Mask: two of super::x86::F64x8
+    Avx512F64, Avx512F64Mask: two of super::x86::F64x8, "avx512f,avx512dq"
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
     /// NEON's `f32`.
-    NeonF32, NeonF32Mask: two of super::neon::F32x4
+    NeonF32, NeonF32Mask: two of super::neon::F32x4, "neon"
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
     /// NEON's `f64`.
-    NeonF64, NeonF64Mask: two of super::neon::F64x2
+    NeonF64, NeonF64Mask: two of super::neon::F64x2, "neon"
 }
