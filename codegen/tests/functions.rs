@@ -688,3 +688,25 @@ fn elementary_functions_stay_calls() {
     );
     assert!(text.contains("max(x + 1.0f, -8.507059e37f)"), "{text}");
 }
+
+#[test]
+fn self_is_the_type_with_its_parameters() {
+    // `A` is in no argument of `made`.
+    let libraries = one("use hankel_dsl::{Real, apart, function, lit};
+        trait Rule<R: Real>: Copy { fn of(x: R) -> Self; fn number(self) -> R; }
+        #[derive(Clone, Copy)] struct Twice<R>(R);
+        impl<R: Real> Rule<R> for Twice<R> {
+            fn of(x: R) -> Self { Self(x * lit!(2.0)) }
+            fn number(self) -> R { self.0 }
+        }
+        struct Held<R, A> { x: A, unit: R }
+        impl<R: Real, A: Rule<R>> Held<R, A> {
+            fn new(x: R) -> Self { apart!(R, if true, Self::made(x)) }
+            fn made(x: R) -> Self { Held { x: A::of(x), unit: lit!(3.0) } }
+            fn both(&self) -> R { self.x.number() * self.unit }
+        }
+        #[function] fn f(x: f32) -> f32 { Held::<f32, Twice<f32>>::new(x).both() }")
+    .expect("it is translated");
+    let glsl = text(&libraries, "glsl");
+    assert!(glsl.contains("x * 2.0 * 3.0"), "{glsl}");
+}

@@ -1889,6 +1889,10 @@ impl<'a> Evaluator<'a> {
                 }
             }
             "unroll" => self.unroll(frame, mac),
+            "apart" => {
+                let apart: Apart = self.parsed(frame, mac.tokens.clone(), span)?;
+                self.value(frame, &apart.call)
+            }
             "assert" | "debug_assert" => Ok(Value::Unit),
             _ => {
                 let Some(rules) = self.tree.rules(frame.module, &name) else {
@@ -2353,6 +2357,14 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Done<Value> {
         let mut inner = self.frame_for(frame, method.module, Some(identity));
+        if outer.is_none() && inner.own == frame.own {
+            // `Self::function` or `self.method()`: the same type, with the same parameters.
+            for name in method.generics.params.iter().map(parameter_name) {
+                if let Some(known) = frame.generics.get(&name) {
+                    inner.generics.insert(name, known.clone());
+                }
+            }
+        }
         self.generics(&mut inner, &method.generics, outer.as_deref(), span)?;
         let function = method.function.clone();
         self.run(
@@ -2601,6 +2613,14 @@ impl<'a> Evaluator<'a> {
 
 // ---- small things ------------------------------------------------------------------------------
 
+fn parameter_name(param: &syn::GenericParam) -> String {
+    match param {
+        syn::GenericParam::Type(t) => t.ident.to_string(),
+        syn::GenericParam::Const(c) => c.ident.to_string(),
+        syn::GenericParam::Lifetime(l) => l.lifetime.to_string(),
+    }
+}
+
 /// The range and body of an `unroll!`.
 struct Turns {
     index: proc_macro2::Ident,
@@ -2634,6 +2654,24 @@ impl syn::parse::Parse for Turns {
             to: *to,
             body: input.parse()?,
         })
+    }
+}
+
+/// The call of an `apart!`: here it is part of its caller, as in a shader.
+struct Apart {
+    call: syn::Expr,
+}
+
+impl syn::parse::Parse for Apart {
+    fn parse(input: syn::parse::ParseStream<'_>) -> syn::Result<Self> {
+        input.parse::<syn::Type>()?;
+        input.parse::<syn::Token![,]>()?;
+        input.parse::<syn::Token![if]>()?;
+        input.parse::<syn::Expr>()?;
+        input.parse::<syn::Token![,]>()?;
+        let call = input.parse()?;
+        input.parse::<Option<syn::Token![,]>>()?;
+        Ok(Self { call })
     }
 }
 

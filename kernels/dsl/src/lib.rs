@@ -117,6 +117,7 @@ extern crate std;
 // So that the macros' `::hankel_dsl` paths also work in this crate's own tests.
 extern crate self as hankel_dsl;
 
+mod apart;
 mod atomics;
 mod data;
 mod half;

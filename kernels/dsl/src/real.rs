@@ -146,6 +146,13 @@ pub trait Real:
     fn two_product(self, other: Self) -> (Self, Self) {
         (self * other, crate::lit!(0.0))
     }
+
+    /// What `work` gives, from a function of its own that is compiled for the type's instruction set: see
+    /// [`apart!`](crate::apart). By default, and in shaders, it is part of the caller.
+    #[inline(always)]
+    fn apart<T>(work: impl FnOnce() -> T) -> T {
+        work()
+    }
 }
 
 /// `x` without its fraction. It must be within the range of `i32`: clamp first. Unlike `as`, this is
@@ -475,6 +482,11 @@ macro_rules! scalar {
             #[inline(always)]
             fn two_product(self, other: Self) -> (Self, Self) {
                 exact::$float::product(self, other)
+            }
+            #[cfg(not(target_arch = "spirv"))]
+            #[inline(never)]
+            fn apart<T>(work: impl FnOnce() -> T) -> T {
+                work()
             }
         }
     )*};

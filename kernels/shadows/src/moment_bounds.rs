@@ -192,7 +192,6 @@ macro_rules! order {
             threads(64),
             precision(f32, f64),
             pinned,
-            scalar,
             inputs = crate::inputs::$adjoint_rows,
             parity(
                 absolute = 1e-12,

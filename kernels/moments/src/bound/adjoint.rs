@@ -11,13 +11,13 @@
 //! derivative of a root, none of a weight, and nothing that is singular where a root is at infinity
 //! (Theorem 14 there).
 
-use hankel_dsl::{Real, lit, unroll};
+use hankel_dsl::{Real, apart, lit, unroll};
 
 use super::kernel::Kernel;
 use super::recurrence::{Recurrence, finite, power_of_two};
 use super::roots::{least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, Plain, Twofold};
-use super::{MAX, MAX_MOMENTS};
+use super::{MAX, MAX_MOMENTS, is_long};
 
 /// The derivative of something that depends on a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,14 +176,11 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     let d_eta = own_weight.times(slope).rounded().clamp(-limit, limit) * -upstream;
     let most: R = lit!(1e37);
     let d_eta = d_eta * recurrence.total.min(most / d_eta.abs().max(one));
-    let mut gradient = Gradient {
-        m: [zero; MAX_MOMENTS],
-        eta: d_eta,
-    };
+    let mut m = [zero; MAX_MOMENTS];
     unroll!(i in 0..(2 * N + 1), max 13, {
-        gradient.m[i] = q[i].rounded() * upstream;
+        m[i] = q[i].rounded() * upstream;
     });
-    gradient
+    Gradient { m, eta: d_eta }
 }
 
 /// The largest magnitude of a derivative.
@@ -199,6 +196,17 @@ fn limit<R: Real>() -> R {
 /// A polynomial in `(x - at) per_length`, a power of two, in powers of `x`: Horner's scheme, repeated.
 #[inline(always)]
 fn moved<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
+    p: &Fine<A>,
+    per_length: R,
+    at: R,
+    limit: R,
+) -> Fine<A> {
+    apart!(R, if DEGREE > 1, by_horner::<R, A, DEGREE>(p, per_length, at, limit))
+}
+
+/// [`moved`]
+#[inline(always)]
+fn by_horner<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
     p: &Fine<A>,
     per_length: R,
     at: R,
@@ -237,21 +245,49 @@ fn blended<R: Real, A: Arithmetic<R>, const N: usize>(
     factor: &Fine<A>,
     minor_share: R,
 ) -> [A; MAX_MOMENTS] {
+    apart!(
+        R,
+        if is_long::<R, A>(N),
+        multiplied::<R, A, N>(e, own_share, rest, factor, minor_share)
+    )
+}
+
+/// [`blended`]
+#[inline(always)]
+fn multiplied<R: Real, A: Arithmetic<R>, const N: usize>(
+    e: &Fine<A>,
+    own_share: R,
+    rest: &Fine<A>,
+    factor: &Fine<A>,
+    minor_share: R,
+) -> [A; MAX_MOMENTS] {
     let limit = limit::<R>();
     let own = squared::<R, A, N>(e);
     let mut minor = [A::of(lit!(0.0)); MAX_MOMENTS];
     if const { N > 1 } {
-        let square = squared::<R, A, N>(rest);
+        // At least one root is divided out.
+        let square = match const { N } {
+            2 => squared::<R, A, 1>(rest),
+            3 => squared::<R, A, 2>(rest),
+            4 => squared::<R, A, 3>(rest),
+            5 => squared::<R, A, 4>(rest),
+            _ => squared::<R, A, 5>(rest),
+        };
+        // In powers of the distance to the query point, the factor has no constant.
         unroll!(i in 0..(MAX + 1), max 7, {
             unroll!(j in 0..(2 * MAX), max 13, {
-                // In powers of the distance to the query point, the factor has no constant.
-                if const { (A::TWICE || i > 0) && i <= N / 2 * 2 && i + j <= 2 * N } {
+                if const { (A::TWICE || i > 0) && i <= N / 2 * 2 && j <= 2 * less(N, 1) && i + j <= 2 * N } {
                     let product = if const { A::TWICE } {
                         factor[i].times_within(square[j], limit)
                     } else {
                         factor[i].times(square[j])
                     };
-                    minor[i + j] = minor[i + j].plus(product);
+                    // The first of its power, or one more.
+                    if const { i == if A::TWICE { 0 } else { 1 } || j == 2 * less(N, 1) } {
+                        minor[i + j] = product;
+                    } else {
+                        minor[i + j] = minor[i + j].plus(product);
+                    }
                 }
             });
         });
@@ -271,13 +307,28 @@ fn blended<R: Real, A: Arithmetic<R>, const N: usize>(
 /// Coefficients of a monic polynomial, highest power first.
 type Fine<A> = [A; MAX + 1];
 
-/// The square of a polynomial of degree N.
+/// The square of a polynomial, of which the coefficients up to DEGREE count.
 #[inline(always)]
-fn squared<R: Real, A: Arithmetic<R>, const N: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
+fn squared<R: Real, A: Arithmetic<R>, const DEGREE: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
+    apart!(R, if is_long::<R, A>(DEGREE), square_of::<R, A, DEGREE>(p))
+}
+
+/// [`squared`]
+#[inline(always)]
+fn square_of<R: Real, A: Arithmetic<R>, const DEGREE: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
+    let two: R = lit!(2.0);
     let mut square = [A::of(lit!(0.0)); MAX_MOMENTS];
-    unroll!(i in 0..(N + 1), max 7, {
-        unroll!(j in 0..(N + 1), max 7, {
-            square[i + j] = square[i + j].plus(p[i].times(p[j]));
+    unroll!(i in 0..(DEGREE + 1), max 7, {
+        square[2 * i] = p[i].times(p[i]);
+        if const { i < DEGREE } {
+            square[2 * i + 1] = p[i].scaled(two).times(p[i + 1]);
+        }
+    });
+    unroll!(i in 0..(DEGREE + 1), max 7, {
+        unroll!(j in 0..(DEGREE + 1), max 7, {
+            if const { j > i + 1 } {
+                square[i + j] = square[i + j].plus(p[i].scaled(two).times(p[j]));
+            }
         });
     });
     square
@@ -363,6 +414,12 @@ const REFINEMENTS: usize = 3;
 /// The negative root of the polynomial next to `v`, with all digits that the coefficients have; 0 stays.
 #[inline(always)]
 fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A {
+    apart!(R, if A::TWICE, refined::<R, A, N>(e, v))
+}
+
+/// [`exact_root`]
+#[inline(always)]
+fn refined<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A {
     let zero: R = lit!(0.0);
     let mut root = A::of(v);
     if const { A::TWICE } {
@@ -397,6 +454,12 @@ fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A
 /// Problems Arising in the Solution of Polynomial Equations*, 1971, section 4).
 #[inline(always)]
 fn deflated<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -> Fine<A> {
+    apart!(R, if A::TWICE, from_both_ends::<R, A, DEGREE>(e, v))
+}
+
+/// [`deflated`]
+#[inline(always)]
+fn from_both_ends<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -> Fine<A> {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let mut rest = *e;
@@ -450,6 +513,12 @@ const fn less(n: usize, by: usize) -> usize {
 /// has degree N - 1.
 #[inline(always)]
 fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
+    apart!(R, if is_long::<R, A>(N), line::<R, A, N>(rest, v))
+}
+
+/// [`single`]
+#[inline(always)]
+fn line<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
     let quotient = divided(rest, v);
@@ -487,6 +556,12 @@ fn limited<R: Real, A: Arithmetic<R>>(a: A, per: A, limit: R) -> A {
 /// polynomials follow from theirs by Leibniz' rule, without cancellation where both roots meet.
 #[inline(always)]
 fn double<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: A) -> Fine<A> {
+    apart!(R, if is_long::<R, A>(N), cubic::<R, A, N>(rest, v1, v2))
+}
+
+/// [`double`]
+#[inline(always)]
+fn cubic<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: A) -> Fine<A> {
     let zero = A::of(lit!(0.0));
     let one = A::of(lit!(1.0));
     let two: R = lit!(2.0);
@@ -590,6 +665,17 @@ fn parabola<R: Real, A: Arithmetic<R>>(v2: A, v3: A, at: A, slope: A, bend: A) -
 /// parabola `t` meets `2 l` times the third divided difference of `s`.
 #[inline(always)]
 fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
+    rest: &Fine<A>,
+    v1: A,
+    v2: A,
+    v3: A,
+) -> Fine<A> {
+    apart!(R, if is_long::<R, A>(N), quintic::<R, A, N>(rest, v1, v2, v3))
+}
+
+/// [`triple`]
+#[inline(always)]
+fn quintic<R: Real, A: Arithmetic<R>, const N: usize>(
     rest: &Fine<A>,
     v1: A,
     v2: A,

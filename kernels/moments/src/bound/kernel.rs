@@ -1,11 +1,11 @@
 //! From the recurrence to the points of the distribution that attains the bound.
 
-use hankel_dsl::{Real, lit, unroll};
+use hankel_dsl::{Real, apart, lit, unroll};
 
-use super::MAX;
 use super::recurrence::Recurrence;
 use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, product};
+use super::{MAX, is_long};
 
 /// What a query point makes of a recurrence.
 ///
@@ -56,6 +56,12 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
     /// For N steps of a recurrence.
     #[inline(always)]
     pub fn new<const N: usize>(recurrence: &Recurrence<R, A>) -> Self {
+        apart!(R, if is_long::<R, A>(N), Self::of_recurrence::<N>(recurrence))
+    }
+
+    /// [`new`](Self::new)
+    #[inline(always)]
+    fn of_recurrence<const N: usize>(recurrence: &Recurrence<R, A>) -> Self {
         let zero: R = lit!(0.0);
         let one: R = lit!(1.0);
         let least: R = lit!(1e-37);
@@ -189,6 +195,12 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
     /// The coefficients `e` and the query point's weight with all digits that the recurrence has.
     #[inline(always)]
     pub fn fine<const N: usize>(&self, reach: R) -> ([A; MAX + 1], A) {
+        apart!(R, if is_long::<R, A>(N), self.fine_coefficients::<N>(reach))
+    }
+
+    /// [`fine`](Self::fine)
+    #[inline(always)]
+    fn fine_coefficients<const N: usize>(&self, reach: R) -> ([A; MAX + 1], A) {
         let zero = A::of(lit!(0.0));
         let one = A::of(lit!(1.0));
         let mut y = [one; MAX + 1];
@@ -404,6 +416,15 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
 /// thereby undone to first order.
 #[inline(always)]
 fn freed<R: Real, A: Arithmetic<R>, const N: usize>(
+    kernel: &Kernel<R, A>,
+    v: R,
+) -> ([R; MAX + 1], R) {
+    apart!(R, if is_long::<R, A>(N), freed_vector::<R, A, N>(kernel, v))
+}
+
+/// [`freed`]
+#[inline(always)]
+fn freed_vector<R: Real, A: Arithmetic<R>, const N: usize>(
     kernel: &Kernel<R, A>,
     v: R,
 ) -> ([R; MAX + 1], R) {

@@ -43,6 +43,11 @@ pub struct Bounds<R> {
     pub upper: R,
 }
 
+/// Whether an order's steps are so long that each is a function of its own natively, which kernels share.
+const fn is_long<R: Real, A: Arithmetic<R>>(n: usize) -> bool {
+    n > 3 || (A::TWICE && n > 1)
+}
+
 impl<R: Real> Bounds<R> {
     /// Between both: the lower one for `overestimation` 0, the upper one for 1.
     #[inline(always)]

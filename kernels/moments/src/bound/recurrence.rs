@@ -10,10 +10,10 @@
 //! moments. The compensated variant computes them with twice the digits, and the first row of
 //! differences, of products of two moments each, with all that are left.
 
-use hankel_dsl::{Real, function, lit, unroll};
+use hankel_dsl::{Real, apart, function, lit, unroll};
 
 use super::twofold::Arithmetic;
-use super::{MAX, MAX_MOMENTS};
+use super::{MAX, MAX_MOMENTS, is_long};
 
 /// The recurrence about the query point, in a unit of length that keeps powers of depths within
 /// range. Its coefficients keep all digits that they were computed with.
@@ -217,169 +217,179 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
     /// diagonal: `ε/4` for plain arithmetic.
     #[inline(always)]
     pub fn new<const N: usize>(m: [R; MAX_MOMENTS], eta: R, floor: R) -> Self {
-        let zero: R = lit!(0.0);
-        let largest: R = lit!(1e25);
-        let far: R = if const { N > 2 } {
+        apart!(R, if is_long::<R, A>(N), by_chebyshev::<R, A, N>(m, eta, floor))
+    }
+}
+
+/// [`Recurrence::new`]
+#[inline(always)]
+fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
+    m: [R; MAX_MOMENTS],
+    eta: R,
+    floor: R,
+) -> Recurrence<R, A> {
+    let zero: R = lit!(0.0);
+    let largest: R = lit!(1e25);
+    let far: R = if const { N > 2 } {
+        lit!(1e12)
+    } else {
+        lit!(1e9)
+    };
+    let total = finite(m[0], lit!(1e37)).max(zero);
+    let lift = lift(total);
+    let lifted = total * lift;
+    let scale = scale(lifted);
+    let mut eta = finite(eta, far);
+
+    let mut current = [A::of(zero); MAX_MOMENTS];
+    let scaled_total = (lifted * scale).max(lit!(1e-12));
+    // Far below what rounding leaves of a pivot, and far above what is too small to divide by.
+    let least = if const { A::TWICE } {
+        scaled_total * lit!(1e-26)
+    } else {
+        R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)))
+    };
+    current[0] = A::of(scaled_total);
+    unroll!(k in 1..(2 * N + 1), max 13, {
+        current[k] = A::of(finite(finite(m[k], lit!(1e37)) * lift * scale, largest));
+    });
+    // In a length near the root of the mean square depth, even moments are 1 and more.
+    let one: R = lit!(1.0);
+    let mut length = one;
+    if const { A::TWICE } {
+        length = depth_unit::<R, N>(current[2].rounded() / scaled_total);
+        let per_length = one / length;
+        let mut power = one;
+        unroll!(k in 1..(2 * N + 1), max 13, {
+            power *= per_length;
+            let scaled = current[k].rounded() * power;
+            current[k] = A::of(finite(scaled, largest));
+        });
+        // No distribution has larger ones of these within that range: their products are finite.
+        let (most, most_square): (R, R) = if const { N == 1 } {
+            (lit!(1e17), largest)
+        } else {
+            (lit!(1e12), lit!(1e17))
+        };
+        current[1] = A::of(finite(current[1].rounded(), most));
+        current[2] = A::of(finite(current[2].rounded(), most_square));
+        eta = (eta * per_length).clamp(-far, far);
+    }
+    let query = A::of(eta);
+    let raw = current;
+    let mut previous = current;
+
+    let mut slope = current[1].over(current[0]);
+    let mut alpha = slope.within(-far, far);
+    // With `scaled`, entries of the first row and all that follow are `m_0` times what they are
+    // otherwise: without a quotient, they are all but exact.
+    let mut beta = A::of(zero);
+    let mut square = scaled_total;
+    let mut unit = scaled_total;
+    let mut limit = far;
+    let mut a = [A::of(zero); MAX];
+    let mut b = [A::of(zero); MAX + 1];
+    a[0] = if const { A::TWICE } {
+        let difference = A::difference(current[1].rounded(), one, eta, scaled_total);
+        difference.over(current[0]).within(-far - far, far + far)
+    } else {
+        alpha.minus(query)
+    };
+    unroll!(k in 1..(N + 1), max 7, {
+        let mut next = current;
+        unroll!(l in 1..(2 * MAX), max 13, {
+            if const { A::TWICE && k == 1 && l < 2 * N } {
+                let (of_this, of_next) = (raw[l].rounded(), raw[l + 1].rounded());
+                let t = A::difference(scaled_total, of_next, raw[1].rounded(), of_this);
+                next[l] = t.within(-largest, largest);
+            } else if const { l >= k && l + k <= 2 * N } {
+                let mut t = current[l + 1].minus(alpha.times(current[l]));
+                if const { k > 1 } {
+                    t = t.minus(beta.times(previous[l]));
+                }
+                next[l] = t.within(-largest, largest);
+            }
+        });
+        if const { k == 2 } {
+            // As the Cholesky factorisation has it: where a bias is all that is left of the
+            // pivot, this keeps more of it.
+            let t = if const { A::TWICE } {
+                let square = raw[2].rounded();
+                A::difference(scaled_total, raw[4].rounded(), square, square)
+            } else {
+                let mean_square = raw[2].over(raw[0]);
+                raw[4].minus(mean_square.times(raw[2]))
+            };
+            let of_slope = if const { A::TWICE } {
+                slope.times_within(current[2], lit!(1e37))
+            } else {
+                slope.times(current[2])
+            };
+            let t = t.minus(of_slope);
+            next[2] = t.within(-largest, largest);
+        }
+        let noise = raw[2 * k].rounded().abs() * floor;
+        next[k] = next[k].at_least(noise.max(least));
+        let most_beta = if const { A::TWICE && k == 1 } {
             lit!(1e12)
         } else {
-            lit!(1e9)
+            far
         };
-        let total = finite(m[0], lit!(1e37)).max(zero);
-        let lift = lift(total);
-        let lifted = total * lift;
-        let scale = scale(lifted);
-        let mut eta = finite(eta, far);
-
-        let mut current = [A::of(zero); MAX_MOMENTS];
-        let scaled_total = (lifted * scale).max(lit!(1e-12));
-        // Far below what rounding leaves of a pivot, and far above what is too small to divide by.
-        let least = if const { A::TWICE } {
-            scaled_total * lit!(1e-26)
+        beta = next[k].over(current[k - 1]).within(zero, most_beta);
+        b[k] = if const { A::TWICE && k == 1 } {
+            beta.over(current[0]).within(zero, far)
         } else {
-            R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)))
+            beta
         };
-        current[0] = A::of(scaled_total);
-        unroll!(k in 1..(2 * N + 1), max 13, {
-            current[k] = A::of(finite(finite(m[k], lit!(1e37)) * lift * scale, largest));
+        if const { k == 1 } {
+            square = b[1].rounded() + a[0].rounded() * a[0].rounded();
+            unit = if const { A::TWICE } {
+                power_of_two(square)
+            } else {
+                square.sqrt()
+            };
+            limit = (unit * farthest::<R, A, N>()).min(far);
+        }
+        if const { k < N } {
+            let below = next[k + 1].over(next[k]);
+            alpha = below.minus(slope).within(eta - limit, eta + limit);
+            slope = below;
+            a[k] = alpha.minus(query);
+        }
+        previous = current;
+        current = next;
+    });
+
+    let (mean, variance) = (a[0].rounded(), b[1].rounded());
+    let spread = variance / square;
+    // The complement where that rounds less.
+    let rest = R::select(spread.lt(lit!(0.5)), one - spread, mean * mean / square);
+    let most = farthest::<R, A, N>() * farthest::<R, A, N>();
+    if const { A::TWICE } {
+        let per_unit = one / unit;
+        let per_square = per_unit * per_unit;
+        unroll!(k in 0..N, max 7, {
+            a[k] = a[k].scaled(per_unit);
+            b[k + 1] = b[k + 1].scaled(per_square).within(zero, most);
         });
-        // In a length near the root of the mean square depth, even moments are 1 and more.
-        let one: R = lit!(1.0);
-        let mut length = one;
-        if const { A::TWICE } {
-            length = depth_unit::<R, N>(current[2].rounded() / scaled_total);
-            let per_length = one / length;
-            let mut power = one;
-            unroll!(k in 1..(2 * N + 1), max 13, {
-                power *= per_length;
-                let scaled = current[k].rounded() * power;
-                current[k] = A::of(finite(scaled, largest));
-            });
-            // No distribution has larger ones of these within that range: their products are finite.
-            let (most, most_square): (R, R) = if const { N == 1 } {
-                (lit!(1e17), largest)
-            } else {
-                (lit!(1e12), lit!(1e17))
-            };
-            current[1] = A::of(finite(current[1].rounded(), most));
-            current[2] = A::of(finite(current[2].rounded(), most_square));
-            eta = (eta * per_length).clamp(-far, far);
-        }
-        let query = A::of(eta);
-        let raw = current;
-        let mut previous = current;
-
-        let mut slope = current[1].over(current[0]);
-        let mut alpha = slope.within(-far, far);
-        // With `scaled`, entries of the first row and all that follow are `m_0` times what they are
-        // otherwise: without a quotient, they are all but exact.
-        let mut beta = A::of(zero);
-        let mut square = scaled_total;
-        let mut unit = scaled_total;
-        let mut limit = far;
-        let mut a = [A::of(zero); MAX];
-        let mut b = [A::of(zero); MAX + 1];
-        a[0] = if const { A::TWICE } {
-            let difference = A::difference(current[1].rounded(), one, eta, scaled_total);
-            difference.over(current[0]).within(-far - far, far + far)
-        } else {
-            alpha.minus(query)
-        };
-        unroll!(k in 1..(N + 1), max 7, {
-            let mut next = current;
-            unroll!(l in 1..(2 * MAX), max 13, {
-                if const { A::TWICE && k == 1 && l < 2 * N } {
-                    let (of_this, of_next) = (raw[l].rounded(), raw[l + 1].rounded());
-                    let t = A::difference(scaled_total, of_next, raw[1].rounded(), of_this);
-                    next[l] = t.within(-largest, largest);
-                } else if const { l >= k && l + k <= 2 * N } {
-                    let mut t = current[l + 1].minus(alpha.times(current[l]));
-                    if const { k > 1 } {
-                        t = t.minus(beta.times(previous[l]));
-                    }
-                    next[l] = t.within(-largest, largest);
-                }
-            });
-            if const { k == 2 } {
-                // As the Cholesky factorisation has it: where a bias is all that is left of the
-                // pivot, this keeps more of it.
-                let t = if const { A::TWICE } {
-                    let square = raw[2].rounded();
-                    A::difference(scaled_total, raw[4].rounded(), square, square)
-                } else {
-                    let mean_square = raw[2].over(raw[0]);
-                    raw[4].minus(mean_square.times(raw[2]))
-                };
-                let of_slope = if const { A::TWICE } {
-                    slope.times_within(current[2], lit!(1e37))
-                } else {
-                    slope.times(current[2])
-                };
-                let t = t.minus(of_slope);
-                next[2] = t.within(-largest, largest);
-            }
-            let noise = raw[2 * k].rounded().abs() * floor;
-            next[k] = next[k].at_least(noise.max(least));
-            let most_beta = if const { A::TWICE && k == 1 } {
-                lit!(1e12)
-            } else {
-                far
-            };
-            beta = next[k].over(current[k - 1]).within(zero, most_beta);
-            b[k] = if const { A::TWICE && k == 1 } {
-                beta.over(current[0]).within(zero, far)
-            } else {
-                beta
-            };
-            if const { k == 1 } {
-                square = b[1].rounded() + a[0].rounded() * a[0].rounded();
-                unit = if const { A::TWICE } {
-                    power_of_two(square)
-                } else {
-                    square.sqrt()
-                };
-                limit = (unit * farthest::<R, A, N>()).min(far);
-            }
-            if const { k < N } {
-                let below = next[k + 1].over(next[k]);
-                alpha = below.minus(slope).within(eta - limit, eta + limit);
-                slope = below;
-                a[k] = alpha.minus(query);
-            }
-            previous = current;
-            current = next;
+        square *= per_square;
+        unit *= length;
+    } else if const { N > 2 } {
+        unroll!(k in 0..N, max 7, {
+            a[k] = A::of(a[k].rounded() / unit);
+            b[k + 1] = A::of((b[k + 1].rounded() / square).min(most));
         });
-
-        let (mean, variance) = (a[0].rounded(), b[1].rounded());
-        let spread = variance / square;
-        // The complement where that rounds less.
-        let rest = R::select(spread.lt(lit!(0.5)), one - spread, mean * mean / square);
-        let most = farthest::<R, A, N>() * farthest::<R, A, N>();
-        if const { A::TWICE } {
-            let per_unit = one / unit;
-            let per_square = per_unit * per_unit;
-            unroll!(k in 0..N, max 7, {
-                a[k] = a[k].scaled(per_unit);
-                b[k + 1] = b[k + 1].scaled(per_square).within(zero, most);
-            });
-            square *= per_square;
-            unit *= length;
-        } else if const { N > 2 } {
-            unroll!(k in 0..N, max 7, {
-                a[k] = A::of(a[k].rounded() / unit);
-                b[k + 1] = A::of((b[k + 1].rounded() / square).min(most));
-            });
-            square = one;
-        } else {
-            unit = one;
-        }
-        Self {
-            a,
-            b,
-            square,
-            spread,
-            rest,
-            unit,
-            total,
-        }
+        square = one;
+    } else {
+        unit = one;
+    }
+    Recurrence {
+        a,
+        b,
+        square,
+        spread,
+        rest,
+        unit,
+        total,
     }
 }

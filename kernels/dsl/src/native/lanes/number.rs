@@ -175,6 +175,16 @@ macro_rules! lanes {
                     ($name($(both[$i].0),+), $name($(both[$i].1),+))
                 })
             }
+            #[inline(always)]
+            fn apart<T>(work: impl FnOnce() -> T) -> T {
+                #[target_feature(enable = $features)]
+                #[inline(never)]
+                fn apart<T>(work: impl FnOnce() -> T) -> T {
+                    work()
+                }
+                // SAFETY: only `on_lanes` uses these types, on processors that have the instruction set.
+                unsafe { apart(work) }
+            }
         }
 
         // SAFETY: the loop over `at` fills every column.
@@ -400,12 +410,12 @@ lanes! {
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f32`.
-    Avx512F32, Avx512F32Mask: two of super::x86::F32x16, "avx512f,avx512dq"
+    Avx512F32, Avx512F32Mask: two of super::x86::F32x16, "avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f64`.
-    Avx512F64, Avx512F64Mask: two of super::x86::F64x8, "avx512f,avx512dq"
+    Avx512F64, Avx512F64Mask: two of super::x86::F64x8, "avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
