@@ -278,7 +278,7 @@ fn multiplied<R: Real, A: Arithmetic<R>, const N: usize>(
             unroll!(j in 0..(2 * MAX), max 13, {
                 if const { (A::TWICE || i > 0) && i <= N / 2 * 2 && j <= 2 * less(N, 1) && i + j <= 2 * N } {
                     let product = if const { A::TWICE } {
-                        factor[i].times_within(square[j], limit)
+                        product_within::<R, A, N>(factor[i], square[j], limit)
                     } else {
                         factor[i].times(square[j])
                     };
@@ -302,6 +302,12 @@ fn multiplied<R: Real, A: Arithmetic<R>, const N: usize>(
         q[i] = of_own.times_plain(own_share).plus(minor[i].times_plain(minor_share));
     });
     q
+}
+
+/// [`Arithmetic::times_within`], of which there are up to seventy in a row.
+#[inline(always)]
+fn product_within<R: Real, A: Arithmetic<R>, const N: usize>(a: A, b: A, limit: R) -> A {
+    apart!(R, if is_long::<R, A>(N), a.times_within(b, limit))
 }
 
 /// Coefficients of a monic polynomial, highest power first.

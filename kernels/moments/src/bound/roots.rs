@@ -116,15 +116,10 @@ fn step<R: Real, const DEGREE: usize>(
 ///
 /// Each lane stops on its own, so that its result does not depend on its neighbours.
 macro_rules! approach {
-    ($($(#[$doc:meta])* $name:ident, $steps:ident -> $Roots:ty: $($way:ident $v:ident $goes_on:ident),*;)*) => {$(
+    ($($(#[$doc:meta])* $name:ident -> $Roots:ty: $($way:ident $v:ident $goes_on:ident),*;)*) => {$(
         $(#[$doc])*
         #[inline(always)]
         fn $name<R: Real, const DEGREE: usize>(e: &Monic<R>, $($way: Way<R>),*) -> $Roots {
-            apart!(R, if DEGREE > 3, $steps::<R, DEGREE>(e, $($way),*))
-        }
-
-        #[inline(always)]
-        fn $steps<R: Real, const DEGREE: usize>(e: &Monic<R>, $($way: Way<R>),*) -> $Roots {
             let most = if const { R::IS_WIDE } { STEPS_WIDE } else { STEPS };
             let zero: R = lit!(0.0);
             $(
@@ -147,11 +142,11 @@ macro_rules! approach {
 
 approach! {
     /// To one root.
-    approach, steps -> [R; 1]: way v goes_on;
+    approach -> [R; 1]: way v goes_on;
     /// To two roots.
-    approach_two, steps_of_two -> [R; 2]: down low goes_down, up high goes_up;
+    approach_two -> [R; 2]: down low goes_down, up high goes_up;
     /// To three roots.
-    approach_three, steps_of_three -> [R; 3]: down low goes_down, up middle goes_up, last high goes_on;
+    approach_three -> [R; 3]: down low goes_down, up middle goes_up, last high goes_on;
 }
 
 /// The least root, from the left: Laguerre's step from minus infinity, and then steps that never
@@ -291,6 +286,15 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
 /// The roots of the derivative of degree D, between its stationary points.
 #[inline(always)]
 fn of_derivative<R: Real, const DEGREE: usize, const D: usize>(
+    e: &Monic<R>,
+    stationary: &[R; MAX],
+) -> [R; MAX] {
+    apart!(R, if D > 2, between_stationary::<R, DEGREE, D>(e, stationary))
+}
+
+/// [`of_derivative`]
+#[inline(always)]
+fn between_stationary<R: Real, const DEGREE: usize, const D: usize>(
     e: &Monic<R>,
     stationary: &[R; MAX],
 ) -> [R; MAX] {

@@ -1,6 +1,6 @@
 //! Numbers of which the rounding error is kept, or is not: what Chebyshev's algorithm runs on.
 
-use hankel_dsl::{Real, apart, function, lit};
+use hankel_dsl::{Real, function, lit};
 
 use super::recurrence::two_to;
 
@@ -232,7 +232,14 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
     }
     #[inline(always)]
     fn times_within(self, other: Self, limit: R) -> Self {
-        apart!(R, if true, limited_product(self, other, limit))
+        let one: R = lit!(1.0);
+        let largest: R = if const { R::IS_WIDE } {
+            lit!(1e250)
+        } else {
+            lit!(1e37)
+        };
+        let most = largest / other.high.abs().max(one);
+        self.within(-most, most).times(other).within(-limit, limit)
     }
     #[inline(always)]
     fn scaled(self, power: R) -> Self {
@@ -303,19 +310,6 @@ impl<R: Real> Arithmetic<R> for Twofold<R> {
             low: R::select(mask, a.low, b.low),
         }
     }
-}
-
-/// [`Arithmetic::times_within`]. Apart, since some functions have so many of them that they would be compiled for minutes.
-#[inline(always)]
-fn limited_product<R: Real>(a: Twofold<R>, b: Twofold<R>, limit: R) -> Twofold<R> {
-    let one: R = lit!(1.0);
-    let largest: R = if const { R::IS_WIDE } {
-        lit!(1e250)
-    } else {
-        lit!(1e37)
-    };
-    let most = largest / b.high.abs().max(one);
-    a.within(-most, most).times(b).within(-limit, limit)
 }
 
 #[cfg(test)]
