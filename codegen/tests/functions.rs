@@ -701,11 +701,12 @@ fn self_is_the_type_with_its_parameters() {
         }
         struct Held<R, A> { x: A, unit: R }
         impl<R: Real, A: Rule<R>> Held<R, A> {
-            fn new(x: R) -> Self { apart!(R, if true, Self::made(x)) }
+            fn new(x: R) -> Self { Self::made(x) }
             fn made(x: R) -> Self { Held { x: A::of(x), unit: lit!(3.0) } }
             fn both(&self) -> R { self.x.number() * self.unit }
         }
-        #[function] fn f(x: f32) -> f32 { Held::<f32, Twice<f32>>::new(x).both() }")
+        #[apart(R, if true)] fn held<R: Real>(x: R) -> Held<R, Twice<R>> { Held::<R, Twice<R>>::new(x) }
+        #[function] fn f(x: f32) -> f32 { held::<f32>(x).both() }")
     .expect("it is translated");
     let glsl = text(&libraries, "glsl");
     assert!(glsl.contains("x * 2.0 * 3.0"), "{glsl}");

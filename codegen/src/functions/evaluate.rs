@@ -1889,10 +1889,6 @@ impl<'a> Evaluator<'a> {
                 }
             }
             "unroll" => self.unroll(frame, mac),
-            "apart" => {
-                let apart: Apart = self.parsed(frame, mac.tokens.clone(), span)?;
-                self.value(frame, &apart.call)
-            }
             "assert" | "debug_assert" => Ok(Value::Unit),
             _ => {
                 let Some(rules) = self.tree.rules(frame.module, &name) else {
@@ -2654,24 +2650,6 @@ impl syn::parse::Parse for Turns {
             to: *to,
             body: input.parse()?,
         })
-    }
-}
-
-/// The call of an `apart!`: here it is part of its caller, as in a shader.
-struct Apart {
-    call: syn::Expr,
-}
-
-impl syn::parse::Parse for Apart {
-    fn parse(input: syn::parse::ParseStream<'_>) -> syn::Result<Self> {
-        input.parse::<syn::Type>()?;
-        input.parse::<syn::Token![,]>()?;
-        input.parse::<syn::Token![if]>()?;
-        input.parse::<syn::Expr>()?;
-        input.parse::<syn::Token![,]>()?;
-        let call = input.parse()?;
-        input.parse::<Option<syn::Token![,]>>()?;
-        Ok(Self { call })
     }
 }
 

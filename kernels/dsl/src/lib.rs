@@ -117,7 +117,6 @@ extern crate std;
 // So that the macros' `::hankel_dsl` paths also work in this crate's own tests.
 extern crate self as hankel_dsl;
 
-mod apart;
 mod atomics;
 mod data;
 mod half;
@@ -138,7 +137,7 @@ pub use atomics::{AtomicInteger, Atomics};
 pub use data::{Bool, PackedVec3};
 pub use glam;
 pub use half::{F16, F16x2, F16x4};
-pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
+pub use hankel_macros::{Element, apart, cooperative, function, kernel, kernels, library};
 pub use memory::{Buffer, array_element};
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]

@@ -148,7 +148,7 @@ pub trait Real:
     }
 
     /// What `work` gives, from a function of its own that is compiled for the type's instruction set: see
-    /// [`apart!`](crate::apart). By default, and in shaders, it is part of the caller.
+    /// [`#[apart]`](macro@crate::apart). By default, and in shaders, it is part of the caller.
     #[inline(always)]
     fn apart<T>(work: impl FnOnce() -> T) -> T {
         work()

@@ -13,7 +13,7 @@
 
 use hankel_dsl::{Real, apart, lit, unroll};
 
-use super::kernel::Kernel;
+use super::kernel::{Kernel, fine};
 use super::recurrence::{Recurrence, finite, power_of_two};
 use super::roots::{least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, Plain, Twofold};
@@ -100,7 +100,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
         kernel.reach
     };
     let (e, own_weight) = if const { A::TWICE } {
-        kernel.fine::<N>(reach)
+        fine::<R, A, N>(&kernel, reach)
     } else {
         let mut e = [A::of(one); MAX + 1];
         unroll!(i in 1..(N + 1), max 7, {
@@ -194,19 +194,9 @@ fn limit<R: Real>() -> R {
 }
 
 /// A polynomial in `(x - at) per_length`, a power of two, in powers of `x`: Horner's scheme, repeated.
+#[apart(R, if DEGREE > 1)]
 #[inline(always)]
 fn moved<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
-    p: &Fine<A>,
-    per_length: R,
-    at: R,
-    limit: R,
-) -> Fine<A> {
-    apart!(R, if DEGREE > 1, by_horner::<R, A, DEGREE>(p, per_length, at, limit))
-}
-
-/// [`moved`]
-#[inline(always)]
-fn by_horner<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
     p: &Fine<A>,
     per_length: R,
     at: R,
@@ -237,24 +227,9 @@ fn by_horner<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
 }
 
 /// `own_share e² + minor_share rest² factor`
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn blended<R: Real, A: Arithmetic<R>, const N: usize>(
-    e: &Fine<A>,
-    own_share: R,
-    rest: &Fine<A>,
-    factor: &Fine<A>,
-    minor_share: R,
-) -> [A; MAX_MOMENTS] {
-    apart!(
-        R,
-        if is_long::<R, A>(N),
-        multiplied::<R, A, N>(e, own_share, rest, factor, minor_share)
-    )
-}
-
-/// [`blended`]
-#[inline(always)]
-fn multiplied<R: Real, A: Arithmetic<R>, const N: usize>(
     e: &Fine<A>,
     own_share: R,
     rest: &Fine<A>,
@@ -305,23 +280,19 @@ fn multiplied<R: Real, A: Arithmetic<R>, const N: usize>(
 }
 
 /// [`Arithmetic::times_within`], of which there are up to seventy in a row.
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn product_within<R: Real, A: Arithmetic<R>, const N: usize>(a: A, b: A, limit: R) -> A {
-    apart!(R, if is_long::<R, A>(N), a.times_within(b, limit))
+    a.times_within(b, limit)
 }
 
 /// Coefficients of a monic polynomial, highest power first.
 type Fine<A> = [A; MAX + 1];
 
 /// The square of a polynomial, of which the coefficients up to DEGREE count.
+#[apart(R, if is_long::<R, A>(DEGREE))]
 #[inline(always)]
 fn squared<R: Real, A: Arithmetic<R>, const DEGREE: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
-    apart!(R, if is_long::<R, A>(DEGREE), square_of::<R, A, DEGREE>(p))
-}
-
-/// [`squared`]
-#[inline(always)]
-fn square_of<R: Real, A: Arithmetic<R>, const DEGREE: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
     let two: R = lit!(2.0);
     let mut square = [A::of(lit!(0.0)); MAX_MOMENTS];
     unroll!(i in 0..(DEGREE + 1), max 7, {
@@ -418,14 +389,9 @@ fn selected<R: Real, A: Arithmetic<R>, const N: usize>(
 const REFINEMENTS: usize = 3;
 
 /// The negative root of the polynomial next to `v`, with all digits that the coefficients have; 0 stays.
+#[apart(R, if A::TWICE)]
 #[inline(always)]
 fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A {
-    apart!(R, if A::TWICE, refined::<R, A, N>(e, v))
-}
-
-/// [`exact_root`]
-#[inline(always)]
-fn refined<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A {
     let zero: R = lit!(0.0);
     let mut root = A::of(v);
     if const { A::TWICE } {
@@ -458,14 +424,9 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A {
 /// division from the lowest power up those of large ones where it is one of the smallest. In twice the digits each
 /// coefficient is taken from the division with the lesser rounding error (G. Peters, J. Wilkinson, *Practical
 /// Problems Arising in the Solution of Polynomial Equations*, 1971, section 4).
+#[apart(R, if A::TWICE)]
 #[inline(always)]
 fn deflated<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -> Fine<A> {
-    apart!(R, if A::TWICE, from_both_ends::<R, A, DEGREE>(e, v))
-}
-
-/// [`deflated`]
-#[inline(always)]
-fn from_both_ends<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -> Fine<A> {
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let mut rest = *e;
@@ -517,14 +478,9 @@ const fn less(n: usize, by: usize) -> usize {
 
 /// The factor that makes `rest(u)²` 1 and stationary at the root, by powers of `u`: `u` times a straight line; `rest`
 /// has degree N - 1.
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
-    apart!(R, if is_long::<R, A>(N), line::<R, A, N>(rest, v))
-}
-
-/// [`single`]
-#[inline(always)]
-fn line<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
     let quotient = divided(rest, v);
@@ -560,14 +516,9 @@ fn limited<R: Real, A: Arithmetic<R>>(a: A, per: A, limit: R) -> A {
 /// straight line `l` that meets `s`, it is `l² + (v - v_1)(v - v_2) t`, where the straight line `t`
 /// meets `2 l` times the second divided difference of `s`. Divided differences of a quotient of
 /// polynomials follow from theirs by Leibniz' rule, without cancellation where both roots meet.
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn double<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: A) -> Fine<A> {
-    apart!(R, if is_long::<R, A>(N), cubic::<R, A, N>(rest, v1, v2))
-}
-
-/// [`double`]
-#[inline(always)]
-fn cubic<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: A) -> Fine<A> {
     let zero = A::of(lit!(0.0));
     let one = A::of(lit!(1.0));
     let two: R = lit!(2.0);
@@ -669,19 +620,9 @@ fn parabola<R: Real, A: Arithmetic<R>>(v2: A, v3: A, at: A, slope: A, bend: A) -
 ///
 /// In the reciprocal it is `l² + (v - v_1)(v - v_2)(v - v_3) t`, where the parabola `l` meets `s` and the
 /// parabola `t` meets `2 l` times the third divided difference of `s`.
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
-    rest: &Fine<A>,
-    v1: A,
-    v2: A,
-    v3: A,
-) -> Fine<A> {
-    apart!(R, if is_long::<R, A>(N), quintic::<R, A, N>(rest, v1, v2, v3))
-}
-
-/// [`triple`]
-#[inline(always)]
-fn quintic<R: Real, A: Arithmetic<R>, const N: usize>(
     rest: &Fine<A>,
     v1: A,
     v2: A,

@@ -56,204 +56,7 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
     /// For N steps of a recurrence.
     #[inline(always)]
     pub fn new<const N: usize>(recurrence: &Recurrence<R, A>) -> Self {
-        apart!(R, if is_long::<R, A>(N), Self::of_recurrence::<N>(recurrence))
-    }
-
-    /// [`new`](Self::new)
-    #[inline(always)]
-    fn of_recurrence<const N: usize>(recurrence: &Recurrence<R, A>) -> Self {
-        let zero: R = lit!(0.0);
-        let one: R = lit!(1.0);
-        let least: R = lit!(1e-37);
-        let mut fine_a = recurrence.a;
-        let fine_b = recurrence.b;
-        let mut a = [zero; MAX];
-        let mut b = [zero; MAX + 1];
-        unroll!(k in 0..N, max 7, {
-            a[k] = fine_a[k].rounded();
-            b[k + 1] = fine_b[k + 1].rounded();
-        });
-        let mut y = [one; MAX + 1];
-        let mut fine_y = [A::of(one); 2];
-        y[1] = -a[0];
-        if const { A::TWICE } {
-            fine_y[1] = fine_a[0].scaled(-one);
-            unroll!(k in 1..N, max 7, {
-                let next = fine_a[k].sum_of_products(fine_y[1], fine_b[k], fine_y[0]).scaled(-one);
-                fine_y[0] = fine_y[1];
-                fine_y[1] = next;
-                y[k + 1] = next.rounded();
-            });
-        } else {
-            unroll!(k in 1..N, max 7, {
-                y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
-            });
-        }
-
-        // The roots and the query point interlace with the roots of p_N, and how many of those
-        // are below the query point is the number of permanences of sign (Sturm).
-        let mut below = zero;
-        unroll!(k in 0..N, max 7, {
-            let (is, was) = (y[k + 1].ge(zero), y[k].ge(zero));
-            below += R::select((is & was) | !(is | was), one, zero);
-        });
-        let count: R = whole!(R, N);
-        let turned = below.gt(count * lit!(0.5));
-        let sign = R::select(turned, -one, one);
-        unroll!(k in 0..N, max 7, {
-            a[k] *= sign;
-        });
-        unroll!(k in 0..(N + 1), max 7, {
-            if const { k % 2 == 1 } {
-                y[k] *= sign;
-            }
-        });
-        if const { A::TWICE } {
-            unroll!(k in 0..N, max 7, {
-                fine_a[k] = fine_a[k].scaled(sign);
-            });
-            let odd = const { N % 2 };
-            fine_y[odd] = fine_y[odd].scaled(sign);
-        }
-        let few = R::select(turned, count - below, below);
-
-        let mut c = [one; MAX + 1];
-        unroll!(k in 0..N, max 7, {
-            c[N - 1 - k] = c[N - k] * b[N - k];
-        });
-        let mut outer = zero;
-        unroll!(k in 2..(N + 1), max 7, {
-            outer += c[k] * (y[k] * y[k]);
-        });
-        // The first two terms are the mean square times c_1.
-        let square = (outer + c[1] * recurrence.square).max(least);
-        let (own, others) = if const { N == 1 } {
-            (recurrence.spread, recurrence.rest)
-        } else {
-            let own = (c[0] / square).min(recurrence.spread);
-            let others = (outer + c[1] * (y[1] * y[1])) / square;
-            let others = R::select(own.lt(lit!(0.5)), one - own, others);
-            (own, others.max(recurrence.rest))
-        };
-
-        // K_k = y_k p_k + β_k K_{k-1}, all in powers of u.
-        let mut p = [zero; MAX + 2];
-        let mut before = p;
-        let mut kernel = [zero; MAX + 1];
-        p[0] = one;
-        kernel[0] = one;
-        unroll!(k in 0..N, max 7, {
-            let mut next = [zero; MAX + 2];
-            unroll!(i in 0..(MAX + 1), max 7, {
-                if const { i <= k + 1 } {
-                    let mut t = zero;
-                    if const { i <= k } {
-                        t -= a[k] * p[i];
-                    }
-                    if const { k > 0 && i < k } {
-                        t -= b[k] * before[i];
-                    }
-                    if const { i > 0 } {
-                        t += p[i - 1];
-                    }
-                    next[i] = t;
-                }
-            });
-            before = p;
-            p = next;
-            unroll!(i in 0..(MAX + 1), max 7, {
-                if const { i <= k } {
-                    kernel[i] = b[k + 1] * kernel[i] + y[k + 1] * p[i];
-                } else if const { i == k + 1 } {
-                    kernel[i] = y[k + 1];
-                }
-            });
-        });
-        kernel[0] = square;
-
-        let (e, reach) = reversed::<R, N>(&kernel);
-        Self {
-            a,
-            b,
-            y,
-            c,
-            mean_square: recurrence.square,
-            k: kernel,
-            square,
-            own,
-            others,
-            e,
-            reach,
-            fine_a,
-            fine_b,
-            fine_y,
-            turned,
-            few,
-        }
-    }
-
-    /// The coefficients `e` and the query point's weight with all digits that the recurrence has.
-    #[inline(always)]
-    pub fn fine<const N: usize>(&self, reach: R) -> ([A; MAX + 1], A) {
-        apart!(R, if is_long::<R, A>(N), self.fine_coefficients::<N>(reach))
-    }
-
-    /// [`fine`](Self::fine)
-    #[inline(always)]
-    fn fine_coefficients<const N: usize>(&self, reach: R) -> ([A; MAX + 1], A) {
-        let zero = A::of(lit!(0.0));
-        let one = A::of(lit!(1.0));
-        let mut y = [one; MAX + 1];
-        y[1] = self.fine_a[0].scaled(lit!(-1.0));
-        unroll!(k in 1..N, max 7, {
-            let next = self.fine_a[k].sum_of_products(y[k], self.fine_b[k], y[k - 1]);
-            y[k + 1] = next.scaled(lit!(-1.0));
-        });
-        // As `new` has it.
-        let mut p = [zero; MAX + 2];
-        let mut before = p;
-        let mut kernel = [zero; MAX + 1];
-        let mut weight = one;
-        p[0] = one;
-        kernel[0] = one;
-        unroll!(k in 0..N, max 7, {
-            let mut next = [zero; MAX + 2];
-            unroll!(i in 0..(MAX + 1), max 7, {
-                if const { i <= k + 1 } {
-                    let mut t = zero;
-                    if const { i <= k } {
-                        t = t.minus(self.fine_a[k].times(p[i]));
-                    }
-                    if const { k > 0 && i < k } {
-                        t = t.minus(self.fine_b[k].times(before[i]));
-                    }
-                    if const { i > 0 } {
-                        t = t.plus(p[i - 1]);
-                    }
-                    next[i] = t;
-                }
-            });
-            before = p;
-            p = next;
-            weight = weight.times(self.fine_b[k + 1]);
-            unroll!(i in 0..(MAX + 1), max 7, {
-                if const { i <= k } {
-                    kernel[i] = self.fine_b[k + 1].times(kernel[i]).plus(y[k + 1].times(p[i]));
-                } else if const { i == k + 1 } {
-                    kernel[i] = y[k + 1];
-                }
-            });
-        });
-        let square = kernel[0].at_least(lit!(1e-37));
-        let per_reach = A::of(R::literal::<{ 1.0_f64.to_bits() }>() / reach);
-        let largest: R = lit!(1e17);
-        let mut e = [one; MAX + 1];
-        let mut power = per_reach;
-        unroll!(i in 1..(N + 1), max 7, {
-            e[i] = kernel[i].over(square).times_within(power, largest);
-            power = power.times(per_reach);
-        });
-        (e, weight.over(square).within(lit!(0.0), lit!(1.0)))
+        of_recurrence::<R, A, N>(recurrence)
     }
 
     #[inline(always)]
@@ -297,6 +100,204 @@ impl<R: Real, A: Arithmetic<R>> Kernel<R, A> {
         let is_small = wanted.lt(half) | !is_other_exact;
         R::select(is_exact & is_small, wanted, one - (self.own + other))
     }
+}
+
+/// [`Kernel::new`]
+#[apart(R, if is_long::<R, A>(N))]
+#[inline(always)]
+fn of_recurrence<R: Real, A: Arithmetic<R>, const N: usize>(
+    recurrence: &Recurrence<R, A>,
+) -> Kernel<R, A> {
+    let zero: R = lit!(0.0);
+    let one: R = lit!(1.0);
+    let least: R = lit!(1e-37);
+    let mut fine_a = recurrence.a;
+    let fine_b = recurrence.b;
+    let mut a = [zero; MAX];
+    let mut b = [zero; MAX + 1];
+    unroll!(k in 0..N, max 7, {
+        a[k] = fine_a[k].rounded();
+        b[k + 1] = fine_b[k + 1].rounded();
+    });
+    let mut y = [one; MAX + 1];
+    let mut fine_y = [A::of(one); 2];
+    y[1] = -a[0];
+    if const { A::TWICE } {
+        fine_y[1] = fine_a[0].scaled(-one);
+        unroll!(k in 1..N, max 7, {
+            let next = fine_a[k].sum_of_products(fine_y[1], fine_b[k], fine_y[0]).scaled(-one);
+            fine_y[0] = fine_y[1];
+            fine_y[1] = next;
+            y[k + 1] = next.rounded();
+        });
+    } else {
+        unroll!(k in 1..N, max 7, {
+            y[k + 1] = -(a[k] * y[k] + b[k] * y[k - 1]);
+        });
+    }
+
+    // The roots and the query point interlace with the roots of p_N, and how many of those
+    // are below the query point is the number of permanences of sign (Sturm).
+    let mut below = zero;
+    unroll!(k in 0..N, max 7, {
+        let (is, was) = (y[k + 1].ge(zero), y[k].ge(zero));
+        below += R::select((is & was) | !(is | was), one, zero);
+    });
+    let count: R = whole!(R, N);
+    let turned = below.gt(count * lit!(0.5));
+    let sign = R::select(turned, -one, one);
+    unroll!(k in 0..N, max 7, {
+        a[k] *= sign;
+    });
+    unroll!(k in 0..(N + 1), max 7, {
+        if const { k % 2 == 1 } {
+            y[k] *= sign;
+        }
+    });
+    if const { A::TWICE } {
+        unroll!(k in 0..N, max 7, {
+            fine_a[k] = fine_a[k].scaled(sign);
+        });
+        let odd = const { N % 2 };
+        fine_y[odd] = fine_y[odd].scaled(sign);
+    }
+    let few = R::select(turned, count - below, below);
+
+    let mut c = [one; MAX + 1];
+    unroll!(k in 0..N, max 7, {
+        c[N - 1 - k] = c[N - k] * b[N - k];
+    });
+    let mut outer = zero;
+    unroll!(k in 2..(N + 1), max 7, {
+        outer += c[k] * (y[k] * y[k]);
+    });
+    // The first two terms are the mean square times c_1.
+    let square = (outer + c[1] * recurrence.square).max(least);
+    let (own, others) = if const { N == 1 } {
+        (recurrence.spread, recurrence.rest)
+    } else {
+        let own = (c[0] / square).min(recurrence.spread);
+        let others = (outer + c[1] * (y[1] * y[1])) / square;
+        let others = R::select(own.lt(lit!(0.5)), one - own, others);
+        (own, others.max(recurrence.rest))
+    };
+
+    // K_k = y_k p_k + β_k K_{k-1}, all in powers of u.
+    let mut p = [zero; MAX + 2];
+    let mut before = p;
+    let mut kernel = [zero; MAX + 1];
+    p[0] = one;
+    kernel[0] = one;
+    unroll!(k in 0..N, max 7, {
+        let mut next = [zero; MAX + 2];
+        unroll!(i in 0..(MAX + 1), max 7, {
+            if const { i <= k + 1 } {
+                let mut t = zero;
+                if const { i <= k } {
+                    t -= a[k] * p[i];
+                }
+                if const { k > 0 && i < k } {
+                    t -= b[k] * before[i];
+                }
+                if const { i > 0 } {
+                    t += p[i - 1];
+                }
+                next[i] = t;
+            }
+        });
+        before = p;
+        p = next;
+        unroll!(i in 0..(MAX + 1), max 7, {
+            if const { i <= k } {
+                kernel[i] = b[k + 1] * kernel[i] + y[k + 1] * p[i];
+            } else if const { i == k + 1 } {
+                kernel[i] = y[k + 1];
+            }
+        });
+    });
+    kernel[0] = square;
+
+    let (e, reach) = reversed::<R, N>(&kernel);
+    Kernel {
+        a,
+        b,
+        y,
+        c,
+        mean_square: recurrence.square,
+        k: kernel,
+        square,
+        own,
+        others,
+        e,
+        reach,
+        fine_a,
+        fine_b,
+        fine_y,
+        turned,
+        few,
+    }
+}
+
+/// The coefficients `e` and the query point's weight with all digits that the recurrence has.
+#[apart(R, if is_long::<R, A>(N))]
+#[inline(always)]
+pub(crate) fn fine<R: Real, A: Arithmetic<R>, const N: usize>(
+    kernel: &Kernel<R, A>,
+    reach: R,
+) -> ([A; MAX + 1], A) {
+    let zero = A::of(lit!(0.0));
+    let one = A::of(lit!(1.0));
+    let mut y = [one; MAX + 1];
+    y[1] = kernel.fine_a[0].scaled(lit!(-1.0));
+    unroll!(k in 1..N, max 7, {
+        let next = kernel.fine_a[k].sum_of_products(y[k], kernel.fine_b[k], y[k - 1]);
+        y[k + 1] = next.scaled(lit!(-1.0));
+    });
+    // As `new` has it.
+    let mut p = [zero; MAX + 2];
+    let mut before = p;
+    let mut powers = [zero; MAX + 1];
+    let mut weight = one;
+    p[0] = one;
+    powers[0] = one;
+    unroll!(k in 0..N, max 7, {
+        let mut next = [zero; MAX + 2];
+        unroll!(i in 0..(MAX + 1), max 7, {
+            if const { i <= k + 1 } {
+                let mut t = zero;
+                if const { i <= k } {
+                    t = t.minus(kernel.fine_a[k].times(p[i]));
+                }
+                if const { k > 0 && i < k } {
+                    t = t.minus(kernel.fine_b[k].times(before[i]));
+                }
+                if const { i > 0 } {
+                    t = t.plus(p[i - 1]);
+                }
+                next[i] = t;
+            }
+        });
+        before = p;
+        p = next;
+        weight = weight.times(kernel.fine_b[k + 1]);
+        unroll!(i in 0..(MAX + 1), max 7, {
+            if const { i <= k } {
+                powers[i] = kernel.fine_b[k + 1].times(powers[i]).plus(y[k + 1].times(p[i]));
+            } else if const { i == k + 1 } {
+                powers[i] = y[k + 1];
+            }
+        });
+    });
+    let square = powers[0].at_least(lit!(1e-37));
+    let per_reach = A::of(R::literal::<{ 1.0_f64.to_bits() }>() / reach);
+    let largest: R = lit!(1e17);
+    let mut e = [one; MAX + 1];
+    let mut power = per_reach;
+    unroll!(i in 1..(N + 1), max 7, {
+        e[i] = powers[i].over(square).times_within(power, largest);
+        power = power.times(per_reach);
+    });
+    (e, weight.over(square).within(lit!(0.0), lit!(1.0)))
 }
 
 /// `p_k(u)` for the root `u = 1 / (reach v)`, all times a common factor that keeps them within
@@ -414,17 +415,9 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
 /// The root's vector and its square, both freed of the query point's vector, to which it would
 /// be orthogonal if the root were exact: what a root's rounding error does to its weight is
 /// thereby undone to first order.
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn freed<R: Real, A: Arithmetic<R>, const N: usize>(
-    kernel: &Kernel<R, A>,
-    v: R,
-) -> ([R; MAX + 1], R) {
-    apart!(R, if is_long::<R, A>(N), freed_vector::<R, A, N>(kernel, v))
-}
-
-/// [`freed`]
-#[inline(always)]
-fn freed_vector<R: Real, A: Arithmetic<R>, const N: usize>(
     kernel: &Kernel<R, A>,
     v: R,
 ) -> ([R; MAX + 1], R) {

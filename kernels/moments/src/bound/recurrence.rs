@@ -217,11 +217,12 @@ impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
     /// diagonal: `ε/4` for plain arithmetic.
     #[inline(always)]
     pub fn new<const N: usize>(m: [R; MAX_MOMENTS], eta: R, floor: R) -> Self {
-        apart!(R, if is_long::<R, A>(N), by_chebyshev::<R, A, N>(m, eta, floor))
+        by_chebyshev::<R, A, N>(m, eta, floor)
     }
 }
 
 /// [`Recurrence::new`]
+#[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
 fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
     m: [R; MAX_MOMENTS],

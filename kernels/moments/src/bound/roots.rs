@@ -284,17 +284,9 @@ pub(crate) fn all<R: Real, const DEGREE: usize>(e: &Monic<R>) -> [R; MAX] {
 }
 
 /// The roots of the derivative of degree D, between its stationary points.
+#[apart(R, if D > 2)]
 #[inline(always)]
 fn of_derivative<R: Real, const DEGREE: usize, const D: usize>(
-    e: &Monic<R>,
-    stationary: &[R; MAX],
-) -> [R; MAX] {
-    apart!(R, if D > 2, between_stationary::<R, DEGREE, D>(e, stationary))
-}
-
-/// [`of_derivative`]
-#[inline(always)]
-fn between_stationary<R: Real, const DEGREE: usize, const D: usize>(
     e: &Monic<R>,
     stationary: &[R; MAX],
 ) -> [R; MAX] {

@@ -343,7 +343,9 @@ macro_rules! lanes {
         }
     };
     (@each $i:tt $value:expr) => { $value };
-    // A function that has the instruction set, in one that can not say so.
+    // An operation of a trait, which cannot have an instruction set of its own, in a function that has. There the
+    // compiler turns it into a few instructions before it is inlined anywhere. Without it each instruction would be a call
+    // with its operands in memory, and to undo that took most of a build.
     (@compiled $features:literal ($($argument:ident: $type:ty = $value:expr),+) -> $result:ty $body:block) => {{
         #[target_feature(enable = $features)]
         #[inline]
