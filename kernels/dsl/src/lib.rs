@@ -137,7 +137,21 @@ pub use atomics::{AtomicInteger, Atomics};
 pub use data::{Bool, PackedVec3};
 pub use glam;
 pub use half::{F16, F16x2, F16x4};
-pub use hankel_macros::{Element, apart, cooperative, function, kernel, kernels, library};
+/// ```
+/// use hankel_dsl::{Real, apart};
+/// #[apart(R, if N > 3)]
+/// #[inline(always)]
+/// fn power<R: Real, const N: usize>(x: R) -> R {
+///     let mut all = x;
+///     for _ in 1..N {
+///         all *= x;
+///     }
+///     all
+/// }
+/// assert_eq!(power::<f32, 4>(2.0) + power::<f32, 2>(3.0), 25.0);
+/// ```
+pub use hankel_macros::apart;
+pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
 pub use memory::{Buffer, array_element};
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]

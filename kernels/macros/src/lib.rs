@@ -171,20 +171,6 @@ pub fn kernels(input: TokenStream) -> TokenStream {
 /// The condition is a constant, and may depend on the function's parameters. A call costs time when it runs: arguments and
 /// results are in memory, for each row of a group of lanes. Measure it: bounds from eight moments, in plain arithmetic and
 /// 30 ns a row, took a tenth longer.
-///
-/// ```
-/// use hankel_dsl::{Real, apart};
-/// #[apart(R, if N > 3)]
-/// #[inline(always)]
-/// fn power<R: Real, const N: usize>(x: R) -> R {
-///     let mut all = x;
-///     for _ in 1..N {
-///         all *= x;
-///     }
-///     all
-/// }
-/// assert_eq!(power::<f32, 4>(2.0) + power::<f32, 2>(3.0), 25.0);
-/// ```
 #[proc_macro_attribute]
 pub fn apart(args: TokenStream, item: TokenStream) -> TokenStream {
     let args = parse_macro_input!(args as apart::Apart);
