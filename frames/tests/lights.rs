@@ -175,14 +175,8 @@ fn every_technique_of_hard_shadows_shades_from_a_lamp() {
                 let pairs = picture.values.iter().zip(&truth.unwrap().values);
                 let darker = pairs.map(|(a, b)| b - a).fold(0.0, f32::max);
                 // The bias may be all shadow. Depths and places are rounded after division, too: twice what
-                // those of a directional light are allowed; the cone's edge is steep: 21 times 4e-7. Hausdorff
-                // shadows are delicate, see `frames/tests/truth.rs`.
-                let delicate = if t.name == "hausdorff" && is_float {
-                    0.04
-                } else {
-                    0.0
-                };
-                let allowed = scene.shadow.moment_bias + 3e-5 + delicate;
+                // those of a directional light are allowed; the cone's edge is steep: 21 times 4e-7.
+                let allowed = scene.shadow.moment_bias + 3e-5;
                 assert!(darker <= allowed, "{fit}, {}: darker by {darker}", t.name);
             }
         }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use hankel_dsl::glam::Vec3;
-use hankel_frames::passes::POWER_MOMENTS;
 use hankel_frames::scattering::Scattering;
 use hankel_frames::scene::{
     Area, AreaShape, DepthRange, Fit, Geometry, Light, MAX_TRIANGLES, MAX_VERTICES, Medium, Mesh,
@@ -54,7 +53,8 @@ fn the_least_scene_has_the_documented_defaults() {
     let pcf = parse(&format!("{LEAST}[shadow]\ntechnique = 'pcf'")).unwrap();
     assert_eq!(pcf.shadow.depth_bias, 2e-3);
     let hausdorff = parse(&format!("{LEAST}[shadow]\ntechnique = 'hausdorff'")).unwrap();
-    assert_eq!(hausdorff.shadow.depth_bias, 1e-3);
+    assert_eq!(hausdorff.shadow.depth_bias, 0.0);
+    assert_eq!(hausdorff.shadow.moment_bias, 5.7e-5);
     let unit = parse(&format!("{LEAST}[shadow]\ndepth_range = 'unit'")).unwrap();
     assert_eq!(unit.shadow.moment_bias, 3e-5);
     let float = parse(&format!("{LEAST}[shadow]\nformat = 'rgba32float'")).unwrap();
@@ -136,7 +136,7 @@ fn every_field_is_read() {
             steps: 20,
         })
     );
-    let map = POWER_MOMENTS[1];
+    let map = Technique::named("hausdorff").unwrap().maps[1];
     let stored = (map.format.name(), map.depth_range);
     assert_eq!(stored, ("rgba16unorm", DepthRange::Unit));
     assert_eq!(

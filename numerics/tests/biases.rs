@@ -25,11 +25,15 @@ fn found() -> Vec<(Measured, Found)> {
 #[test]
 fn measured_strengths_suffice_and_are_not_far_above_what_is_needed() {
     for (measured, found) in found() {
-        let Measured { bias, robust } = measured;
+        let Measured {
+            bias,
+            robust,
+            in_range,
+        } = measured;
         let format = found.format;
         assert_eq!(
-            (bias.basis, bias.count, bias.bits),
-            (format.basis, format.count(), format.bits())
+            (bias.basis, bias.count, bias.bits, in_range),
+            (format.basis, format.count(), format.bits(), format.in_range)
         );
         assert_eq!(bias.target[..=bias.count], found.target[..], "{format}");
         // Fewer regions need no more, and not less by orders of magnitude.

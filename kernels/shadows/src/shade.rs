@@ -284,7 +284,7 @@ shading! {
     shade_hausdorff,
     /// Shading with Hausdorff four moment shadow mapping, with mip levels.
     shade_hausdorff_mips,
-    hausdorff_shadow(map), inputs(shaded), uniforms(), constants(
+    hausdorff_shadow(map), inputs(shaded_in_range), uniforms(), constants(
         #[constant(id = 0, default = 2)]
         #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
         encoding: u32

@@ -8,8 +8,8 @@ use hankel_moments::bias::{self, Basis, Bias, PUBLISHED};
 use hankel_moments::{
     Bounds, HalfAngle, MAX_MOMENTS, Moments4, Moments6, Quantized4, Quantized6,
     TrigonometricMoments, bound, dequantize_symmetric_4, dequantize_symmetric_6, dequantize_unit_4,
-    dequantize_unit_6, from_unorm, quantize_symmetric_4, quantize_symmetric_6, quantize_unit_4,
-    quantize_unit_6, to_unorm, trigonometric_4,
+    dequantize_unit_6, from_unorm, hausdorff_4, hausdorff_4_symmetric, quantize_symmetric_4,
+    quantize_symmetric_6, quantize_unit_4, quantize_unit_6, to_unorm, trigonometric_4,
 };
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,8 @@ pub struct Format {
     #[serde(with = "basis")]
     pub basis: Basis,
     count: usize,
+    /// Whether bounds are those of depths that are known to be in the range (the Hausdorff problem).
+    pub in_range: bool,
     /// How they are stored.
     pub storage: Storage,
 }
@@ -70,7 +72,16 @@ const fn of(basis: Basis, count: usize, storage: Storage) -> Format {
     Format {
         basis,
         count,
+        in_range: false,
         storage,
+    }
+}
+
+/// Four moments, for bounds of depths in the range.
+const fn in_range(basis: Basis, storage: Storage) -> Format {
+    Format {
+        in_range: true,
+        ..of(basis, 4, storage)
     }
 }
 
@@ -79,7 +90,7 @@ const SIXTEEN: Storage = Storage::Normalised(16);
 const TEN: Storage = Storage::Normalised(10);
 
 /// All that are measured.
-pub const FORMATS: [Format; 19] = [
+pub const FORMATS: [Format; 25] = [
     of(Basis::Unit, 4, FLOAT),
     of(Basis::Unit, 4, SIXTEEN),
     of(Basis::Unit, 4, TEN),
@@ -99,6 +110,12 @@ pub const FORMATS: [Format; 19] = [
     of(Basis::Trigonometric, 4, SIXTEEN),
     of(Basis::Trigonometric, 4, TEN),
     of(Basis::Symmetric, 10, FLOAT),
+    in_range(Basis::Unit, FLOAT),
+    in_range(Basis::Unit, SIXTEEN),
+    in_range(Basis::Unit, TEN),
+    in_range(Basis::Symmetric, FLOAT),
+    in_range(Basis::Symmetric, SIXTEEN),
+    in_range(Basis::Symmetric, TEN),
 ];
 
 impl fmt::Display for Format {
@@ -125,18 +142,19 @@ impl Format {
 
     /// The name, without the bits.
     pub(super) fn without_bits(self) -> String {
-        format!("{}-{}", name_of(self.basis), self.count)
+        let range = if self.in_range { "-hausdorff" } else { "" };
+        format!("{}-{}{range}", name_of(self.basis), self.count)
     }
 
     /// Whether there is published code for it: four moments by Hamburger's problem.
     pub(super) fn has_listing(self) -> bool {
-        self.count == 4 && self.basis != Basis::Trigonometric
+        self.count == 4 && self.basis != Basis::Trigonometric && !self.in_range
     }
 
     fn published_bias(self) -> Option<Bias> {
-        let mut fitting = PUBLISHED
-            .into_iter()
-            .filter(|(_, b)| (b.basis, b.count, b.bits) == (self.basis, self.count, self.bits()));
+        let mut fitting = PUBLISHED.into_iter().filter(|(_, b)| {
+            (b.basis, b.count, b.bits) == (self.basis, self.count, self.bits()) && !self.in_range
+        });
         // Of those for [0, 1], the one for clamped depths: it alone suits depths at the ends.
         let suits = |b: &Bias| self.basis != Basis::Unit || b.target[2] < 0.5;
         fitting.find(|(_, b)| suits(b)).map(|(_, b)| b)
@@ -148,11 +166,13 @@ impl Format {
     }
 
     /// What is mixed in: the published vector for this format, or else that for as many moments and
-    /// the most similar number of bits.
+    /// the most similar number of bits. For depths in the range, this project's own.
     #[doc(hidden)]
     #[must_use]
     pub fn target(self) -> [f64; MAX_MOMENTS] {
         let fallback = match (self.basis, self.count, self.storage) {
+            (Basis::Unit, 4, _) if self.in_range => bias::HAUSDORFF_UNIT_4_16,
+            (Basis::Symmetric, 4, _) if self.in_range => bias::HAUSDORFF_SYMMETRIC_4_16,
             (Basis::Unit, 4, _) => bias::CLAMPED_4_16,
             (Basis::Unit, _, _) => bias::CLAMPED_6_10,
             (Basis::Symmetric, 4, _) => bias::SYMMETRIC_4_16,
@@ -393,7 +413,9 @@ impl Format {
         };
         match (criterion, self.basis) {
             (Criterion::Definite, Basis::Trigonometric) => !is_toeplitz_definite(&m),
-            (Criterion::Definite, _) => !is_hankel_definite(self.count / 2, &m),
+            (Criterion::Definite, basis) => {
+                !is_hankel_definite(self.count / 2, &m) || self.in_range && !is_inside(basis, &m)
+            }
             (Criterion::Robust, Basis::Trigonometric) => {
                 let moments = TrigonometricMoments {
                     c1: m[1],
@@ -409,6 +431,14 @@ impl Format {
                 }
                 beyond(bounds)
             }
+            (Criterion::Robust, basis) if self.in_range => {
+                let m = four(&m);
+                let lower = match basis {
+                    Basis::Unit => hausdorff_4(m, query),
+                    _ => hausdorff_4_symmetric(m, query),
+                };
+                beyond(Bounds { lower, upper: 1.0 })
+            }
             (Criterion::Robust, _) => beyond(match self.count {
                 4 => bound::<f32, 2>(m, query),
                 6 => bound::<f32, 3>(m, query),
@@ -417,6 +447,15 @@ impl Format {
             }),
             (Criterion::Listing, _) => beyond(listed(&m, query)),
         }
+    }
+}
+
+fn four(m: &[f32; MAX_MOMENTS]) -> Moments4<f32> {
+    Moments4 {
+        b1: m[1],
+        b2: m[2],
+        b3: m[3],
+        b4: m[4],
     }
 }
 
@@ -459,6 +498,17 @@ fn is_hankel_definite(n: usize, m: &[f32; MAX_MOMENTS]) -> bool {
         }
     }
     true
+}
+
+/// Whether x (1 - x) times the distribution, or (1 + x) (1 - x) times it, has a positive definite Hankel matrix. With that
+/// of the distribution itself, its moments are inside those of the Hausdorff problem.
+fn is_inside(basis: Basis, m: &[f32; MAX_MOMENTS]) -> bool {
+    let [b0, b1, b2, b3, b4] = [m[0], m[1], m[2], m[3], m[4]].map(DoubleDouble::from);
+    let (n0, n1, n2) = match basis {
+        Basis::Unit => (b1 - b2, b2 - b3, b3 - b4),
+        _ => (b0 - b2, b1 - b3, b2 - b4),
+    };
+    f64::from(n0) > 0.0 && f64::from(n0 * n2 - n1 * n1) > 0.0
 }
 
 /// Whether the Toeplitz matrix of 1, c1 + i s1 and c2 + i s2 is positive definite.

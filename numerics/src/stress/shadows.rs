@@ -300,6 +300,7 @@ impl Distributions {
         let bias = |bits: u32| {
             let fits = |b: &&hankel_moments::bias::Measured| {
                 (b.bias.basis, b.bias.count, b.bias.bits) == (bound.basis(), 4, bits)
+                    && b.in_range == (bound != Bound::Trigonometric)
             };
             MEASURED.iter().find(fits).map(|b| b.bias)
         };

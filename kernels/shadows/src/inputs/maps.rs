@@ -9,8 +9,9 @@ use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::inputs::{Given, Request, Source, Value};
 use hankel_dsl::native::{Address, Filter, Sampler};
 use hankel_moments::bias::{
-    Bias, CLAMPED_4_16, MEASURED, SYMMETRIC_4_16, SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32,
-    SYMMETRIC_8_32, SYMMETRIC_10_32, TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32,
+    Bias, CLAMPED_4_16, HAUSDORFF_SYMMETRIC_4_16, HAUSDORFF_SYMMETRIC_4_32, HAUSDORFF_UNIT_4_16,
+    MEASURED, SYMMETRIC_4_16, SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32, SYMMETRIC_8_32,
+    SYMMETRIC_10_32, TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32,
 };
 use hankel_moments::{
     Moments4, Moments6, OddHarmonics, TrigonometricMoments, from_unorm, pack_10, pack_16,
@@ -76,6 +77,15 @@ pub(super) fn published(how: u32) -> Bias {
         encoding::UNIT => CLAMPED_4_16,
         encoding::SYMMETRIC => SYMMETRIC_4_16,
         _ => SYMMETRIC_4_32,
+    }
+}
+
+/// How a map holds moments, and the bias for the Hausdorff problem.
+pub(super) fn measured_in_range(how: u32) -> Bias {
+    match how {
+        encoding::UNIT => HAUSDORFF_UNIT_4_16,
+        encoding::SYMMETRIC => HAUSDORFF_SYMMETRIC_4_16,
+        _ => HAUSDORFF_SYMMETRIC_4_32,
     }
 }
 
@@ -284,6 +294,13 @@ pub(super) fn with_bias(request: &Request, bias: &Bias, maps: &[(&str, Vec<Vec4>
 pub fn shaded(request: &Request) -> Vec<Given> {
     let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
     with_bias(request, &published(how), &[("map", texels(how))])
+}
+
+/// The same for the Hausdorff problem.
+#[must_use]
+pub fn shaded_in_range(request: &Request) -> Vec<Given> {
+    let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
+    with_bias(request, &measured_in_range(how), &[("map", texels(how))])
 }
 
 /// What shading with maps of six moments reads, for their `encoding`.

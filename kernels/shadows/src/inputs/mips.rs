@@ -176,8 +176,18 @@ fn stored(is_plain: bool, m: [f64; 4]) -> Vec4 {
 /// What shading with a map of moments reads, for the map's `encoding`.
 #[must_use]
 pub fn shaded(request: &Request) -> Vec<Given> {
+    shaded_with(request, maps::published)
+}
+
+/// The same for the Hausdorff problem.
+#[must_use]
+pub fn shaded_in_range(request: &Request) -> Vec<Given> {
+    shaded_with(request, maps::measured_in_range)
+}
+
+fn shaded_with(request: &Request, bias: impl Fn(u32) -> Bias) -> Vec<Given> {
     let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
-    let bias = maps::published(how);
+    let bias = bias(how);
     let strength = bias.strength as f32;
     let of = |z| maps::channels(how, z);
     let store = |_, m| stored(how == encoding::PLAIN, m);

@@ -59,6 +59,20 @@ pub const CLAMPED_FOUR_TARGET: Vec4 = four(&bias::CLAMPED_4_16);
 /// supplement).
 pub const CLAMPED_FOUR_STRENGTH: f32 = bias::CLAMPED_4_16.strength as f32;
 
+/// Target for the Hausdorff problem, four power moments of depths in [-1, 1]: the arcsine distribution's moments.
+pub const HAUSDORFF_SYMMETRIC_FOUR_TARGET: Vec4 = four(&bias::HAUSDORFF_SYMMETRIC_4_16);
+/// Strength for the Hausdorff problem, four power moments of depths in [-1, 1] in 16 bits, as measured.
+pub const HAUSDORFF_SYMMETRIC_FOUR_SIXTEEN_BITS_STRENGTH: f32 =
+    bias::HAUSDORFF_SYMMETRIC_4_16.strength as f32;
+/// Strength for the Hausdorff problem, four power moments of depths in [-1, 1] in 32-bit floats, as measured.
+pub const HAUSDORFF_SYMMETRIC_FOUR_FLOAT_STRENGTH: f32 =
+    bias::HAUSDORFF_SYMMETRIC_4_32.strength as f32;
+/// Target for the Hausdorff problem, four power moments of depths in [0, 1]: the arcsine distribution's moments.
+pub const HAUSDORFF_UNIT_FOUR_TARGET: Vec4 = four(&bias::HAUSDORFF_UNIT_4_16);
+/// Strength for the Hausdorff problem, four power moments of depths in [0, 1] in 16 bits, as measured.
+pub const HAUSDORFF_UNIT_FOUR_SIXTEEN_BITS_STRENGTH: f32 =
+    bias::HAUSDORFF_UNIT_4_16.strength as f32;
+
 /// Strength for two trigonometric moments in 16 bits (\[MBOIT\], Table 1 of the supplement): they are
 /// scaled by 1 minus this.
 pub const TRIGONOMETRIC_SIXTEEN_BITS_STRENGTH: f32 = bias::TRIGONOMETRIC_2_16.strength as f32;
