@@ -1,5 +1,6 @@
 //! Kernels that map rows to rows have neither loops that a compiler cannot unroll nor dynamic
-//! indices into arrays of their own, in the form from which every text is written.
+//! indices into arrays of their own, in the form from which every text is written. Derivatives in twice the digits, from
+//! eight moments on, have arrays: in a row, their operations are too many (`bound/adjoint.rs`).
 
 use std::collections::BTreeMap;
 
@@ -47,8 +48,18 @@ fn findings(one: &Crate) -> BTreeMap<String, (bool, Vec<Finding>)> {
 fn maps_over_rows_are_clean() {
     let all = findings(&Crate::shadows());
     let maps: Vec<_> = all.iter().filter(|(_, (maps, _))| *maps).collect();
+    let long: Vec<String> = [4, 5, 6]
+        .into_iter()
+        .flat_map(|n| {
+            ["", "_f64"].map(|bits| format!("moment_bound_adjoint_compensated_n{n}{bits}"))
+        })
+        .collect();
     for (name, (_, found)) in &maps {
-        assert!(found.is_empty(), "{name}: {found:?}");
+        // Their loops are as long for every input, too.
+        let is_array = |it: &Finding| it.construct == Construct::DynamicIndex;
+        let is_long = long.contains(name);
+        assert_eq!(is_long, found.iter().any(is_array), "{name}: {found:?}");
+        assert!(found.iter().all(is_array), "{name}: {found:?}");
     }
     let names: Vec<&str> = maps.iter().map(|(name, _)| name.as_str()).collect();
     let bounds = (1..=6).flat_map(|n| {

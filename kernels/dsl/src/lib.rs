@@ -152,7 +152,7 @@ pub use half::{F16, F16x2, F16x4};
 /// ```
 pub use hankel_macros::apart;
 pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
-pub use memory::{Buffer, array_element};
+pub use memory::{Buffer, array_element, array_element_mut};
 pub use real::{Mask, Real, to_i32};
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]

@@ -42,8 +42,7 @@ impl<'a, T: Copy> Buffer<'a, T> {
     }
 }
 
-/// Element `i` of an array in a uniform, which must be less than `N`. As with [`Buffer::get`], a shader does not
-/// test that.
+/// Element `i` of an array, which must be less than `N`. As with [`Buffer::get`], a shader does not test that.
 #[inline(always)]
 #[cfg_attr(not(target_arch = "spirv"), track_caller)]
 #[must_use]
@@ -53,4 +52,16 @@ pub fn array_element<T: Copy, const N: usize>(array: &[T; N], i: u32) -> T {
     return unsafe { *array.index_unchecked(i as usize) };
     #[cfg(not(target_arch = "spirv"))]
     return array[i as usize];
+}
+
+/// Element `i` of a local array, to be written. As with [`array_element`], a shader does not test that it is there.
+#[inline(always)]
+#[cfg_attr(not(target_arch = "spirv"), track_caller)]
+#[must_use]
+pub fn array_element_mut<T, const N: usize>(array: &mut [T; N], i: u32) -> &mut T {
+    #[cfg(target_arch = "spirv")]
+    // SAFETY: the caller's contract; exports with bounds checks test it again.
+    return unsafe { array.index_unchecked_mut(i as usize) };
+    #[cfg(not(target_arch = "spirv"))]
+    return &mut array[i as usize];
 }

@@ -8,6 +8,11 @@
 /// Three of them within each other, or two around a long block, belong into functions with a const
 /// parameter for the outer index: an incremental build's time grows with the square of a function's copies.
 ///
+/// A long block may be too much for a shader compiler, and for a GPU's instruction cache, when it is repeated dozens of
+/// times. With a condition, `unroll!(i in 0..N, max 7, loop if N > 3, { … })`, it is a loop in a shader where that holds,
+/// and natively as without. The block must then be right for an index that is no constant: `if` in place of `if const`,
+/// and [`array_element`](crate::array_element) and [`array_element_mut`](crate::array_element_mut) for arrays.
+///
 /// A shader that indexes a local array dynamically spills it to memory, and rust-gpu's loops are
 /// ones that shader compilers rarely unroll. With this, arrays of a few numbers become plain
 /// variables.
@@ -25,6 +30,17 @@
 /// ```
 #[macro_export]
 macro_rules! unroll {
+    ($i:ident in $from:tt .. $to:expr, max $max:tt, loop if $condition:expr, $body:block) => {
+        if const { cfg!(target_arch = "spirv") && $condition } {
+            let mut $i: usize = $from;
+            while $i < $to {
+                $body
+                $i += 1;
+            }
+        } else {
+            $crate::unroll!($i in $from .. $to, max $max, $body);
+        }
+    };
     ($i:ident in $from:tt .. $to:expr, max 7, $body:block) => {
         $crate::unroll!(@each $i, $from, $to, $body, 7, 0 1 2 3 4 5 6)
     };

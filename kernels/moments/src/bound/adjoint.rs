@@ -10,8 +10,11 @@
 //! This is the adjoint of the algorithm, \[MBD\] Eq. 22 to 30, without going through it: no
 //! derivative of a root, none of a weight, and nothing that is singular where a root is at infinity
 //! (Theorem 14 there).
+//!
+//! In twice the digits an operation is some thirty. From eight moments on, all of them in a row would be 17 000 to 39 000,
+//! which no instruction cache holds: shaders have loops there, and polynomials in arrays.
 
-use hankel_dsl::{Real, apart, lit, unroll};
+use hankel_dsl::{Real, apart, array_element, array_element_mut, lit, unroll};
 
 use super::kernel::{Kernel, fine};
 use super::recurrence::{Recurrence, finite, power_of_two};
@@ -204,22 +207,24 @@ fn moved<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
 ) -> Fine<A> {
     let mut p = *p;
     // Not by powers of the length, which may be beyond range where the products are not.
-    unroll!(j in 1..(DEGREE + 1), max 7, {
-        unroll!(i in 1..(DEGREE + 1), max 7, {
-            if const { i >= j } {
-                p[i] = p[i].scaled(per_length);
+    unroll!(j in 1..(DEGREE + 1), max 7, loop if DEGREE > 3, {
+        unroll!(i in 1..(DEGREE + 1), max 7, loop if DEGREE > 3, {
+            if i >= j {
+                let scaled = array_element(&p, i as u32).scaled(per_length);
+                *array_element_mut(&mut p, i as u32) = scaled;
             }
         });
+        let limited = array_element(&p, j as u32).within(-limit, limit);
+        *array_element_mut(&mut p, j as u32) = limited;
     });
-    unroll!(i in 1..(DEGREE + 1), max 7, {
-        p[i] = p[i].within(-limit, limit);
-    });
-    unroll!(j in 0..DEGREE, max 7, {
-        unroll!(i in 0..DEGREE, max 7, {
+    unroll!(j in 0..DEGREE, max 7, loop if DEGREE > 3, {
+        unroll!(i in 0..DEGREE, max 7, loop if DEGREE > 3, {
             // Each time one coefficient less: from the highest but one down to j.
-            if const { i + j < DEGREE } {
-                let carried = p[DEGREE - i].times_plain(at);
-                p[DEGREE - 1 - i] = p[DEGREE - 1 - i].minus(carried).within(-limit, limit);
+            if i + j < DEGREE {
+                let higher = (DEGREE - i) as u32;
+                let carried = array_element(&p, higher).times_plain(at);
+                let lower = array_element(&p, higher - 1).minus(carried).within(-limit, limit);
+                *array_element_mut(&mut p, higher - 1) = lower;
             }
         });
     });
@@ -248,24 +253,24 @@ fn blended<R: Real, A: Arithmetic<R>, const N: usize>(
             5 => squared::<R, A, 4>(rest),
             _ => squared::<R, A, 5>(rest),
         };
-        // In powers of the distance to the query point, the factor has no constant.
-        unroll!(i in 0..(MAX + 1), max 7, {
-            unroll!(j in 0..(2 * MAX), max 13, {
-                if const { (A::TWICE || i > 0) && i <= N / 2 * 2 && j <= 2 * less(N, 1) && i + j <= 2 * N } {
-                    let product = if const { A::TWICE } {
-                        product_within::<R, A, N>(factor[i], square[j], limit)
-                    } else {
-                        factor[i].times(square[j])
-                    };
-                    // The first of its power, or one more.
-                    if const { i == if A::TWICE { 0 } else { 1 } || j == 2 * less(N, 1) } {
-                        minor[i + j] = product;
-                    } else {
-                        minor[i + j] = minor[i + j].plus(product);
+        if const { A::TWICE } {
+            minor = product_within::<R, A, N>(factor, &square, limit);
+        } else {
+            // In powers of the distance to the query point, the factor has no constant.
+            unroll!(i in 1..(MAX + 1), max 7, {
+                unroll!(j in 0..(2 * MAX), max 13, {
+                    if const { i <= N / 2 * 2 && j <= 2 * less(N, 1) && i + j <= 2 * N } {
+                        let product = factor[i].times(square[j]);
+                        // The first of its power, or one more.
+                        if const { i == 1 || j == 2 * less(N, 1) } {
+                            minor[i + j] = product;
+                        } else {
+                            minor[i + j] = minor[i + j].plus(product);
+                        }
                     }
-                }
+                });
             });
-        });
+        }
     }
     let mut q = [A::of(lit!(0.0)); MAX_MOMENTS];
     unroll!(i in 0..(2 * N + 1), max 13, {
@@ -279,10 +284,38 @@ fn blended<R: Real, A: Arithmetic<R>, const N: usize>(
     q
 }
 
+/// The product of a polynomial of degree 2 (N / 2) and one of degree 2N - 2, without what is beyond degree 2N, by
+/// [`Arithmetic::times_within`].
+#[apart(R, if is_long::<R, A>(N))]
+#[inline(always)]
+fn product_within<R: Real, A: Arithmetic<R>, const N: usize>(
+    factor: &Fine<A>,
+    square: &[A; MAX_MOMENTS],
+    limit: R,
+) -> [A; MAX_MOMENTS] {
+    let mut product = [A::of(lit!(0.0)); MAX_MOMENTS];
+    unroll!(i in 0..(N / 2 * 2 + 1), max 7, loop if is_long::<R, A>(N), {
+        unroll!(j in 0..(2 * less(N, 1) + 1), max 13, loop if is_long::<R, A>(N), {
+            if i + j <= 2 * N {
+                let by = array_element(factor, i as u32);
+                let term = product_term::<R, A, N>(by, array_element(square, j as u32), limit);
+                let sum = array_element_mut(&mut product, (i + j) as u32);
+                // The first of its power, or one more.
+                *sum = if i == 0 || j == 2 * less(N, 1) {
+                    term
+                } else {
+                    sum.plus(term)
+                };
+            }
+        });
+    });
+    product
+}
+
 /// [`Arithmetic::times_within`], of which there are up to seventy in a row.
 #[apart(R, if is_long::<R, A>(N))]
 #[inline(always)]
-fn product_within<R: Real, A: Arithmetic<R>, const N: usize>(a: A, b: A, limit: R) -> A {
+fn product_term<R: Real, A: Arithmetic<R>, const N: usize>(a: A, b: A, limit: R) -> A {
     a.times_within(b, limit)
 }
 
@@ -295,16 +328,21 @@ type Fine<A> = [A; MAX + 1];
 fn squared<R: Real, A: Arithmetic<R>, const DEGREE: usize>(p: &Fine<A>) -> [A; MAX_MOMENTS] {
     let two: R = lit!(2.0);
     let mut square = [A::of(lit!(0.0)); MAX_MOMENTS];
-    unroll!(i in 0..(DEGREE + 1), max 7, {
-        square[2 * i] = p[i].times(p[i]);
-        if const { i < DEGREE } {
-            square[2 * i + 1] = p[i].scaled(two).times(p[i + 1]);
+    unroll!(i in 0..(DEGREE + 1), max 7, loop if is_long::<R, A>(DEGREE), {
+        let own = array_element(p, i as u32);
+        *array_element_mut(&mut square, 2 * i as u32) = own.times(own);
+        if i < DEGREE {
+            let next = own.scaled(two).times(array_element(p, i as u32 + 1));
+            *array_element_mut(&mut square, 2 * i as u32 + 1) = next;
         }
     });
-    unroll!(i in 0..(DEGREE + 1), max 7, {
-        unroll!(j in 0..(DEGREE + 1), max 7, {
-            if const { j > i + 1 } {
-                square[i + j] = square[i + j].plus(p[i].scaled(two).times(p[j]));
+    unroll!(i in 0..(DEGREE + 1), max 7, loop if is_long::<R, A>(DEGREE), {
+        unroll!(j in 0..(DEGREE + 1), max 7, loop if is_long::<R, A>(DEGREE), {
+            if j > i + 1 {
+                let twice = array_element(p, i as u32).scaled(two);
+                let product = twice.times(array_element(p, j as u32));
+                let sum = array_element_mut(&mut square, (i + j) as u32);
+                *sum = sum.plus(product);
             }
         });
     });
@@ -397,14 +435,14 @@ fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A
     if const { A::TWICE } {
         let quarter: R = lit!(0.25);
         let least: R = lit!(1e-37);
-        unroll!(_step in 0..REFINEMENTS, max 7, {
+        unroll!(_step in 0..REFINEMENTS, max 7, loop if is_long::<R, A>(N), {
             let mut p = e[0];
             let mut d = A::of(zero);
             let mut h = zero;
-            unroll!(i in 1..(N + 1), max 7, {
+            unroll!(i in 1..(N + 1), max 7, loop if is_long::<R, A>(N), {
                 h = h * v + d.rounded();
                 d = d.times(root).plus(p);
-                p = p.times(root).plus(e[i]);
+                p = p.times(root).plus(array_element(e, i as u32));
             });
             // The nearer root of the parabola that touches it: right to third order.
             let (value, slope) = (p.rounded(), d.rounded());
@@ -430,26 +468,31 @@ fn deflated<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -
     let zero: R = lit!(0.0);
     let one: R = lit!(1.0);
     let mut rest = *e;
-    unroll!(i in 1..DEGREE, max 7, {
-        rest[i] = e[i].plus(v.times(rest[i - 1]));
+    unroll!(i in 1..DEGREE, max 7, loop if is_long::<R, A>(DEGREE), {
+        let carried = v.times(array_element(&rest, i as u32 - 1));
+        let lower = array_element(e, i as u32).plus(carried);
+        *array_element_mut(&mut rest, i as u32) = lower;
     });
     if const { A::TWICE } {
         let size = v.rounded().abs();
         let per_root = v.inverse();
         let per_size = per_root.rounded().abs();
         let mut down = [one; MAX + 1];
-        unroll!(i in 1..DEGREE, max 7, {
-            down[i] = e[i].rounded().abs().max(size * down[i - 1]);
+        unroll!(i in 1..DEGREE, max 7, loop if is_long::<R, A>(DEGREE), {
+            let carried = size * array_element(&down, i as u32 - 1);
+            let most = array_element(e, i as u32).rounded().abs().max(carried);
+            *array_element_mut(&mut down, i as u32) = most;
         });
         let mut from_below = A::of(zero);
         let mut up = zero;
-        unroll!(j in 0..MAX, max 7, {
-            if const { j + 1 < DEGREE } {
-                let i = const { less(DEGREE, 1 + j) };
-                from_below = from_below.minus(e[i + 1]).times(per_root);
-                up = up.max(e[i + 1].rounded().abs()) * per_size;
-                rest[i] = A::select(up.lt(down[i]), from_below, rest[i]);
-            }
+        unroll!(j in 1..DEGREE, max 7, loop if is_long::<R, A>(DEGREE), {
+            let i = (DEGREE - j) as u32;
+            let higher = array_element(e, i + 1);
+            from_below = from_below.minus(higher).times(per_root);
+            up = up.max(higher.rounded().abs()) * per_size;
+            let is_nearer = up.lt(array_element(&down, i));
+            let nearer = A::select(is_nearer, from_below, array_element(&rest, i));
+            *array_element_mut(&mut rest, i) = nearer;
         });
     }
     unroll!(i in 0..(MAX + 1), max 7, {
@@ -463,10 +506,24 @@ fn deflated<R: Real, A: Arithmetic<R>, const DEGREE: usize>(e: &Fine<A>, v: A) -
 /// The quotient of a polynomial by `v - at`, and the remainder at index `degree`; what is beyond
 /// has no meaning.
 #[inline(always)]
-fn divided<R: Real, A: Arithmetic<R>>(e: &Fine<A>, at: A) -> Fine<A> {
+fn divided<R: Real, A: Arithmetic<R>, const N: usize>(
+    e: &Fine<A>,
+    at: A,
+    degree: usize,
+) -> Fine<A> {
     let mut quotient = *e;
-    unroll!(i in 1..(MAX + 1), max 7, {
-        quotient[i] = e[i].plus(at.times(quotient[i - 1]));
+    // Natively, what is not used of it is not computed.
+    let last = if const { cfg!(target_arch = "spirv") } {
+        degree
+    } else {
+        MAX
+    };
+    unroll!(i in 1..(MAX + 1), max 7, loop if is_long::<R, A>(N), {
+        if i <= last {
+            let carried = at.times(array_element(&quotient, i as u32 - 1));
+            let lower = array_element(e, i as u32).plus(carried);
+            *array_element_mut(&mut quotient, i as u32) = lower;
+        }
     });
     quotient
 }
@@ -483,12 +540,12 @@ const fn less(n: usize, by: usize) -> usize {
 fn single<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v: A) -> Fine<A> {
     let one: R = lit!(1.0);
     let zero: R = lit!(0.0);
-    let quotient = divided(rest, v);
+    let quotient = divided::<R, A, N>(rest, v, less(N, 1));
     let value = quotient[const { less(N, 1) }];
-    let slope = divided(&quotient, v)[const { less(N, 2) }];
+    let slope = divided::<R, A, N>(&quotient, v, less(N, 2))[const { less(N, 2) }];
     let per_value = value.inverse();
     let mut power = A::of(one);
-    unroll!(k in 1..N, max 7, {
+    unroll!(_k in 1..N, max 7, loop if is_long::<R, A>(N), {
         power = power.times(v);
     });
     // 1 / rest at the root: all its roots are on the other side, so it is between 0 and 1.
@@ -523,19 +580,20 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: 
     let one = A::of(lit!(1.0));
     let two: R = lit!(2.0);
     // Divided differences of rest, named by their arguments.
-    let by_1 = divided(rest, v1);
-    let by_2 = divided(rest, v2);
-    let by_11 = divided(&by_1, v1);
-    let by_12 = divided(&by_1, v2);
+    let by_1 = divided::<R, A, N>(rest, v1, less(N, 2));
+    let by_2 = divided::<R, A, N>(rest, v2, less(N, 2));
+    let by_11 = divided::<R, A, N>(&by_1, v1, less(N, 3));
+    let by_12 = divided::<R, A, N>(&by_1, v2, less(N, 3));
     let r1 = by_1[const { less(N, 2) }];
     let r2 = by_2[const { less(N, 2) }];
     let r11 = by_11[const { less(N, 3) }];
     let r12 = by_12[const { less(N, 3) }];
-    let r22 = divided(&by_2, v2)[const { less(N, 3) }];
-    let r112 = divided(&by_11, v2)[const { less(N, 4) }];
-    let r122 = divided(&by_12, v2)[const { less(N, 4) }];
+    let r22 = divided::<R, A, N>(&by_2, v2, less(N, 3))[const { less(N, 3) }];
+    let by_112 = divided::<R, A, N>(&by_11, v2, less(N, 4));
+    let r112 = by_112[const { less(N, 4) }];
+    let r122 = divided::<R, A, N>(&by_12, v2, less(N, 4))[const { less(N, 4) }];
     let r1122 = if const { N == 6 } {
-        divided(&divided(&by_11, v2), v2)[1]
+        divided::<R, A, N>(&by_112, v2, 1)[1]
     } else if const { N == 5 } {
         one
     } else {
@@ -545,7 +603,7 @@ fn double<R: Real, A: Arithmetic<R>, const N: usize>(rest: &Fine<A>, v1: A, v2: 
     let (mut p2, mut p12, mut p22, mut p112, mut p122, mut p1122) =
         (one, zero, zero, zero, zero, zero);
     let mut p1 = one;
-    unroll!(k in 0..N, max 7, {
+    unroll!(_k in 0..N, max 7, loop if is_long::<R, A>(N), {
         p1122 = v2.times(p1122).plus(p112);
         p122 = v2.times(p122).plus(p12);
         p112 = v1.times(p112).plus(p12);
@@ -632,25 +690,25 @@ fn triple<R: Real, A: Arithmetic<R>, const N: usize>(
     let one = A::of(lit!(1.0));
     let two: R = lit!(2.0);
     // Divided differences of rest, named by their arguments; with four it is 1, with more 0.
-    let by_1 = divided(rest, v1);
-    let by_2 = divided(rest, v2);
-    let by_3 = divided(rest, v3);
-    let by_12 = divided(&by_1, v2);
+    let by_1 = divided::<R, A, N>(rest, v1, less(N, 3));
+    let by_2 = divided::<R, A, N>(rest, v2, less(N, 3));
+    let by_3 = divided::<R, A, N>(rest, v3, less(N, 3));
+    let by_12 = divided::<R, A, N>(&by_1, v2, less(N, 4));
     let r1 = by_1[const { less(N, 3) }];
     let r2 = by_2[const { less(N, 3) }];
     let r3 = by_3[const { less(N, 3) }];
-    let r11 = divided(&by_1, v1)[const { less(N, 4) }];
+    let r11 = divided::<R, A, N>(&by_1, v1, less(N, 4))[const { less(N, 4) }];
     let r12 = by_12[const { less(N, 4) }];
-    let r13 = divided(&by_1, v3)[const { less(N, 4) }];
-    let r23 = divided(&by_2, v3)[const { less(N, 4) }];
-    let r112 = divided(&by_12, v1)[const { less(N, 5) }];
-    let r122 = divided(&by_12, v2)[const { less(N, 5) }];
-    let r123 = divided(&by_12, v3)[const { less(N, 5) }];
+    let r13 = divided::<R, A, N>(&by_1, v3, less(N, 4))[const { less(N, 4) }];
+    let r23 = divided::<R, A, N>(&by_2, v3, less(N, 4))[const { less(N, 4) }];
+    let r112 = divided::<R, A, N>(&by_12, v1, less(N, 5))[const { less(N, 5) }];
+    let r122 = divided::<R, A, N>(&by_12, v2, less(N, 5))[const { less(N, 5) }];
+    let r123 = divided::<R, A, N>(&by_12, v3, less(N, 5))[const { less(N, 5) }];
     // Divided differences of v^N: complete homogeneous polynomials.
     let mut p3 = one;
     let (mut p23, mut p123, mut p1123, mut p1223, mut p1233) = (zero, zero, zero, zero, zero);
     let (mut p11223, mut p12233, mut p112233) = (zero, zero, zero);
-    unroll!(k in 0..N, max 7, {
+    unroll!(_k in 0..N, max 7, loop if is_long::<R, A>(N), {
         p112233 = v1.times(p112233).plus(p12233);
         p12233 = v2.times(p12233).plus(p1233);
         p11223 = v1.times(p11223).plus(p1223);

@@ -1,6 +1,6 @@
 //! From the recurrence to the points of the distribution that attains the bound.
 
-use hankel_dsl::{Real, apart, lit, unroll};
+use hankel_dsl::{Real, apart, array_element, array_element_mut, lit, unroll};
 
 use super::recurrence::Recurrence;
 use super::roots::{Monic, least_of_cubic, least_of_quadratic, least_three, least_two, whole};
@@ -247,44 +247,49 @@ pub(crate) fn fine<R: Real, A: Arithmetic<R>, const N: usize>(
 ) -> ([A; MAX + 1], A) {
     let zero = A::of(lit!(0.0));
     let one = A::of(lit!(1.0));
-    let mut y = [one; MAX + 1];
-    y[1] = kernel.fine_a[0].scaled(lit!(-1.0));
-    unroll!(k in 1..N, max 7, {
-        let next = kernel.fine_a[k].sum_of_products(y[k], kernel.fine_b[k], y[k - 1]);
-        y[k + 1] = next.scaled(lit!(-1.0));
-    });
-    // As `new` has it.
-    let mut p = [zero; MAX + 2];
+    let minus: R = lit!(-1.0);
+    // As `of_recurrence` has it, with p_k and the one before in place.
+    let mut p = [zero; MAX + 1];
     let mut before = p;
-    let mut powers = [zero; MAX + 1];
+    let mut powers = p;
     let mut weight = one;
+    let (mut y, mut y_before) = (one, zero);
     p[0] = one;
     powers[0] = one;
-    unroll!(k in 0..N, max 7, {
-        let mut next = [zero; MAX + 2];
-        unroll!(i in 0..(MAX + 1), max 7, {
-            if const { i <= k + 1 } {
-                let mut t = zero;
-                if const { i <= k } {
-                    t = t.minus(kernel.fine_a[k].times(p[i]));
+    unroll!(k in 0..N, max 7, loop if is_long::<R, A>(N), {
+        let a = array_element(&kernel.fine_a, k as u32);
+        let b = array_element(&kernel.fine_b, k as u32);
+        let y_next = if k == 0 {
+            a.scaled(minus)
+        } else {
+            a.sum_of_products(y, b, y_before).scaled(minus)
+        };
+        (y_before, y) = (y, y_next);
+        let b_next = array_element(&kernel.fine_b, k as u32 + 1);
+        weight = weight.times(b_next);
+        let mut carried = zero;
+        unroll!(i in 0..(N + 1), max 7, loop if is_long::<R, A>(N), {
+            if i <= k + 1 {
+                let here = array_element(&p, i as u32);
+                let mut next = zero;
+                if i <= k {
+                    next = next.minus(a.times(here));
                 }
-                if const { k > 0 && i < k } {
-                    t = t.minus(kernel.fine_b[k].times(before[i]));
+                if i < k {
+                    next = next.minus(b.times(array_element(&before, i as u32)));
                 }
-                if const { i > 0 } {
-                    t = t.plus(p[i - 1]);
+                if i > 0 {
+                    next = next.plus(carried);
                 }
-                next[i] = t;
-            }
-        });
-        before = p;
-        p = next;
-        weight = weight.times(kernel.fine_b[k + 1]);
-        unroll!(i in 0..(MAX + 1), max 7, {
-            if const { i <= k } {
-                powers[i] = kernel.fine_b[k + 1].times(powers[i]).plus(y[k + 1].times(p[i]));
-            } else if const { i == k + 1 } {
-                powers[i] = y[k + 1];
+                *array_element_mut(&mut before, i as u32) = here;
+                *array_element_mut(&mut p, i as u32) = next;
+                carried = here;
+                let power = array_element_mut(&mut powers, i as u32);
+                *power = if i <= k {
+                    b_next.times(*power).plus(y.times(next))
+                } else {
+                    y
+                };
             }
         });
     });
@@ -293,8 +298,9 @@ pub(crate) fn fine<R: Real, A: Arithmetic<R>, const N: usize>(
     let largest: R = lit!(1e17);
     let mut e = [one; MAX + 1];
     let mut power = per_reach;
-    unroll!(i in 1..(N + 1), max 7, {
-        e[i] = powers[i].over(square).times_within(power, largest);
+    unroll!(i in 1..(N + 1), max 7, loop if is_long::<R, A>(N), {
+        let ratio = array_element(&powers, i as u32).over(square);
+        *array_element_mut(&mut e, i as u32) = ratio.times_within(power, largest);
         power = power.times(per_reach);
     });
     (e, weight.over(square).within(lit!(0.0), lit!(1.0)))
