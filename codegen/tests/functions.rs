@@ -142,7 +142,7 @@ both! {
         unroll!(_i in 0..4, {
             v = (v + w) * 0.5;
         });
-        unroll!(k in 1..4, {
+        unroll!(k in 1..4, max 7, loop if true, {
             w -= v * k as f32;
         });
         let mut j = 0_u32;

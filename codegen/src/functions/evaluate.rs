@@ -2644,6 +2644,13 @@ impl syn::parse::Parse for Turns {
             input.parse::<syn::LitInt>()?;
             input.parse::<syn::Token![,]>()?;
         }
+        // A loop in a shader: functions have no arrays, so that here it is none.
+        if input.peek(syn::Token![loop]) {
+            input.parse::<syn::Token![loop]>()?;
+            input.parse::<syn::Token![if]>()?;
+            input.parse::<syn::Expr>()?;
+            input.parse::<syn::Token![,]>()?;
+        }
         Ok(Self {
             index,
             from: *from,
