@@ -16,7 +16,7 @@ use hankel_codegen::functions::print::Naming;
 use hankel_codegen::functions::source::CrateText;
 use hankel_codegen::functions::{FORMS, Refusal, read};
 use hankel_dsl::glam::{UVec2, Vec2, Vec3};
-use hankel_dsl::{Real, function, lit, to_i32, unroll};
+use hankel_dsl::{Real, array_element, array_element_mut, function, lit, to_i32, unroll};
 
 /// A crate of one file.
 fn krate(text: &str) -> CrateText {
@@ -142,9 +142,15 @@ both! {
         unroll!(_i in 0..4, {
             v = (v + w) * 0.5;
         });
+        let mut powers = [x; 4];
         unroll!(k in 1..4, max 7, loop if true, {
+            let before = array_element(&powers, k as u32 - 1);
+            *array_element_mut(&mut powers, k as u32) = before * x;
             w -= v * k as f32;
         });
+        let last = array_element_mut(&mut powers, 3);
+        *last += w;
+        w = powers[3];
         let mut j = 0_u32;
         while j < turns & 15 {
             w = w * 0.5 + j as f32;

@@ -1,6 +1,6 @@
 //! Kernels that map rows to rows have neither loops that a compiler cannot unroll nor dynamic
-//! indices into arrays of their own, in the form from which every text is written. Derivatives in twice the digits, from
-//! eight moments on, have arrays: in a row, their operations are too many (`bound/adjoint.rs`).
+//! indices into arrays of their own, in the form from which every text is written. Bounds and derivatives in twice the
+//! digits, from eight moments on, have arrays: in a row, their operations are too many (`is_long` in `bound/mod.rs`).
 
 use std::collections::BTreeMap;
 
@@ -50,9 +50,8 @@ fn maps_over_rows_are_clean() {
     let maps: Vec<_> = all.iter().filter(|(_, (maps, _))| *maps).collect();
     let long: Vec<String> = [4, 5, 6]
         .into_iter()
-        .flat_map(|n| {
-            ["", "_f64"].map(|bits| format!("moment_bound_adjoint_compensated_n{n}{bits}"))
-        })
+        .flat_map(|n| ["compensated_n", "adjoint_compensated_n"].map(|kind| format!("{kind}{n}")))
+        .flat_map(|what| ["", "_f64"].map(|bits| format!("moment_bound_{what}{bits}")))
         .collect();
     for (name, (_, found)) in &maps {
         // Their loops are as long for every input, too.

@@ -1262,6 +1262,10 @@ impl<'a> Evaluator<'a> {
                 place.path.push(Step::Index(at));
                 Ok(place)
             }
+            syn::Expr::Call(c) => match element(c) {
+                Some((element, true)) => self.place(frame, &element),
+                _ => Err(self.refuse(frame, c.span(), "this cannot be changed")),
+            },
             other => Err(self.refuse(frame, other.span(), "this cannot be changed")),
         }
     }
@@ -1965,6 +1969,13 @@ impl<'a> Evaluator<'a> {
     }
 
     fn call(&mut self, frame: &mut Frame, c: &syn::ExprCall) -> Done<Value> {
+        if let Some((element, is_changed)) = element(c) {
+            return if is_changed {
+                self.place(frame, &element).map(Value::Ref)
+            } else {
+                self.value(frame, &element)
+            };
+        }
         let callee = match c.func.as_ref() {
             syn::Expr::Path(p) => {
                 let names = segments(&p.path);
@@ -2615,6 +2626,31 @@ fn parameter_name(param: &syn::GenericParam) -> String {
         syn::GenericParam::Const(c) => c.ident.to_string(),
         syn::GenericParam::Lifetime(l) => l.lifetime.to_string(),
     }
+}
+
+/// Of `array_element(&array, i)` and `array_element_mut(&mut array, i)`, `array[i]`, and whether it may be changed.
+fn element(call: &syn::ExprCall) -> Option<(syn::Expr, bool)> {
+    let syn::Expr::Path(p) = call.func.as_ref() else {
+        return None;
+    };
+    let is_changed = match p.path.segments.last()?.ident.to_string().as_str() {
+        "array_element" => false,
+        "array_element_mut" => true,
+        _ => return None,
+    };
+    let mut args = call.args.iter();
+    let (array, index) = (args.next()?, args.next()?);
+    let array = match array {
+        syn::Expr::Reference(r) => r.expr.as_ref(),
+        other => other,
+    };
+    let indexed = syn::ExprIndex {
+        attrs: Vec::new(),
+        expr: Box::new(array.clone()),
+        bracket_token: syn::token::Bracket(call.span()),
+        index: Box::new(index.clone()),
+    };
+    Some((indexed.into(), is_changed))
 }
 
 /// The range and body of an `unroll!`.

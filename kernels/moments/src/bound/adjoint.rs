@@ -10,9 +10,6 @@
 //! This is the adjoint of the algorithm, \[MBD\] Eq. 22 to 30, without going through it: no
 //! derivative of a root, none of a weight, and nothing that is singular where a root is at infinity
 //! (Theorem 14 there).
-//!
-//! In twice the digits an operation is some thirty. From eight moments on, all of them in a row would be 17 000 to 39 000,
-//! which no instruction cache holds: shaders have loops there, and polynomials in arrays.
 
 use hankel_dsl::{Real, apart, array_element, array_element_mut, lit, unroll};
 

@@ -124,11 +124,13 @@ fn of_recurrence<R: Real, A: Arithmetic<R>, const N: usize>(
     y[1] = -a[0];
     if const { A::TWICE } {
         fine_y[1] = fine_a[0].scaled(-one);
-        unroll!(k in 1..N, max 7, {
-            let next = fine_a[k].sum_of_products(fine_y[1], fine_b[k], fine_y[0]).scaled(-one);
+        unroll!(k in 1..N, max 7, loop if is_long::<R, A>(N), {
+            let a = array_element(&fine_a, k as u32);
+            let b = array_element(&fine_b, k as u32);
+            let next = a.sum_of_products(fine_y[1], b, fine_y[0]).scaled(-one);
             fine_y[0] = fine_y[1];
             fine_y[1] = next;
-            y[k + 1] = next.rounded();
+            *array_element_mut(&mut y, k as u32 + 1) = next.rounded();
         });
     } else {
         unroll!(k in 1..N, max 7, {
@@ -359,29 +361,31 @@ fn refined<R: Real, A: Arithmetic<R>, const N: usize>(
     let mut h = [zero; MAX + 1];
     let mut before = A::of(zero);
     let mut fine = A::of(one);
-    unroll!(k in 0..N, max 7, {
-        let factor = fine_s.minus(kernel.fine_a[k].times_plain(t));
-        let slope = s_moves - t_moves * kernel.a[k];
+    unroll!(k in 0..N, max 7, loop if is_long::<R, A>(N), {
+        let at = k as u32;
+        let factor = fine_s.minus(array_element(&kernel.fine_a, at).times_plain(t));
+        let slope = s_moves - t_moves * array_element(&kernel.a, at);
         let f = factor.rounded();
-        if const { k == 0 } {
+        if k == 0 {
             before = fine;
             fine = factor;
             d[1] = slope;
         } else {
-            let by = kernel.fine_b[k].times(t_square);
+            let by = array_element(&kernel.fine_b, at).times(t_square);
             let next = factor.cross(fine, by, before);
             before = fine;
             fine = next;
-            let bend = t_moves * kernel.b[k];
+            let bend = t_moves * array_element(&kernel.b, at);
             let b = by.rounded();
             let steep = (bend + bend) * t;
-            d[k + 1] = f * d[k] + slope * z[k] - b * d[k - 1] - steep * z[k - 1];
-            h[k + 1] = f * h[k] + slope * d[k]
-                - b * h[k - 1]
-                - steep * d[k - 1]
-                - bend * z[k - 1];
+            let (z0, z1) = (array_element(&z, at), array_element(&z, at - 1));
+            let (d0, d1) = (array_element(&d, at), array_element(&d, at - 1));
+            let (h0, h1) = (array_element(&h, at), array_element(&h, at - 1));
+            *array_element_mut(&mut d, at + 1) = f * d0 + slope * z0 - b * d1 - steep * z1;
+            *array_element_mut(&mut h, at + 1) =
+                f * h0 + slope * d0 - b * h1 - steep * d1 - bend * z1;
         }
-        z[k + 1] = fine.rounded();
+        *array_element_mut(&mut z, at + 1) = fine.rounded();
     });
 
     // The kernel polynomial times u, by Christoffel and Darboux.

@@ -43,8 +43,9 @@ pub struct Bounds<R> {
     pub upper: R,
 }
 
-/// Whether an order's steps are so long that each is a function of its own natively, which kernels share. Arguments in
-/// memory would cost a tenth of the time in plain arithmetic, and a fifth in twice the digits for N = 3.
+/// Whether an order's steps are so long that each is a function of its own natively, which kernels share, and has loops in
+/// a shader. Natively, arguments in memory would cost a tenth of the time in plain arithmetic, and a fifth in twice the
+/// digits for N = 3. In a shader, operations in a row would be up to 39 000, which no instruction cache holds.
 const fn is_long<R: Real, A: Arithmetic<R>>(n: usize) -> bool {
     A::TWICE && n > 3
 }

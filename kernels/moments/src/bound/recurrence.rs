@@ -10,7 +10,7 @@
 //! moments. The compensated variant computes them with twice the digits, and the first row of
 //! differences, of products of two moments each, with all that are left.
 
-use hankel_dsl::{Real, apart, function, lit, unroll};
+use hankel_dsl::{Real, apart, array_element, array_element_mut, function, lit, unroll};
 
 use super::twofold::Arithmetic;
 use super::{MAX, MAX_MOMENTS, is_long};
@@ -296,22 +296,25 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
     } else {
         alpha.minus(query)
     };
-    unroll!(k in 1..(N + 1), max 7, {
+    unroll!(k in 1..(N + 1), max 7, loop if is_long::<R, A>(N), {
         let mut next = current;
-        unroll!(l in 1..(2 * MAX), max 13, {
-            if const { A::TWICE && k == 1 && l < 2 * N } {
-                let (of_this, of_next) = (raw[l].rounded(), raw[l + 1].rounded());
+        unroll!(l in 1..(2 * MAX), max 13, loop if is_long::<R, A>(N), {
+            let at = l as u32;
+            if A::TWICE && k == 1 && l < 2 * N {
+                let of_this = array_element(&raw, at).rounded();
+                let of_next = array_element(&raw, at + 1).rounded();
                 let t = A::difference(scaled_total, of_next, raw[1].rounded(), of_this);
-                next[l] = t.within(-largest, largest);
-            } else if const { l >= k && l + k <= 2 * N } {
-                let mut t = current[l + 1].minus(alpha.times(current[l]));
-                if const { k > 1 } {
-                    t = t.minus(beta.times(previous[l]));
+                *array_element_mut(&mut next, at) = t.within(-largest, largest);
+            } else if l >= k && l + k <= 2 * N {
+                let of_this = alpha.times(array_element(&current, at));
+                let mut t = array_element(&current, at + 1).minus(of_this);
+                if k > 1 {
+                    t = t.minus(beta.times(array_element(&previous, at)));
                 }
-                next[l] = t.within(-largest, largest);
+                *array_element_mut(&mut next, at) = t.within(-largest, largest);
             }
         });
-        if const { k == 2 } {
+        if k == 2 {
             // As the Cholesky factorisation has it: where a bias is all that is left of the
             // pivot, this keeps more of it.
             let t = if const { A::TWICE } {
@@ -329,20 +332,24 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
             let t = t.minus(of_slope);
             next[2] = t.within(-largest, largest);
         }
-        let noise = raw[2 * k].rounded().abs() * floor;
-        next[k] = next[k].at_least(noise.max(least));
-        let most_beta = if const { A::TWICE && k == 1 } {
+        let at = k as u32;
+        let noise = array_element(&raw, 2 * at).rounded().abs() * floor;
+        let pivot = array_element(&next, at).at_least(noise.max(least));
+        *array_element_mut(&mut next, at) = pivot;
+        let most_beta = if A::TWICE && k == 1 {
             lit!(1e12)
         } else {
             far
         };
-        beta = next[k].over(current[k - 1]).within(zero, most_beta);
-        b[k] = if const { A::TWICE && k == 1 } {
+        beta = pivot
+            .over(array_element(&current, at - 1))
+            .within(zero, most_beta);
+        *array_element_mut(&mut b, at) = if A::TWICE && k == 1 {
             beta.over(current[0]).within(zero, far)
         } else {
             beta
         };
-        if const { k == 1 } {
+        if k == 1 {
             square = b[1].rounded() + a[0].rounded() * a[0].rounded();
             unit = if const { A::TWICE } {
                 power_of_two(square)
@@ -351,11 +358,11 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
             };
             limit = (unit * farthest::<R, A, N>()).min(far);
         }
-        if const { k < N } {
-            let below = next[k + 1].over(next[k]);
+        if k < N {
+            let below = array_element(&next, at + 1).over(pivot);
             alpha = below.minus(slope).within(eta - limit, eta + limit);
             slope = below;
-            a[k] = alpha.minus(query);
+            *array_element_mut(&mut a, at) = alpha.minus(query);
         }
         previous = current;
         current = next;
