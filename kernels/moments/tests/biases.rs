@@ -3,8 +3,9 @@
 mod validity;
 
 use hankel_moments::bias::{
-    Basis, Bias, CLAMPED_4_16, CLAMPED_6_10, PUBLISHED, SYMMETRIC_4_16, SYMMETRIC_4_16_LECTURE,
-    SYMMETRIC_4_32, SYMMETRIC_6_16, SYMMETRIC_6_32, SYMMETRIC_8_32, SYMMETRIC_10_32, UNIT_4_16,
+    Basis, Bias, CLAMPED_4_16, CLAMPED_6_10, HAUSDORFF_SYMMETRIC_4_16, HAUSDORFF_SYMMETRIC_4_32,
+    HAUSDORFF_UNIT_4_16, PUBLISHED, SYMMETRIC_4_16, SYMMETRIC_4_16_LECTURE, SYMMETRIC_4_32,
+    SYMMETRIC_6_16, SYMMETRIC_6_32, SYMMETRIC_8_32, SYMMETRIC_10_32, UNIT_4_16,
 };
 use hankel_moments::{
     Moments4, Moments6, bias_target, dequantize_symmetric_4, dequantize_symmetric_6,
@@ -272,4 +273,53 @@ fn a_trigonometric_bias_makes_a_single_surface_positive_definite() {
             assert!(form > bias.strength * norm * (1.0 - 1e-6), "{name}: {form}");
         }
     }
+}
+
+/// The lesser of the two determinants that are positive for moments inside those of depths in the range, and of which one
+/// is 0 on the boundary: of the moments' Hankel matrix, and of that of the distribution times x (1 - x) or 1 - x².
+fn determinant_in_range(bias: &Bias) -> f64 {
+    let [m0, m1, m2, m3, m4] = [0, 1, 2, 3, 4].map(|k| bias.target[k]);
+    let (n0, n1, n2) = match bias.basis {
+        Basis::Unit => (m1 - m2, m2 - m3, m3 - m4),
+        _ => (m0 - m2, m1 - m3, m2 - m4),
+    };
+    let below = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2);
+    let above = n0 * n2 - n1 * n1;
+    below.min(above)
+}
+
+#[test]
+fn targets_for_depths_in_a_range_are_inside_it() {
+    for published in [
+        UNIT_4_16,
+        SYMMETRIC_4_16,
+        SYMMETRIC_4_16_LECTURE,
+        SYMMETRIC_4_32,
+    ] {
+        assert!(
+            determinant_in_range(&published).abs() < 1e-12,
+            "{published:?}"
+        );
+    }
+    for own in [
+        HAUSDORFF_UNIT_4_16,
+        HAUSDORFF_SYMMETRIC_4_16,
+        HAUSDORFF_SYMMETRIC_4_32,
+    ] {
+        assert!(determinant_in_range(&own) > 1e-4, "{own:?}");
+    }
+}
+
+/// Of the interval that moments 0 to 3 leave, the fourth is the middle.
+#[test]
+fn targets_for_depths_in_a_range_are_in_the_middle() {
+    let [m0, m1, m2, m3, m4] = [0, 1, 2, 3, 4].map(|k| HAUSDORFF_UNIT_4_16.target[k]);
+    assert_eq!(m1, 0.5);
+    assert_eq!(m2, f64::midpoint(m1 * m1, m1));
+    let least = m2 * m2 / m1;
+    let most = m2 - (m1 - m2).powi(2) / (m0 - m1);
+    assert!((m3 - f64::midpoint(least, most)).abs() < 1e-15);
+    let least = (m2.powi(3) + m0 * m3 * m3 - 2.0 * m1 * m2 * m3) / (m0 * m2 - m1 * m1);
+    let most = m3 - (m2 - m3).powi(2) / (m1 - m2);
+    assert!((m4 - f64::midpoint(least, most)).abs() < 1e-15);
 }
