@@ -62,7 +62,12 @@ const child = spawn(chromium, [
     // Chromium ends when this pipe does, even if this process is killed.
     "--remote-debugging-pipe", `--user-data-dir=${profile}`,
     `http://127.0.0.1:${server.address().port}/page/index.html`,
-], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"], detached: true });
+], {
+    stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"],
+    detached: true,
+    // What it writes there beside its profile stays when it is killed.
+    env: { ...process.env, TMPDIR: profile },
+});
 for (const pipe of [child.stdio[3], child.stdio[4]]) pipe.on("error", () => {});
 child.stdio[4].resume();
 const death = new Promise((_, reject) => {

@@ -335,10 +335,17 @@ pub struct Diff {
     /// numbers. For kernels of which the interface is the same.
     #[arg(long)]
     pub run: bool,
-    #[command(flatten)]
-    pub source: Source,
+    /// With --run: Cargo.toml of the kernel crate whose descriptions say what the inputs are.
+    #[arg(long, value_name = "FILE", requires = "run")]
+    pub manifest_path: Option<PathBuf>,
     /// Seed of the generated inputs.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "run")]
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        allow_negative_numbers = true,
+        default_value_t = 1,
+        requires = "run"
+    )]
     pub seed: u64,
     /// Render this scene (TOML) on Vulkan with the shaders of either build, and compare the pictures.
     #[cfg(feature = "frames")]
@@ -408,11 +415,16 @@ pub struct Parity {
     #[arg(long = "kernel", value_name = "NAME")]
     pub kernels: Vec<String>,
     /// Seed of the generated inputs.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
     pub seed: u64,
     /// Seconds that a kernel of another crate may run natively, and with --matrix a compiler or
     /// device for one kernel.
-    #[arg(long, value_name = "SECONDS", default_value_t = 120,
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 120,
           value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub limit: u64,
     /// How the report is printed.
@@ -444,10 +456,15 @@ pub struct Sanitize {
     #[arg(long = "kernel", value_name = "NAME")]
     pub kernels: Vec<String>,
     /// Seed of the generated inputs.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
     pub seed: u64,
     /// Seconds that a kernel of another crate may run.
-    #[arg(long, value_name = "SECONDS", default_value_t = 120,
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 120,
           value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub limit: u64,
     /// How the report is printed.
@@ -542,7 +559,7 @@ pub struct Eval {
     #[arg(long)]
     pub fast: bool,
     /// Seconds that a kernel of another crate may run natively for 65536 rows.
-    #[arg(long, value_name = "SECONDS", default_value_t = 120,
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 120,
           value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub limit: u64,
 }
@@ -583,7 +600,7 @@ pub struct Render {
     pub technique: Option<String>,
     /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
     /// --filter, --fit and --multisampling are what is chosen from.
-    #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true, requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
     #[command(flatten)]
     pub maps: Maps,
@@ -592,7 +609,7 @@ pub struct Render {
     #[arg(long, value_name = "FORM", default_value_t)]
     pub image_passes: ImagePasses,
     /// How much the difference picture is amplified.
-    #[arg(long, value_name = "FACTOR", default_value_t = hankel_frames::AMPLIFICATION, requires = "compare",
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, default_value_t = hankel_frames::AMPLIFICATION, requires = "compare",
         value_parser = clap::value_parser!(u32).range(1..))]
     pub amplify: u32,
     /// Also tells how wrong the shadow is, against rays and against filtering without moments; takes
@@ -617,7 +634,7 @@ pub struct OfScene {
     pub technique: Option<String>,
     /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
     /// --filter, --fit and --multisampling are what is chosen from.
-    #[arg(long, value_name = "ERROR", requires = "technique", value_parser = budget)]
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true, requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
     /// With --technique auto: where the frame will run [default: native].
     #[arg(long, value_enum, requires = "error")]
@@ -712,13 +729,13 @@ pub struct Plan {
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// The greatest root mean square error.
-    #[arg(long, value_name = "ERROR", value_parser = budget)]
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true, value_parser = budget)]
     pub error: f64,
     /// The greatest time of a frame in milliseconds.
-    #[arg(long, value_name = "MILLISECONDS", value_parser = positive)]
+    #[arg(long, value_name = "MILLISECONDS", allow_negative_numbers = true, value_parser = positive)]
     pub time: Option<f64>,
     /// The most memory on the device in megabytes (10^6 bytes).
-    #[arg(long, value_name = "MEGABYTES", value_parser = positive)]
+    #[arg(long, value_name = "MEGABYTES", allow_negative_numbers = true, value_parser = positive)]
     pub memory: Option<f64>,
     /// Where the frame will run.
     #[arg(long, value_enum, default_value_t)]

@@ -14,7 +14,8 @@ use hankel_host::device::DeviceError;
 use hankel_host::eval::EvalError;
 use hankel_system::input::InputError;
 use hankel_system::output::OutputError;
-use hankel_system::text::visible;
+use hankel_system::signals;
+use hankel_system::text::{shortened, visible};
 use miette::Diagnostic;
 
 /// How a command that ran to its end ends.
@@ -73,7 +74,7 @@ impl Failure {
     fn say(blame: Blame, message: &str, help: Option<&str>) -> Self {
         Self {
             blame,
-            message: visible(message).into_owned(),
+            message: shortened(&visible(message)).into_owned(),
             help: help.map(|help| visible(help).into_owned()),
         }
     }
@@ -167,6 +168,11 @@ pub fn blame_of_input(error: &InputError) -> Blame {
 }
 
 pub fn blame_of_output(error: &OutputError) -> Blame {
+    // Whoever read it has closed the pipe, and does not want to be told.
+    if matches!(error, OutputError::Write { source, .. } if source.kind() == ErrorKind::BrokenPipe)
+    {
+        signals::end_of_pipe();
+    }
     match error.is_machine() {
         true => Blame::Machine,
         false => Blame::Input,
@@ -233,6 +239,7 @@ impl From<FrameError> for Failure {
             FrameError::Device { source, .. } => blame_of(source),
             FrameError::Graph(_) | FrameError::NoShader { .. } => Blame::Kernel,
             FrameError::Write(error) => blame_of_output(error),
+            FrameError::Store(StoreError::Input(error)) => blame_of_input(error),
             FrameError::Store(StoreError::Io { source, .. }) if !is_misplaced(source.kind()) => {
                 Blame::Machine
             }

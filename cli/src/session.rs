@@ -100,12 +100,7 @@ impl Session {
         let Some(manifest) = manifest else {
             return Ok(Self::linked(quiet));
         };
-        if !manifest.is_file() {
-            return Err(Failure::input(
-                format!("{}: there is no such file", manifest.display()),
-                "Give the path of a kernel crate's Cargo.toml.",
-            ));
-        }
+        check_manifest(&manifest)?;
         let linked = is_linked(&manifest);
         let mut ahead = None;
         let krate = if linked {
@@ -245,12 +240,13 @@ impl Session {
 
     /// A request for what `folder` should hold. Without options in `args`, those hold that it was built with.
     pub fn request_again(&self, args: &Generate, folder: &Path) -> Result<Request> {
-        match diff::shaders(folder) {
-            Ok(manifest) if args.first_option().is_none() => {
+        match diff::options(folder) {
+            Ok(built) if args.first_option().is_none() => {
+                let options = built.options()?;
                 let WriteOptions {
                     kernels, targets, ..
-                } = manifest.options.clone();
-                Ok(self.request_for(kernels, targets, manifest.options.options()?))
+                } = built;
+                Ok(self.request_for(kernels, targets, options))
             }
             // A manifest that cannot be read is a file that differs.
             Err(problem) if args.first_option().is_none() => {
@@ -527,6 +523,21 @@ fn is_linked(manifest: &Path) -> bool {
         })
 }
 
+/// Whether a file can be a crate's Cargo.toml.
+pub fn check_manifest(path: &Path) -> Result<()> {
+    let problem = if !path.is_file() {
+        "there is no such file"
+    } else if path.file_name().is_none_or(|name| name != "Cargo.toml") {
+        "it is no Cargo.toml"
+    } else {
+        return Ok(());
+    };
+    Err(Failure::input(
+        format!("{}: {problem}", path.display()),
+        "Give the path of a kernel crate's Cargo.toml, or of its folder.",
+    ))
+}
+
 /// The folder that a Cargo.toml lies in.
 pub fn folder_of(manifest: &Path) -> &Path {
     match manifest.parent() {
@@ -589,6 +600,8 @@ fn placement(args: &Placed) -> Result<Placement> {
 fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, u32>>> {
     const HELP: &str = "Write --variant _NAME:CONSTANT=NUMBER, with a comma between constants; the suffix \
                         has lower-case letters, digits and `_`.";
+    /// A name of a file may have 255 bytes.
+    const MOST_LETTERS: usize = 64;
     let mut variants = BTreeMap::new();
     for text in texts {
         let wrong = |problem: &str| Failure::input(format!("--variant {text}: {problem}"), HELP);
@@ -599,6 +612,9 @@ fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, u32>>>
             |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
         if suffix.is_empty() || !suffix.chars().all(is_part_of_name) {
             return Err(wrong("the suffix cannot end a kernel's name"));
+        }
+        if suffix.len() > MOST_LETTERS {
+            return Err(wrong("the suffix has more than 64 letters"));
         }
         let pairs: Vec<String> = pairs.split(',').map(str::to_owned).collect();
         let values = constants(&format!("--variant {suffix}:"), &pairs)?;

@@ -87,7 +87,8 @@ fn a_build_is_whole_and_then_left_alone() {
         .and_then(|m| m.modified())
         .ok();
     assert_eq!(before, after);
-    assert_eq!(desk.hankel("--quiet build --out shaders").code(0).out(), "");
+    let quiet = "--quiet build --out quiet --kernel vsm";
+    assert_eq!(desk.hankel(quiet).code(0).out(), "");
 }
 
 #[test]
@@ -222,7 +223,7 @@ fn misuse_of_build_is_explained() {
         .fails(2, &["--set encoding=2", "`encoding` was set to 1 already"]);
     desk.write("file", "");
     desk.hankel("build --out file")
-        .fails(2, &["file is a file", "goes into a folder"]);
+        .fails(2, &["file is a file", "a folder is expected"]);
     desk.hankel("build --out file/deeper")
         .fails(2, &["file/deeper", "Not a directory"]);
     desk.hankel("check file")
@@ -401,6 +402,15 @@ fn check_finds_what_does_not_follow() {
     for word in ["--- ", "+++ ", "vsm.wgsl", "-", "+"] {
         assert!(out.contains(word), "{out}");
     }
+    // What it was built with is known from its manifest, whatever has become of the file.
+    let file_of_every = desk.path("every/hlsl/shade_hamburger.hlsl");
+    let hlsl = fs::read_to_string(&file_of_every).expect("it was built");
+    fs::write(&file_of_every, format!("{hlsl}\n")).expect("the desk can be written");
+    let out = desk.hankel("check every").code(1).out();
+    assert!(out.contains("1 changed, 0 missing"), "{out}");
+    fs::remove_file(&file_of_every).expect("it is there");
+    let out = desk.hankel("check every").code(1).out();
+    assert!(out.contains("0 changed, 1 missing"), "{out}");
     let json = desk
         .hankel("check s --kernel vsm --format json")
         .code(1)
@@ -848,6 +858,24 @@ fn a_scene_is_planned() {
 }
 
 /// A crate of one's own, outside of the repository, through the plug-in.
+#[test]
+fn a_new_crate_may_be_the_present_folder() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    let desk = Desk::new();
+    let here = desk.path("mine");
+    fs::create_dir(&here).expect("a folder");
+    fs::set_permissions(&here, fs::Permissions::from_mode(0o700)).expect("a mode");
+    let before = fs::metadata(&here).expect("it is there").ino();
+    desk::run(desk.command("new .").current_dir(&here)).code(0);
+    let after = fs::metadata(&here).expect("it is there");
+    assert_eq!((after.ino(), after.mode() & 0o777), (before, 0o700));
+    assert!(here.join("Cargo.toml").is_file() && here.join("src/lib.rs").is_file());
+    std::os::unix::fs::symlink("nowhere", desk.path("dangling")).expect("a link");
+    desk.hankel("new dangling").fails(2, &["it is a link"]);
+    desk.hankel("new hankel_dsl")
+        .fails(2, &["another crate's name"]);
+}
+
 #[test]
 fn a_new_crate_builds_at_once() {
     let desk = Desk::new();

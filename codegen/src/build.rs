@@ -30,7 +30,7 @@ use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
 };
 use crate::spirv;
-use crate::translate::{Ir, Options, Place, Written};
+use crate::translate::{self, Ir, Options, Place, Written};
 use crate::translated::Translated;
 
 pub use crate::folder::is_own;
@@ -354,8 +354,16 @@ pub(crate) fn assemble(
         kernels.insert(name.to_owned(), it.entry);
         files.extend(it.files);
     }
+    let known = request.kernels.first().map_or("", |it| it.licence.as_str());
     for (path, text) in headers::files(&layouts, &kernels, &in_wgsl) {
-        files.insert(path.into(), text.into_bytes());
+        let line = match translate::licence("//", known) {
+            // C before 1999 has no other comments.
+            line if path.ends_with(".h") && !line.is_empty() => {
+                format!("/*{} */\n", line["//".len()..].trim_end())
+            }
+            line => line,
+        };
+        files.insert(path.into(), (line + &text).into_bytes());
     }
     let file_entry = |bytes: &Vec<u8>| FileEntry {
         sha256: sha256(bytes),

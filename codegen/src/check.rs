@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
-use hankel_system::input;
+use hankel_system::{fields, input};
 use serde::{Deserialize, Serialize};
 
 use crate::build::Generated;
@@ -49,7 +49,7 @@ pub struct Limits {
 #[serde(deny_unknown_fields)]
 pub struct Config {
     /// The budget.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "fields::table")]
     pub budget: Budget,
 }
 
@@ -72,7 +72,7 @@ pub struct Budget {
     /// Most findings of [`crate::lint`].
     pub findings: Option<u32>,
     /// Limits of single kernels, which come before those for all.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "fields::map")]
     pub kernels: BTreeMap<String, Limits>,
 }
 
@@ -203,7 +203,7 @@ pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result
                 }
                 report.changed.push(Changed {
                     file: name.clone(),
-                    diff: diff(name, &there, expected),
+                    diff: unified_diff(name, &there, expected),
                 });
             }
             Found::Nothing => report.missing.push(name.clone()),
@@ -272,7 +272,8 @@ fn invalid(name: &str, bytes: &[u8]) -> Option<Failure> {
         .err()
 }
 
-fn diff(name: &str, there: &[u8], expected: &[u8]) -> String {
+/// A unified diff from what is committed to what the sources give; sizes of what is no text.
+pub(crate) fn unified_diff(name: &str, there: &[u8], expected: &[u8]) -> String {
     match (std::str::from_utf8(there), std::str::from_utf8(expected)) {
         (Ok(there), Ok(expected)) => similar::TextDiff::from_lines(there, expected)
             .unified_diff()

@@ -317,8 +317,11 @@ pub fn compile(
 /// inlines everything in these crates before rust-gpu sees it; in others it does not, since that reads
 /// vectors part by part, and says less of what stands in the source.
 fn of_arrays(arrays: Arrays) -> impl Iterator<Item = &'static str> {
-    const ITERATED: [&str; 3] = [
+    const ITERATED: [&str; 4] = [
         "-Zmir-enable-passes=+Inline",
+        // rustc looks an eighth of it deep for calls that end in themselves, and takes those beyond for such: a closure that
+        // calls `math::exp` has more within each other than an eighth of the usual 128.
+        "-Zcrate-attr=recursion_limit=\"4096\"",
         "-Zinline-mir-threshold=100000",
         "-Zinline-mir-hint-threshold=100000",
     ];

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::files::sha256;
 use crate::folder::{Folder, Found};
 use crate::functions::api;
-use crate::manifest::{KernelEntry, Manifest};
+use crate::manifest::{KernelEntry, Manifest, WriteOptions};
 
 /// What changed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -127,13 +127,7 @@ impl Build {
         let Some(folder) = Folder::open(path)? else {
             return Err(fail("there is no such folder".into()));
         };
-        let manifest = folder.read(MANIFEST_FILE)?;
-        if let Found::Other(_, kind) = manifest {
-            return Err(fail(format!("{MANIFEST_FILE} is {kind}")));
-        }
-        if let Found::File(bytes) = manifest {
-            let manifest = Manifest::from_json(&bytes)
-                .map_err(|problem| fail(format!("{MANIFEST_FILE}: {problem}")))?;
+        if let Some(manifest) = manifest_of(&folder, path)? {
             let files = manifest.files.iter().map(|(name, it)| (name, &it.sha256));
             as_recorded(&folder, files)?
                 .map_or(Ok(()), |name| Err(fail(edited(name, MANIFEST_FILE))))?;
@@ -151,6 +145,40 @@ impl Build {
             api::FILE
         )))
     }
+}
+
+/// The manifest of a folder, whatever has become of the files that it names; none if there is no such file.
+fn manifest_of(folder: &Folder, path: &Path) -> Result<Option<Manifest>> {
+    let fail = |problem: String| Error::Compared {
+        path: path.to_owned(),
+        problem,
+    };
+    match folder.read(MANIFEST_FILE)? {
+        Found::Nothing => Ok(None),
+        Found::Other(_, kind) => Err(fail(format!("{MANIFEST_FILE} is {kind}"))),
+        Found::File(bytes) => Manifest::from_json(&bytes)
+            .map(Some)
+            .map_err(|problem| fail(format!("{MANIFEST_FILE}: {problem}"))),
+    }
+}
+
+/// What a folder of shaders was built with, whatever has become of its files since.
+///
+/// # Errors
+///
+/// The folder cannot be read, or has no manifest, or one of another format.
+pub fn options(path: &Path) -> Result<WriteOptions> {
+    let fail = |problem: &str| Error::Compared {
+        path: path.to_owned(),
+        problem: problem.into(),
+    };
+    let Some(folder) = Folder::open(path)? else {
+        return Err(fail("there is no such folder"));
+    };
+    let manifest = manifest_of(&folder, path)?;
+    manifest
+        .map(|it| it.options)
+        .ok_or_else(|| fail(&format!("it has no {MANIFEST_FILE}")))
 }
 
 /// The first file that is missing, or has another hash than the one that was recorded.

@@ -265,8 +265,8 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
-    /// The output is no folder.
-    #[error("{} is {kind}: the output goes into a folder", path.display())]
+    /// What should be a folder is none.
+    #[error("{} is {kind}, and a folder is expected: generated files are in one", path.display())]
     NotAFolder {
         /// What was given.
         path: PathBuf,
@@ -402,7 +402,7 @@ impl Error {
                 "Move it away or choose another output folder: hankel follows no links below it."
                     .into()
             }
-            Self::NotAFolder { .. } => "Choose another folder, or move it away.".into(),
+            Self::NotAFolder { .. } => "Give the path of a folder, or move what is there away.".into(),
             Self::OtherKind { .. } => {
                 "Shaders and libraries of functions are built into folders of their own: give another one."
                     .into()
@@ -471,7 +471,8 @@ impl Failure {
             }
             Step::Place => {
                 "Give one of them another place in the file of `--bindings`, take its line out, or \
-                 lower the language's base."
+                 change the place of all (`--hlsl-space`, `--register-base`, `--wgsl-group`, \
+                 `--msl-slot-base`, `--glsl-binding-base`)."
             }
             Step::Read => "The file is damaged or no SPIR-V: make it again.",
             Step::Validate if self.message.contains("capability") => {

@@ -13,8 +13,8 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, branches, canonical, exact, libm, names, narrow, order, parts, references,
-    refused, split, tables, trim, undefined, uniform, widths,
+    self, bounds, branches, canonical, exact, holders, libm, names, narrow, order, parts,
+    references, refused, split, tables, trim, undefined, uniform, widths,
 };
 use crate::translate::reading;
 
@@ -56,19 +56,32 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     };
     widths::mend(&mut module);
     narrow::widen(&mut module, name).map_err(placed)?;
+    if holders::are_passed(&module) {
+        let words = run_passes(&module, name, |passes| {
+            passes
+                .register_pass(Passes::InlineExhaustive)
+                .register_pass(Passes::EliminateDeadFunctions);
+        })?;
+        module = spirv::load(&words, name)?;
+    }
     // What is left may be resolved by spirv-opt, unless it is invalid.
     let (mut has_references, mut left) = references::resolve(&mut module, name);
-    while references::forward_stores(&mut module) {
+    while (holders::has_handles(&module) && parts::divide(&mut module))
+        | holders::divide(&mut module)
+        | references::forward_stores(&mut module)
+        | holders::fold(&mut module)
+    {
         let (has_more, still) = references::resolve(&mut module, name);
         has_references |= has_more;
         left = still;
     }
-    validate(&spirv::store(&module), name).map_err(|invalid| left.map_or(invalid, placed))?;
+    check_raw(&module, name).map_err(|invalid| left.map_or(invalid, placed))?;
     refused::check(&module, name).map_err(placed)?;
     canonical::order(&mut module);
     libm::mend(&mut module);
     let (words, has_more) = optimise(module, name)?;
     let mut module = spirv::load(&words, name)?;
+    refused::check_references(&module, name).map_err(placed)?;
     order::mend(&mut module);
     if has_references || has_more {
         references::near(&mut module);
@@ -155,7 +168,7 @@ pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool
     exact::fold(&mut module);
     // Inlining and unrolling bring constants together, and what they decide may bring more.
     for _ in 0..MOST_ROUNDS {
-        let words = run_passes(&spirv::store(&module), name, |passes| {
+        let words = run_passes(&module, name, |passes| {
             passes
                 .register_pass(Passes::StripDebugInfo)
                 .register_performance_passes()
@@ -187,7 +200,7 @@ pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool
             break;
         }
     }
-    let words = run_passes(&spirv::store(&module), name, |passes| {
+    let words = run_passes(&module, name, |passes| {
         passes
             .register_pass(Passes::LocalRedundancyElimination)
             .register_pass(Passes::AggressiveDCE)
@@ -203,15 +216,16 @@ pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool
 }
 
 fn run_passes(
-    words: &[u32],
+    module: &Module,
     name: &str,
     register: impl FnOnce(&mut spirv_tools::opt::compiled::CompiledOptimizer),
 ) -> Result<Vec<u32>, Failure> {
-    let mut optimizer = spirv_tools::opt::compiled::CompiledOptimizer::with_env(ENVIRONMENT);
+    let mut optimizer =
+        spirv_tools::opt::compiled::CompiledOptimizer::with_env(environment_of(module));
     register(&mut optimizer);
     let mut said = Vec::new();
     let result = optimizer.optimize(
-        words,
+        spirv::store(module),
         &mut |message: spirv_tools::error::Message| said.push(message.message),
         Some(spirv_tools::opt::Options {
             preserve_spec_constants: true,
@@ -234,13 +248,31 @@ fn run_passes(
     }
 }
 
+/// spirv-val for what rust-gpu made. Structures may still hold textures and samplers, which is Vulkan's rule alone: a
+/// function that takes one has it in a structure, until it is inlined.
+fn check_raw(module: &Module, name: &str) -> Result<(), Failure> {
+    validate_in(environment_of(module), &spirv::store(module), name)
+}
+
+/// By whose rules a module is read that is not finished.
+fn environment_of(module: &Module) -> TargetEnv {
+    match holders::has_handles(module) {
+        true => TargetEnv::Universal_1_5,
+        false => ENVIRONMENT,
+    }
+}
+
 /// spirv-val for Vulkan 1.2.
 ///
 /// # Errors
 ///
 /// The module is invalid.
 pub fn validate(words: &[u32], name: &str) -> Result<(), Failure> {
-    let validator = spirv_tools::val::create(Some(ENVIRONMENT));
+    validate_in(ENVIRONMENT, words, name)
+}
+
+fn validate_in(environment: TargetEnv, words: &[u32], name: &str) -> Result<(), Failure> {
+    let validator = spirv_tools::val::create(Some(environment));
     guarded(
         || {
             validator.validate(words, None).map_err(|error| {

@@ -63,6 +63,7 @@ fn name_of(module: &[u8], kernel: &Kernel) -> String {
     // Errors name the line, and what is kept has none.
     let description = Kernel {
         line: 0,
+        licence: String::new(),
         ..kernel.clone()
     };
     // Nothing in a description can fail to become JSON.

@@ -826,7 +826,7 @@ mod tests {
         std::fs::write(&file, "").unwrap();
         let text = Folder::create(&file).err().unwrap().to_string();
         assert!(
-            text.ends_with("file is a file: the output goes into a folder"),
+            text.contains("file is a file, and a folder is expected"),
             "{text}"
         );
         assert!(Folder::open(&place.path().join("none")).unwrap().is_none());

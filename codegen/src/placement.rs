@@ -19,6 +19,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::native::describe::Kernel;
+use hankel_system::fields::{self, Table};
 use hankel_system::input;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -63,19 +64,39 @@ pub struct Placement {
 #[serde(deny_unknown_fields)]
 pub struct Places {
     /// In HLSL.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        default,
+        deserialize_with = "fields::optional"
+    )]
     pub hlsl: Option<HlslPlace>,
     /// In WGSL.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        default,
+        deserialize_with = "fields::optional"
+    )]
     pub wgsl: Option<WgslPlace>,
     /// In MSL.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        default,
+        deserialize_with = "fields::optional"
+    )]
     pub msl: Option<MslPlace>,
     /// In GLSL 4.50.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        default,
+        deserialize_with = "fields::optional"
+    )]
     pub glsl: Option<GlslPlace>,
     /// In GLSL ES 3.10.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        default,
+        deserialize_with = "fields::optional"
+    )]
     pub essl310: Option<GlslPlace>,
 }
 
@@ -143,7 +164,7 @@ impl Placement {
             problem,
         };
         let text = input::read_text(file, MAX_BYTES).map_err(|error| fail(error.problem()))?;
-        type Tables = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Places>>;
+        type Tables = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Table<Places>>>;
         let tables: Tables =
             toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?;
         let line = |span: Range<usize>| 1 + text[..span.start].matches('\n').count();
@@ -159,7 +180,7 @@ impl Placement {
                 .collect();
             let places = params
                 .into_iter()
-                .map(|(param, places)| (param.into_inner(), places))
+                .map(|(param, Table(places))| (param.into_inner(), places))
                 .collect();
             self.origin.lines.insert(kernel.get_ref().clone(), lines);
             self.bindings.insert(kernel.into_inner(), places);

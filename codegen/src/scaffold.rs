@@ -51,21 +51,33 @@ pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
             "`{name}` is no name for a crate: use small letters, digits, - and _, a letter first"
         )));
     }
-    if OTHER_CRATES.contains(&name.as_str()) || name == "hankel" || name.starts_with("hankel-") {
+    if OTHER_CRATES.contains(&name.as_str())
+        || name == "hankel"
+        || name.starts_with("hankel-")
+        || name.starts_with("hankel_")
+    {
         return Err(fail(format!("`{name}` is another crate's name")));
     }
     if KEYWORDS.contains(&name.as_str()) {
         return Err(fail(format!("`{name}` is a word of Rust's own")));
     }
-    match std::fs::read_dir(&folder_path) {
+    let is_there = match std::fs::read_dir(&folder_path) {
         Ok(entries) => {
             if entries.into_iter().next().is_some() {
                 return Err(fail("it is not empty".into()));
             }
+            true
         }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            if folder_path.is_symlink() {
+                return Err(fail(
+                    "it is a link, and what it points to is not there".into(),
+                ));
+            }
+            false
+        }
         Err(error) => return Err(fail(error.to_string())),
-    }
+    };
     let dependency = match dsl {
         Dsl::Path(path) => {
             let path = std::path::absolute(path).during("resolve", path)?;
@@ -85,15 +97,26 @@ pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
             .replace("@LIBRARY@", &library)
             .replace("@DSL@", &dependency)
     };
-    // The folder appears whole or, on a full disk, not at all.
-    let above = folder_path.parent().unwrap_or(&folder_path);
-    std::fs::create_dir_all(above).during("create", above)?;
-    let work = Folder::within(above).during("write to", above)?;
+    // The crate appears whole or, on a full disk, not at all. An empty folder stays the one that it is: somebody may be
+    // in it, or it may be a link.
+    let around = match folder_path.parent() {
+        Some(above) if !is_there => above,
+        _ => &folder_path,
+    };
+    std::fs::create_dir_all(around).during("create", around)?;
+    let work = Folder::within(around).during("write to", around)?;
     let made = work.join(&name);
     for (file, text) in FILES {
         write_whole(&made.join(file), fill(text).as_bytes())?;
     }
-    std::fs::rename(&made, &folder_path).during("create", &folder_path)?;
+    if is_there {
+        for name in PARTS {
+            let part = folder_path.join(name);
+            std::fs::rename(made.join(name), &part).during("create", &part)?;
+        }
+    } else {
+        std::fs::rename(&made, &folder_path).during("create", &folder_path)?;
+    }
     Ok(FILES.map(|(file, _)| folder_path.join(file)).to_vec())
 }
 
@@ -148,9 +171,23 @@ const FILES: [(&str, &str); 5] = [
     ("tests/parity.rs", include_str!("scaffold/parity.rs.txt")),
 ];
 
+/// What lies in the crate's folder itself; what makes a crate of it comes last.
+const PARTS: [&str; 5] = [".gitignore", "README.md", "tests", "src", "Cargo.toml"];
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_hold_all_files() {
+        for (file, _) in FILES {
+            assert!(
+                PARTS
+                    .iter()
+                    .any(|part| file.split('/').next() == Some(part))
+            );
+        }
+    }
 
     #[test]
     fn relative_paths() {

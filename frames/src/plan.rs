@@ -180,8 +180,19 @@ impl fmt::Display for Impossible {
         if self.considered == 0 {
             writeln!(f, "nothing that was chosen is for this scene")?;
         } else {
-            let error = self.wanted.error;
-            writeln!(f, "nothing has an error of at most {error} here")?;
+            let Wanted {
+                error,
+                seconds,
+                bytes,
+            } = self.wanted;
+            write!(f, "nothing has an error of at most {error}")?;
+            if let Some(seconds) = seconds {
+                write!(f, " in at most {} ms", seconds * 1e3)?;
+            }
+            if let Some(bytes) = bytes {
+                write!(f, " with at most {} MB", bytes as f64 / 1e6)?;
+            }
+            writeln!(f, " here")?;
         }
         if let Some((name, error)) = &self.nearest {
             writeln!(f, "nearest: {name}, {error}")?;

@@ -449,6 +449,28 @@ fn errors_name_the_place_the_field_and_what_is_allowed() {
 }
 
 #[test]
+fn a_table_is_no_array() {
+    let camera = "[camera]\neye = [3, 4, 5]\ntarget = [0, 0, 0]\n";
+    for (text, table) in [
+        (format!("output = [640, 480]\n{LEAST}"), "output"),
+        (format!("shadow = [\"pcf\"]\n{LEAST}"), "shadow"),
+        (format!("medium = [0.1]\n{LEAST}"), "medium"),
+        (
+            format!(
+                "camera = [[3, 4, 5], [0, 0, 0]]\n{}",
+                LEAST.replace(camera, "")
+            ),
+            "camera",
+        ),
+    ] {
+        let message = refused(&text);
+        let words = format!("scene.toml:1:{}: `{table}`: ", table.len() + 4);
+        assert!(message.starts_with(&words), "{message}");
+        assert!(message.contains("expected a table"), "{message}");
+    }
+}
+
+#[test]
 fn numbers_beyond_those_that_are_wanted_are_refused() {
     let light = |field: &str| {
         let more = format!("[-1, -2, -1]\n{field} = [1, 1, 1, 1]");

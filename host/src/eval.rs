@@ -6,14 +6,14 @@
 
 use std::collections::HashMap;
 use std::fmt;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::native::CallError;
 use hankel_dsl::native::call::Ending;
 use hankel_dsl::native::describe::{Kernel, Output, Param, Precision, Range, Role, Scalar, Stage};
-use hankel_system::input::{self, InputError, Rows};
+use hankel_system::input::InputError;
 use hankel_system::output::{self, OutputError};
+use hankel_system::table::{CellError, ColumnsError, Table as Rows, TableError};
 
 use crate::crates::{KernelCrate, KernelEntry};
 use crate::device::{Bind, Device, DeviceError, Shader};
@@ -70,27 +70,11 @@ pub enum EvalError {
     #[error(transparent)]
     Output(#[from] OutputError),
     /// Columns that do not fit the kernel.
-    #[error("{}: {problem}", path.display())]
-    Columns {
-        /// The file.
-        path: PathBuf,
-        /// Which, and what is wanted.
-        problem: String,
-    },
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
     /// A row or a cell that cannot be used.
-    #[error("{}: row {row} (line {line}){}: {problem}", path.display(), column.as_ref().map_or_else(String::new, |c| format!(", column `{c}`")))]
-    Cell {
-        /// The file.
-        path: PathBuf,
-        /// Row, from 1, without the header.
-        row: u64,
-        /// Line of the file, from 1.
-        line: u64,
-        /// The column; none for the row as a whole.
-        column: Option<String>,
-        /// What is wrong.
-        problem: String,
-    },
+    #[error(transparent)]
+    Cell(#[from] CellError),
     /// A row that the kernel does not come back from.
     #[error("{}: row {row}: kernel `{kernel}`: its process {how}, at {inputs}", path.display())]
     Row {
@@ -108,6 +92,15 @@ pub enum EvalError {
     /// The device's words.
     #[error(transparent)]
     Device(#[from] DeviceError),
+}
+
+impl From<TableError> for EvalError {
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::Input(error) => Self::Input(error),
+            TableError::Cell(error) => Self::Cell(error),
+        }
+    }
 }
 
 /// A number that may be given by name: a field of a uniform, or a specialisation constant.
@@ -438,57 +431,6 @@ impl Table {
         }
         Ok((bytes, constants))
     }
-
-    /// For each column of the file, which of the inputs it is.
-    fn columns(&self, path: &Path, header: &csv::StringRecord) -> Result<Vec<usize>, EvalError> {
-        let bad = |problem: String| EvalError::Columns {
-            path: path.into(),
-            problem,
-        };
-        let wanted = || {
-            self.inputs
-                .iter()
-                .map(|c| c.name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        if header.iter().all(str::is_empty) {
-            return Err(bad(format!(
-                "it has no header; the columns must be: {}",
-                wanted()
-            )));
-        }
-        let mut found = Vec::new();
-        for (i, name) in header.iter().enumerate() {
-            let Some(input) = self.inputs.iter().position(|c| c.name == name) else {
-                return Err(bad(format!(
-                    "column {} is `{name}`, which the kernel does not read; the columns must be: {}",
-                    i + 1,
-                    wanted()
-                )));
-            };
-            if found.contains(&input) {
-                return Err(bad(format!("there are two columns `{name}`")));
-            }
-            found.push(input);
-        }
-        let missing: Vec<&str> = self
-            .inputs
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| !found.contains(i))
-            .map(|(_, c)| c.name.as_str())
-            .collect();
-        if missing.is_empty() {
-            Ok(found)
-        } else {
-            Err(bad(format!(
-                "column {} is missing; the columns must be: {}",
-                missing.join(", "),
-                wanted()
-            )))
-        }
-    }
 }
 
 /// Reads a finite number; the error says what is wrong with it.
@@ -603,16 +545,9 @@ pub fn run(
 ) -> Result<u64, EvalError> {
     let table = Table::new(&job.entry.kernel)?;
     let (uniforms, constants) = table.settings(job.settings)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(input::open_table(job.input)?);
-    let unreadable = |e: csv::Error| InputError::Io {
-        path: job.input.into(),
-        source: e.into(),
-    };
-    let header = reader.headers().map_err(unreadable)?.clone();
-    let columns = table.columns(job.input, &header)?;
+    let mut rows = Rows::open(job.input)?;
+    let names: Vec<&str> = table.inputs.iter().map(|c| c.name.as_str()).collect();
+    let columns = rows.columns(&names)?;
 
     let unwritable = |e: csv::Error| OutputError::write(job.output, e);
     let output = output::Output::create(job.output, &[job.input])?;
@@ -621,8 +556,8 @@ pub fn run(
         .write_record(table.outputs.iter().map(|c| &c.name))
         .map_err(unwritable)?;
 
-    let mut rows = 0;
-    let mut record = csv::StringRecord::new();
+    let mut done = 0;
+    let mut cells = csv::StringRecord::new();
     let mut chunk = uniforms;
     loop {
         for (bytes, _) in chunk
@@ -633,18 +568,18 @@ pub fn run(
             bytes.clear();
         }
         let mut count = 0;
-        while count < ROWS && read(&mut reader, &mut record, job.input, rows + 1 + count as u64)? {
-            let row = rows + 1 + count as u64;
-            append(
-                &table, &columns, &header, &record, job.input, row, &mut chunk,
-            )?;
+        while count < ROWS
+            && let Some(place) = rows.next(&mut cells)?
+        {
+            append(&table, &columns, &cells, &mut chunk)
+                .map_err(|(column, problem)| rows.wrong(&place, Some(column), problem))?;
             count += 1;
         }
         if count == 0 {
             break;
         }
         let results = run_chunk(device, job, &table, &chunk, &constants, count)
-            .map_err(|error| of_row(error, job.input, rows + 1))?;
+            .map_err(|error| of_row(error, job.input, done + 1))?;
         let mut text = String::new();
         for element in results.chunks_exact(table.output_bytes) {
             for column in &table.outputs {
@@ -657,83 +592,23 @@ pub fn run(
             }
             writer.write_record(None::<&[u8]>).map_err(unwritable)?;
         }
-        rows += count as u64;
-        progress(rows);
+        done += count as u64;
+        progress(done);
     }
     writer
         .into_inner()
         .map_err(|e| OutputError::write(job.output, e.into_error()))?
         .commit()?;
-    Ok(rows)
+    Ok(done)
 }
 
-/// The next record; false at the end.
-fn read(
-    reader: &mut csv::Reader<Rows>,
-    record: &mut csv::StringRecord,
-    path: &Path,
-    row: u64,
-) -> Result<bool, EvalError> {
-    reader.read_record(record).map_err(|e| {
-        // Such an error names the line itself: a row without an end has no position.
-        if e.is_io_error() {
-            return EvalError::Input(InputError::Io {
-                path: path.into(),
-                source: e.into(),
-            });
-        }
-        let line = e.position().map_or(0, |p| line_of(path, p));
-        let problem = match e.kind() {
-            csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".to_string(),
-            _ => e.to_string(),
-        };
-        EvalError::Cell {
-            path: path.into(),
-            row,
-            line,
-            column: None,
-            problem,
-        }
-    })
-}
-
-/// The line on which a record begins. The reader counts the empty lines before it as part of it;
-/// they are looked up again only for an error.
-fn line_of(path: &Path, position: &csv::Position) -> u64 {
-    let skipped = || -> io::Result<u64> {
-        let mut file = BufReader::new(input::open(path).map_err(io::Error::other)?);
-        file.seek(SeekFrom::Start(position.byte()))?;
-        let empty = file
-            .bytes()
-            .map_while(Result::ok)
-            .take_while(|b| matches!(b, b'\n' | b'\r'));
-        Ok(empty.filter(|&b| b == b'\n').count() as u64)
-    };
-    // A pipe, or a file that vanished meanwhile, leaves the reader's own count.
-    position.line() + skipped().unwrap_or(0)
-}
-
-/// Adds a row's numbers to the buffers.
-fn append(
-    table: &Table,
+/// Adds a row's numbers to the buffers; the error is a column, and what is wrong with its cell.
+fn append<'a>(
+    table: &'a Table,
     columns: &[usize],
-    header: &csv::StringRecord,
-    record: &csv::StringRecord,
-    path: &Path,
-    row: u64,
+    cells: &csv::StringRecord,
     chunk: &mut [Vec<u8>],
-) -> Result<(), EvalError> {
-    let bad = |column: Option<&str>, problem: String| EvalError::Cell {
-        path: path.into(),
-        row,
-        line: record.position().map_or(0, |p| line_of(path, p)),
-        column: column.map(Into::into),
-        problem,
-    };
-    if record.len() != header.len() {
-        let problem = format!("it has {} cells, the header {}", record.len(), header.len());
-        return Err(bad(None, problem));
-    }
+) -> Result<(), (&'a str, String)> {
     let mut starts = Vec::with_capacity(chunk.len());
     for (bytes, (is_element, size)) in chunk.iter_mut().zip(&table.arguments) {
         starts.push(bytes.len());
@@ -741,9 +616,9 @@ fn append(
             bytes.resize(bytes.len() + size, 0);
         }
     }
-    for (cell, &input) in record.iter().zip(columns) {
+    for (cell, &input) in cells.iter().zip(columns) {
         let column = &table.inputs[input];
-        let number = parse(column.scalar, cell).map_err(|p| bad(Some(&column.name), p))?;
+        let number = parse(column.scalar, cell).map_err(|p| (column.name.as_str(), p))?;
         let (argument, offset) = column.place;
         number.write(&mut chunk[argument][starts[argument] + offset..]);
     }

@@ -140,7 +140,7 @@ fn json_comes_back() {
 fn every_file_is_written_and_parses() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("new");
-    let paths = sample().write(&out, "bounds").unwrap();
+    let paths = sample().write(&out, "bounds", &[]).unwrap();
     let names: Vec<_> = paths
         .iter()
         .map(|p| p.file_name().unwrap().to_string_lossy().into_owned())
@@ -209,7 +209,7 @@ fn a_file_stands_where_the_folder_should() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     std::fs::write(&file, "x").unwrap();
-    let error = sample().write(&file, "bounds").unwrap_err();
+    let error = sample().write(&file, "bounds", &[]).unwrap_err();
     assert!(matches!(&error, ReportError::Output(error) if !error.is_machine()));
     assert!(error.to_string().contains("should be a folder"), "{error}");
     assert_eq!(std::fs::read(&file).unwrap(), b"x");

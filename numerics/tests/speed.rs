@@ -131,7 +131,7 @@ fn errors(speed: &Speed) {
 fn files(speed: &Speed) {
     let folder = tempfile::tempdir().unwrap();
     let report = speed.report("hankel bench bounds --quick");
-    let paths = report.write(folder.path(), "bounds").unwrap();
+    let paths = report.write(folder.path(), "bounds", &[]).unwrap();
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(paths.iter().all(|p| p.is_file()));
     let json: Report = serde_json::from_str(&read("bounds.json")).unwrap();

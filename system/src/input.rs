@@ -2,7 +2,7 @@
 //! large could take all memory: both are refused before anything is read.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Why a file was not read.
@@ -68,7 +68,7 @@ impl InputError {
 }
 
 /// `64 MiB`.
-fn size(bytes: u64) -> String {
+pub(crate) fn size(bytes: u64) -> String {
     match bytes {
         n if n >= 1 << 30 => format!("{} GiB", n >> 30),
         n if n >= 1 << 20 => format!("{} MiB", n >> 20),
@@ -121,180 +121,6 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
 /// [`InputError`].
 pub fn read_text(path: &Path, most: u64) -> Result<String, InputError> {
     String::from_utf8(read(path, most)?).map_err(|_| InputError::NotText { path: path.into() })
-}
-
-/// Bytes that a row of a table may have, with the line breaks in its quoted cells.
-pub const ROW: usize = 1 << 20;
-
-/// Opens a table in CSV, which is read row by row: a regular file of any length, or a pipe, in
-/// which another program may write it. A row of more than [`ROW`] bytes is an error while reading,
-/// and so is a quoted cell that the file does not close; the error names the line.
-///
-/// # Errors
-/// [`InputError::Io`]; [`InputError::NotRegular`] for folders, devices and sockets.
-pub fn open_table(path: &Path) -> Result<Rows, InputError> {
-    // A named pipe that nobody has opened yet: this waits for its writer, as every program does.
-    let file = if is_pipe(path) {
-        File::open(path).map_err(|source| InputError::Io {
-            path: path.into(),
-            source,
-        })?
-    } else {
-        open(path)?
-    };
-    Ok(Rows {
-        from: BufReader::with_capacity(1 << 16, file),
-        is_new: true,
-        place: Place {
-            part: Part::Start,
-            bytes: 0,
-            line: 1,
-            row: 1,
-            quote: 1,
-        },
-    })
-}
-
-#[cfg(unix)]
-fn is_pipe(path: &Path) -> bool {
-    use std::os::unix::fs::FileTypeExt;
-    path.metadata().is_ok_and(|m| m.file_type().is_fifo())
-}
-
-#[cfg(not(unix))]
-fn is_pipe(_: &Path) -> bool {
-    false
-}
-
-/// A reader of a table in CSV whose rows have at most [`ROW`] bytes, and whose quoted cells end.
-#[derive(Debug)]
-pub struct Rows {
-    from: BufReader<File>,
-    /// Whether nothing was read yet.
-    is_new: bool,
-    place: Place,
-}
-
-impl Read for Rows {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let from = self.from.fill_buf()?;
-        if from.is_empty() {
-            self.place.end()?;
-            return Ok(0);
-        }
-        let count = from.len().min(into.len());
-        into[..count].copy_from_slice(&from[..count]);
-        self.from.consume(count);
-        let mut bytes = &into[..count];
-        // The mark of UTF-8, which the first cell may have in front of its quote.
-        if self.is_new {
-            bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        }
-        self.is_new = false;
-        self.place.follow(bytes)?;
-        Ok(count)
-    }
-}
-
-/// Where in a table its reader is.
-#[derive(Debug)]
-struct Place {
-    part: Part,
-    /// Bytes of the row so far.
-    bytes: usize,
-    /// The present line, from 1.
-    line: u64,
-    /// The line on which the row begins.
-    row: u64,
-    /// The line with the last quote that began a cell.
-    quote: u64,
-}
-
-/// A part of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
-    /// The beginning of a cell.
-    Start,
-    /// A cell without quotes, where a quote means nothing.
-    Plain,
-    /// A quoted cell, where commas and line breaks mean nothing.
-    Quoted,
-    /// Behind a quote in a quoted cell: it ends the cell, or a second one makes it a letter.
-    Quote,
-}
-
-impl Place {
-    /// Goes on behind these bytes.
-    fn follow(&mut self, bytes: &[u8]) -> io::Result<()> {
-        for &byte in bytes {
-            self.step(byte);
-            if self.bytes > ROW {
-                return Err(self.too_long());
-            }
-        }
-        Ok(())
-    }
-
-    fn step(&mut self, byte: u8) {
-        self.bytes += 1;
-        if byte == b'\n' {
-            self.line += 1;
-        }
-        self.part = match (self.part, byte) {
-            (Part::Start, b'"') => {
-                self.quote = self.line;
-                Part::Quoted
-            }
-            (Part::Quoted, b'"') => Part::Quote,
-            (Part::Quoted, _) | (Part::Quote, b'"') => Part::Quoted,
-            (_, b',') => Part::Start,
-            (_, b'\n' | b'\r') => {
-                self.bytes = 0;
-                self.row = self.line;
-                Part::Start
-            }
-            _ => Part::Plain,
-        };
-    }
-
-    fn too_long(&self) -> io::Error {
-        let most = size(ROW as u64);
-        match self.part {
-            Part::Quoted => refusal(
-                self.quote,
-                &format!(
-                    "the quote that begins a cell there is not closed within the {most} that a row \
-                     may have: close it, or leave it out"
-                ),
-            ),
-            _ => refusal(
-                self.row,
-                &format!(
-                    "the row that begins there has more than the {most} that are read at most"
-                ),
-            ),
-        }
-    }
-
-    /// What is wrong with a table that ends here.
-    fn end(&self) -> io::Result<()> {
-        match self.part {
-            Part::Quoted => Err(refusal(
-                self.quote,
-                "the quote that begins a cell there is not closed where the file ends: close it, \
-                 or write the table again if its end is missing",
-            )),
-            _ => Ok(()),
-        }
-    }
-}
-
-/// Why a table is not read on, and in which line.
-fn refusal(line: u64, problem: &str) -> io::Error {
-    io::Error::new(
-        io::ErrorKind::InvalidData,
-        format!("line {line}: {problem}"),
-    )
 }
 
 /// Opens what there is, without waiting for another program.
@@ -387,70 +213,6 @@ mod tests {
             );
             let error = read(&fifo, 10).unwrap_err().to_string();
             assert!(error.contains("a pipe"), "{error}");
-        }
-    }
-
-    /// What is wrong with a table of this text.
-    fn refused(text: impl AsRef<[u8]>) -> Option<String> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("table");
-        std::fs::write(&path, &text).unwrap();
-        let mut read = Vec::new();
-        match open_table(&path).unwrap().read_to_end(&mut read) {
-            Ok(_) => {
-                assert_eq!(read, text.as_ref());
-                None
-            }
-            Err(error) => Some(error.to_string()),
-        }
-    }
-
-    #[test]
-    fn a_row_that_does_not_end_is_refused() {
-        let digits = "1".repeat(ROW);
-        for (text, words) in [
-            (format!("{digits}1"), "line 1: the row"),
-            (format!("a,b\n\n1,{digits}"), "line 3: the row"),
-            (format!("a\n\"\n\",{digits}"), "line 2: the row"),
-            (
-                format!("a,b\n1,\"{}", "1\n".repeat(ROW)),
-                "line 2: the quote",
-            ),
-            (format!("\u{feff}\"{digits}"), "line 1: the quote"),
-        ] {
-            let error = refused(&text).unwrap();
-            assert!(error.contains(words) && error.contains("1 MiB"), "{error}");
-        }
-        assert_eq!(refused(&digits), None);
-        for row in ["a,b\n1,2\n", "1,2\r", "\"1\n\",2\r\n"] {
-            assert_eq!(refused(row.repeat(ROW / 2)), None);
-        }
-    }
-
-    #[test]
-    fn a_quote_that_is_not_closed_is_refused() {
-        for (text, line) in [
-            ("a,b\n1,\"2", 2),
-            ("a,b\n1,\"2\n3,4\n", 2),
-            ("a,b\r\n\"1\r\n2\",\"3", 3),
-            ("\"a\"\"", 1),
-            ("\u{feff}\"a", 1),
-        ] {
-            let error = refused(text).unwrap();
-            assert!(
-                error.contains(&format!("line {line}: the quote")) && error.contains("file ends"),
-                "{text:?}: {error}"
-            );
-        }
-        for text in [
-            "",
-            "a,b\n1,\"2\"",
-            "\"a\"\"b\",\"\"\n",
-            "a\" b,2\"\n",
-            "\"a\"b\"c\n",
-            "\u{feff}\"a\nb\"\n",
-        ] {
-            assert_eq!(refused(text), None, "{text:?}");
         }
     }
 }

@@ -61,6 +61,9 @@ impl OutputError {
                 Kind::NotADirectory | Kind::AlreadyExists => {
                     "what should be a folder is none".into()
                 }
+                // Without the name of a temporary file, which the user never gave.
+                Kind::PermissionDenied => "this user may not write there".into(),
+                Kind::ReadOnlyFilesystem => "the file system is read-only".into(),
                 _ => error.to_string(),
             },
             forbidden: matches!(
@@ -277,6 +280,23 @@ pub fn create_all(paths: &[&Path], inputs: &[&Path]) -> Result<Vec<Output>, Outp
         targets.push(target);
     }
     paths.iter().map(|p| Output::create(p, inputs)).collect()
+}
+
+/// Refuses outputs that are files which the command reads.
+///
+/// # Errors
+/// [`OutputError::IsInput`].
+pub fn refuse_inputs(
+    outputs: impl IntoIterator<Item = PathBuf>,
+    inputs: &[PathBuf],
+) -> Result<(), OutputError> {
+    for path in outputs {
+        let there = path.metadata().ok();
+        if there.is_some() && inputs.iter().any(|input| is_same(input, there.as_ref())) {
+            return Err(OutputError::IsInput { path });
+        }
+    }
+    Ok(())
 }
 
 /// Makes a folder for outputs, if it is not there, and finds out whether it can be written.

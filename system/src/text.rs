@@ -28,6 +28,27 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// Letters of a line of a message; a file that it quotes may have longer ones.
+const LINE: usize = 1000;
+
+/// Text with the middle of very long lines left out.
+pub fn shortened(text: &str) -> Cow<'_, str> {
+    if text.lines().all(|line| line.chars().count() <= LINE) {
+        return Cow::Borrowed(text);
+    }
+    let short = |line: &str| {
+        let letters: Vec<char> = line.chars().collect();
+        if letters.len() <= LINE {
+            return line.to_owned();
+        }
+        let left = letters[..LINE / 2].iter();
+        let right = letters[letters.len() - LINE / 4..].iter();
+        left.chain(&[' ', '…', ' ']).chain(right).collect()
+    };
+    let lines: Vec<String> = text.lines().map(short).collect();
+    Cow::Owned(lines.join("\n"))
+}
+
 /// Control characters, and those of Unicode that embed or override the direction of text.
 fn steers(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
@@ -37,6 +58,15 @@ fn steers(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_lines_lose_their_middle() {
+        let long = format!("a\n{}é{}\nb", "x".repeat(LINE), "y".repeat(LINE));
+        let short = shortened(&long);
+        assert!(short.starts_with("a\nxxx") && short.ends_with("yyy\nb"));
+        assert!(short.chars().count() < LINE && short.contains(" … "));
+        assert_eq!(shortened("a\nb\n"), "a\nb\n");
+    }
 
     #[test]
     fn what_steers_a_terminal_is_spelled_out() {

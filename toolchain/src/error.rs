@@ -85,8 +85,9 @@ pub enum Error {
     #[error(
         "no checksum is known for {}\n\
          help: put a SHA256SUMS file that names it beside it, or give its SHA-256 \
-         (HANKEL_TOOLCHAIN_SHA256)",
-        path.display()
+         with --sha256 ({})",
+        path.display(),
+        crate::options::ENV_SHA256,
     )]
     ChecksumUnknown {
         /// The archive.

@@ -5,7 +5,7 @@ use std::time::SystemTime;
 use hankel_codegen::Language;
 use hankel_codegen::build::{MANIFEST_FILE, Report, check_output, is_own, write};
 use hankel_codegen::functions::api;
-use hankel_system::output::Output;
+use hankel_system::output::{self, Output};
 
 use super::functions;
 use crate::args::{Build, Form, Format};
@@ -158,6 +158,18 @@ fn touch(file: &Path) -> Result<()> {
         .map_err(|e| Failure::machine(format!("{}: {e}", file.display()), None))
 }
 
+/// Refuses to replace a file that the build reads. Without `--force`, any file of others is in the way.
+pub fn keep<'a>(
+    args: &Build,
+    files: impl Iterator<Item = &'a String>,
+    inputs: &[PathBuf],
+) -> Result<()> {
+    if args.force {
+        output::refuse_inputs(files.map(|file| args.out.join(file)), inputs)?;
+    }
+    Ok(())
+}
+
 /// Writes shaders. Gives what they follow from, if that was asked for.
 fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     check_output(&args.out)?;
@@ -169,11 +181,13 @@ fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     let request = session.request(&args.generate)?;
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
-    let report = write(&session.generate(&request)?, &args.out, args.force)?;
-    let inputs = match args.watch || args.depfile.is_some() {
+    let generated = session.generate(&request)?;
+    let inputs = match args.watch || args.depfile.is_some() || args.force {
         true => [session.inputs(&request)?, places(args)?].concat(),
         false => Vec::new(),
     };
+    keep(args, generated.files.keys(), &inputs)?;
+    let report = write(&generated, &args.out, args.force)?;
     tell(args, &report, quiet);
     Ok(inputs)
 }

@@ -8,7 +8,7 @@ use hankel_frames::scene::Scene;
 use hankel_frames::{FrameError, export, recorded, recorded_medium};
 use hankel_system::input;
 
-use super::build::{depend, tell};
+use super::build::{depend, keep, tell};
 use super::scene::{AUTO, Asked, files, with_technique};
 use crate::args::{Build, Check, Form, Format, Generate};
 use crate::failure::{Failure, Outcome, Result, blame_of_input};
@@ -51,10 +51,10 @@ pub fn build(args: &Build, file: &Path, quiet: bool) -> Result<Outcome> {
     let session = Session::linked(quiet);
     let request = session.request(&args.generate)?;
     let generated = generate(&session, &request, &draft)?;
+    let inputs = inputs(args, file, &scene)?;
+    keep(args, generated.files.keys(), &inputs)?;
     let report = write(&generated, &args.out, args.force)?;
-    if args.depfile.is_some() {
-        depend(args, MANIFEST_FILE, &inputs(args, file, &scene)?)?;
-    }
+    depend(args, MANIFEST_FILE, &inputs)?;
     if !quiet {
         let bytes: usize = draft.contents.values().map(Vec::len).sum();
         say!(

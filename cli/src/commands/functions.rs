@@ -9,10 +9,11 @@ use hankel_codegen::functions::folder::Folder;
 use hankel_codegen::functions::source::CrateText;
 use hankel_codegen::functions::{crates, read_chosen};
 
+use super::build::keep;
 use crate::args::{Build, Format};
-use crate::failure::{Failure, Outcome, Result};
+use crate::failure::{Outcome, Result};
 use crate::print::{self, say};
-use crate::session::built_in_manifest;
+use crate::session::{built_in_manifest, check_manifest};
 
 /// What the names of libraries begin with, if nothing is said.
 const PREFIX: &str = "hankel";
@@ -46,12 +47,7 @@ fn folder(
 }
 
 fn from_disk(manifest: &Path) -> Result<Sources> {
-    if !manifest.is_file() {
-        return Err(Failure::input(
-            format!("{}: there is no such file", manifest.display()),
-            "Give the path of a kernel crate's Cargo.toml.",
-        ));
-    }
+    check_manifest(manifest)?;
     Ok(crates::sources(manifest)?)
 }
 
@@ -77,6 +73,7 @@ pub fn build(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     let manifest = args.generate.source.manifest_path.as_deref();
     let prefix = args.prefix.as_deref().unwrap_or(PREFIX);
     let (folder, paths) = folder(manifest, prefix, &args.functions)?;
+    keep(args, folder.files().keys(), &paths)?;
     let report = folder.write(&args.out, args.force)?;
     if args.format == Format::Json {
         print::json(&report);

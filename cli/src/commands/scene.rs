@@ -130,8 +130,12 @@ fn check_name(out: &Path) -> Result<()> {
 
 /// `scan.png` and `vulkan` to `scan-vulkan.png`.
 pub fn beside(out: &Path, what: &str) -> PathBuf {
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = out.extension().unwrap_or_default().to_string_lossy();
-    let dot = if extension.is_empty() { "" } else { "." };
-    out.with_file_name(format!("{stem}-{what}{dot}{extension}"))
+    let mut name = out.file_stem().unwrap_or_default().to_os_string();
+    name.push("-");
+    name.push(what);
+    if let Some(extension) = out.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    out.with_file_name(name)
 }

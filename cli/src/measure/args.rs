@@ -19,9 +19,9 @@ pub enum Command {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  hankel judge --functions z,z^2,z^3,z^4 --input rows.csv --output bounds.csv
-  hankel judge --functions z,z^2,z^3,z^4 --range line --input rows.csv --output bounds.csv
-  hankel judge --functions 'z,exp(2z),sin(2pi*z)' --range 0,1 --input rows.csv --output bounds.csv
+  hankel judge --functions z,z^2,z^3,z^4 --input questions.csv --output exact.csv
+  hankel judge --functions z,z^2,z^3,z^4 --range line --input questions.csv --output exact.csv
+  hankel judge --functions 'z,exp(2z),sin(2pi*z)' --range 0,1 --input questions.csv --output exact.csv
 
 The table's columns are m0 (the total weight), m1, m2 and so on (the sums of weight times each
 function) and z. Written are the least weight strictly below z, the greatest at or below z, over all
@@ -91,13 +91,18 @@ pub struct BenchBounds {
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub n: Vec<u8>,
     /// Rows of each call [default: 1000000; with --quick 20000].
-    #[arg(long, value_name = "NUMBER", value_parser = rows)]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = rows)]
     pub samples: Option<usize>,
     /// Rounds in which everything has its turn [default: 5; with --quick 3].
-    #[arg(long, value_name = "NUMBER", value_parser = rounds)]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = rounds)]
     pub rounds: Option<usize>,
     /// Seed of the rows.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
     pub seed: u64,
     /// Measure this implementation in turns with the kernels.
     #[arg(long, value_enum)]
@@ -141,14 +146,14 @@ pub struct BenchFrames {
     #[arg(long, value_name = "WIDTHxHEIGHT", value_delimiter = ',', value_parser = pixels)]
     pub output: Vec<[u32; 2]>,
     /// Rounds in which every configuration has its turn.
-    #[arg(long, value_name = "NUMBER", value_parser = rounds, default_value_t = 5)]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = rounds, default_value_t = 5)]
     pub rounds: usize,
     /// Where frames are drawn.
     #[arg(long, value_enum, default_value_t)]
     pub backend: Backend,
     /// Also plan each scene within this error, and compare with the fastest configuration that was
     /// measured; several with commas between.
-    #[arg(long, value_name = "ERROR", value_delimiter = ',', value_parser = crate::args::budget)]
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true, value_delimiter = ',', value_parser = crate::args::budget)]
     pub error: Vec<f64>,
     /// Folder for the report.
     #[arg(long, value_name = "FOLDER")]
@@ -172,13 +177,13 @@ percentage-closer filtering, on average, as a share of light. Four functions wit
 candidates-all.csv with every choice.")]
 pub struct BenchCandidates {
     /// How many functions a map holds the means of.
-    #[arg(long, value_name = "NUMBER", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=5))]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=5))]
     pub functions: u8,
     /// Scene file (TOML) whose shadow map is taken; may be repeated [default: all in the folder scenes].
     #[arg(long, value_name = "FILE")]
     pub scene: Vec<PathBuf>,
     /// Filter regions of each scene.
-    #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u32).range(10..=100_000))]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 100, value_parser = clap::value_parser!(u32).range(10..=100_000))]
     pub regions: u32,
     /// Texels of the maps along an edge [default: each scene's].
     #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(16..=8192))]
@@ -222,7 +227,7 @@ pub struct Stress {
     pub family: Vec<String>,
     /// Rows of each family, order and precision; moment vectors for --singularities; rows of each
     /// family for --shadows; regions for each strength for --biases [default: 10000; 400; 1000; 4000000].
-    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u64).range(16..=MOST_SAMPLES))]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(16..=MOST_SAMPLES))]
     pub samples: Option<u64>,
     /// Only this precision.
     #[arg(long, value_enum)]
@@ -246,7 +251,12 @@ pub struct Stress {
     #[arg(long, conflicts_with_all = ["n", "family", "precision", "against"])]
     pub biases: bool,
     /// Seed of the rows.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        allow_negative_numbers = true,
+        default_value_t = 1
+    )]
     pub seed: u64,
     /// Folder for the report; without it, tables are only printed.
     #[arg(long, value_name = "FOLDER")]

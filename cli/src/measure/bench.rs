@@ -80,7 +80,14 @@ fn bounds(args: &BenchBounds, quiet: bool) -> Result<Outcome> {
             "instruction counts of shaders are left out: {failure}"
         )),
     }
-    deliver(&report, args.out.as_deref(), "bounds", args.format, quiet)?;
+    deliver(
+        &report,
+        args.out.as_deref(),
+        "bounds",
+        &[],
+        args.format,
+        quiet,
+    )?;
     Ok(Outcome::Fine)
 }
 

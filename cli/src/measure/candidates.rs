@@ -87,7 +87,14 @@ pub fn run(args: &BenchCandidates, quiet: bool) -> Result<Outcome> {
     all.write_all(&bytes)
         .map_err(|e| OutputError::write(all.path(), e))?;
     all.commit()?;
-    deliver(&report, Some(&args.out), "candidates", args.format, quiet)?;
+    deliver(
+        &report,
+        Some(&args.out),
+        "candidates",
+        &files,
+        args.format,
+        quiet,
+    )?;
     Ok(Outcome::Fine)
 }
 

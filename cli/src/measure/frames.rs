@@ -119,7 +119,16 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
             .galleries
             .push(bench.gallery(&session, subject, of_subject)?);
     }
-    deliver(&report, Some(&args.out), "frames", args.format, quiet)?;
+    let mut inputs = scene_files(&args.scene)?;
+    inputs.extend(subjects.iter().flat_map(|it| it.scene.files()));
+    deliver(
+        &report,
+        Some(&args.out),
+        "frames",
+        &inputs,
+        args.format,
+        quiet,
+    )?;
     Ok(Outcome::of(fine))
 }
 

@@ -34,16 +34,20 @@ pub fn run(command: &Command, quiet: bool) -> Result<Outcome> {
     }
 }
 
-/// Writes a report's files where a folder is given for them, and prints it.
+/// Writes a report's files where a folder is given for them, over none of the inputs, and prints it.
 fn deliver(
     report: &Report,
     out: Option<&Path>,
     name: &str,
+    inputs: &[PathBuf],
     format: Format,
     quiet: bool,
 ) -> Result<()> {
     let paths = match out {
-        Some(folder) => report.write(folder, name)?,
+        Some(folder) => {
+            let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+            report.write(folder, name, &inputs)?
+        }
         None => Vec::new(),
     };
     match format {

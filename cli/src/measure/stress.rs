@@ -43,7 +43,14 @@ pub fn run(args: &Stress, quiet: bool) -> Result<Outcome> {
         (report, passed && there)
     };
     drop(progress);
-    deliver(&report, args.out.as_deref(), "stress", args.format, quiet)?;
+    deliver(
+        &report,
+        args.out.as_deref(),
+        "stress",
+        &[],
+        args.format,
+        quiet,
+    )?;
     Ok(Outcome::of(passed))
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
 use std::thread;
 
-use crate::desk::Desk;
+use crate::desk::{Desk, run};
 
 const ROWS: &str = "b1,b2,depth\n0.5,0.3,0.2\n";
 const SCENE: &str = "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\n\
@@ -97,6 +97,46 @@ fn inputs_are_not_overwritten() {
     desk.hankel("diff s s --scene scene.toml --out s/manifest.json")
         .fails(2, &["is compared"]);
     assert_eq!(desk.read("s/manifest.json"), manifest);
+}
+
+/// Whatever `--force` says of files that are in the way.
+#[test]
+fn inputs_stay_where_generated_files_would_be() {
+    let desk = Desk::new();
+    let places = "[vsm.rows]\nwgsl = { binding = 7 }\n";
+    desk.write("frame.json", SCENE);
+    desk.write("manifest.json", places);
+    for line in [
+        "build --scene frame.json --out . --force --target wgsl",
+        "build --kernel vsm --out . --force --target wgsl --bindings manifest.json",
+    ] {
+        desk.hankel(line).fails(2, &["is read", "another name"]);
+    }
+    assert_eq!(
+        (desk.read("frame.json"), desk.read("manifest.json")),
+        (SCENE.into(), places.into())
+    );
+    // A report is a folder of files, too.
+    desk.write("scene.toml", SCENE);
+    fs::create_dir(desk.path("report")).expect("a folder");
+    symlink("../scene.toml", desk.path("report/frames.json")).expect("a link");
+    let bench = "bench frames --scene scene.toml --technique pcf --size 64 --filter 1 --fit scene --rounds 1";
+    desk.hankel(&format!("{bench} --multisampling 1 --out report"))
+        .fails(2, &["is read", "another name"]);
+    assert_eq!(desk.read("scene.toml"), SCENE);
+}
+
+#[test]
+fn pictures_beside_each_other_keep_the_bytes_of_their_names() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    desk.write("scene.toml", SCENE);
+    let mut command = desk.command("render scene.toml --compare --limit 0 --out");
+    command.arg(OsStr::from_bytes(b"q\xff.png"));
+    run(&mut command);
+    let name = OsStr::from_bytes(b"q\xff-vulkan.png");
+    assert!(desk.path("").join(name).is_file(), "{:?}", desk.names());
 }
 
 /// Before the work, which would be lost.

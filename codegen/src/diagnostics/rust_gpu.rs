@@ -57,7 +57,7 @@ fn file_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
 }
 
 /// What messages are known: words that they contain, and what to write instead.
-const KNOWN: [(&[&str], &str); 23] = [
+const KNOWN: [(&[&str], &str); 25] = [
     (
         &["cannot offset a pointer"],
         "a shader cannot walk through memory by pointer, as `windows` and `chunks` do: count an \
@@ -73,12 +73,19 @@ const KNOWN: [(&[&str], &str); 23] = [
         &["cannot cast between pointer types"],
         "memory has one type in a shader. An enum whose variants hold different types: first the variant \
          that holds most, `enum Shape { Box(Vec3, Vec3), Ball(Vec3, f32), Height(f32) }`; or a structure with a tag \
-         and a field for each",
+         and a field for each. An enum within a `Result` of another type: an `Option` instead. A reference to a field \
+         of no size, `&self` of a unit structure: give it a field, or call it without `self`",
     ),
     (
         &["OpSwitch", "is duplicated"],
         "two arms of a `match` that do nothing become one, which rust-gpu 0.10 refuses: write `if`, or let \
          each arm give a value, `y = match x { 0 => 5, _ => y }`",
+    ),
+    (
+        &["OpBranchConditional", "is duplicated"],
+        "two arms become one, which rust-gpu 0.10 refuses, and it tells no line. A `match` of two values with a guard \
+         does so, `match (a, b) { (Some(a), Some(b)) if a < b => …, … }`: write `if let (Some(a), Some(b)) = (a, b) \
+         && a < b { … } else { … }`",
     ),
     (
         &["is not a logical pointer"],
@@ -93,6 +100,10 @@ const KNOWN: [(&[&str], &str); 23] = [
     (
         &["no method named `sqrt`"],
         "`use hankel_dsl::Real;`, then `Real::sqrt(x)`: the same bits everywhere",
+    ),
+    (
+        &["no method named `fract`"],
+        "`use hankel_dsl::math;`, then `math::fract(x)`: the same bits everywhere",
     ),
     (
         &["no method named `floor`"],
@@ -381,6 +392,9 @@ mod tests {
         let said = "malformed SPIR-V (in OpSwitch: `OpPhi` (#0 in %9)'s case for source block %8 is \
                     duplicated)";
         assert!(advice(said).unwrap().contains("write `if`"));
+        let said = "malformed SPIR-V (in OpBranchConditional: `OpPhi` (#0 in %9)'s case for source block %8 is \
+                    duplicated)";
+        assert!(advice(said).unwrap().contains("`if let"));
         assert_eq!(advice("mismatched types"), None);
     }
 }

@@ -79,8 +79,9 @@ pub fn check(folder: &Path) -> Found {
     }
     let elsewhere: BTreeSet<PathBuf> = parsed
         .iter()
-        .flat_map(|(path, file)| files_elsewhere(path, &file.items))
+        .flat_map(|(path, file)| files_of(path, &file.items, &|it| is_elsewhere(&it.attrs)))
         .collect();
+    let modules = modules(&folder.join("src/lib.rs"), &parsed);
     for (path, parsed) in &parsed {
         if path.ancestors().any(|part| elsewhere.contains(part)) {
             continue;
@@ -90,6 +91,8 @@ pub fn check(folder: &Path) -> Found {
         Items {
             all: &mut all,
             file,
+            // Another one may be declared by a macro, and iterate.
+            is_declared: modules.contains(path),
         }
         .visit_file(parsed);
     }
@@ -119,25 +122,85 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Files and folders of the modules that a file declares, and that are not part of the shaders.
-fn files_elsewhere(path: &Path, items: &[syn::Item]) -> Vec<PathBuf> {
+/// The files of a crate's modules, as far as files declare them; all where there is no root.
+fn modules(root: &Path, parsed: &[(PathBuf, syn::File)]) -> BTreeSet<PathBuf> {
+    let by_path: BTreeMap<&Path, &syn::File> = parsed
+        .iter()
+        .map(|(path, file)| (path.as_path(), file))
+        .collect();
+    if !by_path.contains_key(root) {
+        return by_path.into_keys().map(Path::to_owned).collect();
+    }
+    let mut found = BTreeSet::new();
+    let mut open = vec![root.to_owned()];
+    while let Some(path) = open.pop() {
+        if let Some(file) = by_path.get(path.as_path())
+            && found.insert(path.clone())
+        {
+            let declared = files_of(&path, &file.items, &|_| true);
+            open.extend(declared.iter().map(|it| it.join("mod.rs")));
+            open.extend(declared);
+        }
+    }
+    found
+}
+
+/// Files and folders of those modules that a file declares and that are wanted.
+fn files_of(
+    path: &Path,
+    items: &[syn::Item],
+    is_wanted: &dyn Fn(&syn::ItemMod) -> bool,
+) -> Vec<PathBuf> {
     let is_root = ["lib.rs", "mod.rs"].iter().any(|name| path.ends_with(name));
     let folder = match is_root {
         true => path.parent().unwrap_or(path).to_owned(),
         false => path.with_extension(""),
     };
-    items
-        .iter()
-        .filter_map(|item| match item {
-            syn::Item::Mod(module) if module.content.is_none() => Some(module),
+    files_in(&folder, path.parent().unwrap_or(path), items, is_wanted)
+}
+
+/// The same, of modules whose files lie in `folder`; `beside` is where a `path` attribute begins.
+fn files_in(
+    folder: &Path,
+    beside: &Path,
+    items: &[syn::Item],
+    is_wanted: &dyn Fn(&syn::ItemMod) -> bool,
+) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for item in items {
+        let syn::Item::Mod(module) = item else {
+            continue;
+        };
+        let name = syn::ext::IdentExt::unraw(&module.ident).to_string();
+        match &module.content {
+            Some((_, within)) => {
+                let folder = folder.join(name);
+                found.extend(files_in(&folder, &folder, within, is_wanted));
+            }
+            None if is_wanted(module) => match path_attribute(&module.attrs) {
+                Some(path) => found.push(beside.join(path)),
+                None => {
+                    found.extend([folder.join(format!("{name}.rs")), folder.join(name)]);
+                }
+            },
+            None => {}
+        }
+    }
+    found
+}
+
+/// The file that `#[path = "…"]` names.
+fn path_attribute(attributes: &[syn::Attribute]) -> Option<String> {
+    attributes.iter().find_map(|it| match &it.meta {
+        syn::Meta::NameValue(it) if it.path.is_ident("path") => match &it.value {
+            syn::Expr::Lit(syn::ExprLit {
+                lit: syn::Lit::Str(path),
+                ..
+            }) => Some(path.value()),
             _ => None,
-        })
-        .filter(|module| is_elsewhere(&module.attrs))
-        .flat_map(|module| {
-            let name = module.ident.to_string();
-            [folder.join(format!("{name}.rs")), folder.join(name)]
-        })
-        .collect()
+        },
+        _ => None,
+    })
 }
 
 impl Crate {
@@ -295,6 +358,8 @@ fn is_elsewhere(attributes: &[syn::Attribute]) -> bool {
 struct Items<'a> {
     all: &'a mut Crate,
     file: usize,
+    /// Whether it is a module's.
+    is_declared: bool,
 }
 
 impl Items<'_> {
@@ -317,9 +382,10 @@ impl Items<'_> {
         let function = Function {
             file: self.file,
             name: signature.ident.span(),
-            is_kernel: attributes
-                .iter()
-                .any(|attribute| last(attribute).as_deref() == Some("kernel")),
+            is_kernel: self.is_declared
+                && attributes
+                    .iter()
+                    .any(|attribute| last(attribute).as_deref() == Some("kernel")),
             calls: body.calls,
             names: body.names,
             refused: body.refused,
@@ -573,6 +639,34 @@ mod tests {
             "#[kernel]\npub fn one(x: f32) -> f32 { other::one(x) }\nhankel_dsl::kernels![one];\n",
         );
         assert!(none.is_empty(), "{none:?}");
+    }
+
+    #[test]
+    fn a_file_that_is_no_module_is_not_of_the_crate() {
+        let folder = tempfile::tempdir().unwrap();
+        let source = folder.path().join("src");
+        let kernel = "#[kernel(compute, threads(64))]\npub fn one(x: f32) -> f32 { x }\n";
+        std::fs::create_dir_all(source.join("deeper")).unwrap();
+        for file in ["left.rs", "beside.rs", "deeper/mod.rs", "deeper/inner.rs"] {
+            std::fs::write(
+                source.join(file),
+                kernel.replace("one", &file[..file.len() - 3].replace('/', "_")),
+            )
+            .unwrap();
+        }
+        let lib = "#[path = \"beside.rs\"]\nmod other;\nmod deeper;\nhankel_dsl::kernels![];\n";
+        std::fs::write(source.join("lib.rs"), lib).unwrap();
+        std::fs::write(source.join("deeper/mod.rs"), "mod inner;\n").unwrap();
+        let told: Vec<String> = check(folder.path())
+            .diagnostics
+            .into_iter()
+            .map(|it| it.message)
+            .collect();
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(
+            told[0].contains("`beside`") && told[1].contains("`deeper_inner`"),
+            "{told:?}"
+        );
     }
 
     #[test]

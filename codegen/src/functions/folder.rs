@@ -10,6 +10,7 @@ use super::FORMS;
 use super::api::{FILE, LibraryRecord, Record};
 use super::ir::Library;
 use crate::build::MANIFEST_FILE;
+use crate::check::unified_diff;
 use crate::error::{Error, Result};
 use crate::files::sha256;
 use crate::folder::{self, Found};
@@ -43,7 +44,19 @@ pub struct Report {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Differences {
     /// Files that differ, are missing, or should not be there.
-    pub files: Vec<String>,
+    pub files: Vec<Difference>,
+}
+
+/// A file that is not as it should be.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// Its path in the folder; the folder itself, `.`, where a build of it was stopped.
+    pub file: String,
+    /// What is wrong with it.
+    pub problem: &'static str,
+    /// A unified diff from what is committed to what the sources give.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diff: Option<String>,
 }
 
 impl Differences {
@@ -59,14 +72,20 @@ impl fmt::Display for Differences {
         if self.is_fine() {
             return f.write_str("all files follow from their sources");
         }
-        for file in &self.files {
-            writeln!(f, "{file}")?;
+        for it in &self.files {
+            writeln!(f, "{} {}", it.file, it.problem)?;
+            if let Some(diff) = &it.diff {
+                f.write_str(diff)?;
+            }
         }
-        write!(
-            f,
-            "{} files no longer follow from their sources: build them again",
-            self.files.len()
-        )
+        let (count, follow) = match self.files.len() {
+            1 => ("1 file".into(), "follows from its sources: build it again"),
+            n => (
+                format!("{n} files"),
+                "follow from their sources: build them again",
+            ),
+        };
+        write!(f, "{count} no longer {follow}")
     }
 }
 
@@ -114,6 +133,12 @@ impl Folder {
         json.push(b'\n');
         files.insert(FILE.into(), json);
         Ok(Self { record, files })
+    }
+
+    /// The texts, by path.
+    #[must_use]
+    pub const fn files(&self) -> &BTreeMap<String, Vec<u8>> {
+        &self.files
     }
 
     /// Writes the folder. What already is as it should be is left alone; nothing is written if
@@ -166,25 +191,38 @@ impl Folder {
         let (before, _) = record(&folder)?.ok_or_else(missing)?;
         self.same_api(Some(&before))?;
         let mut files = Vec::new();
+        let mut tell = |file: &str, problem, diff| {
+            files.push(Difference {
+                file: file.into(),
+                problem,
+                diff,
+            });
+        };
         if folder.was_stopped()? {
-            files.push("a build of the folder was stopped before its end".into());
+            tell(".", "holds a build that was stopped before its end", None);
         }
         for (name, bytes) in &self.files {
             match folder.read(name)? {
                 Found::File(there) if there == *bytes => {}
-                Found::Nothing => files.push(format!("{name} is missing")),
-                Found::File(_) | Found::Other(..) => files.push(format!("{name} differs")),
+                Found::Nothing => tell(name, "is missing", None),
+                Found::Other(..) => tell(name, "is no regular file", None),
+                Found::File(there) => {
+                    tell(name, "differs", Some(unified_diff(name, &there, bytes)))
+                }
             }
         }
-        let extra = before.files.keys().filter(|n| !self.files.contains_key(*n));
-        files.extend(extra.map(|name| format!("{name} has no source any more")));
+        for name in before.files.keys() {
+            if !self.files.contains_key(name) {
+                tell(name, "has no source any more", None);
+            }
+        }
         for form in &FORMS {
             for file in folder.files_in(form.name)? {
                 let name = format!("{}/{file}", form.name);
                 let known = self.files.contains_key(&name) || before.files.contains_key(&name);
                 // Hidden files are an editor's or the system's.
                 if !known && !file.starts_with('.') {
-                    files.push(format!("{name} is extra: no build wrote it"));
+                    tell(&name, "is extra: no build wrote it", None);
                 }
             }
         }

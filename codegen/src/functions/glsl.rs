@@ -75,15 +75,17 @@ pub fn by_macro(naming: &Naming, function: &Function, body: &str) -> String {
     if !looks_up(function) {
         return body.into();
     }
-    let names: Vec<String> = function
-        .params
-        .iter()
-        .filter(|p| matches!(p.ty, Type::Lookup(_)))
-        .map(|p| {
-            let name = naming.function(&function.locals[p.id].name).to_uppercase();
-            format!("defined({name})")
-        })
-        .collect();
+    let mut body = body.to_owned();
+    let mut names: Vec<String> = Vec::new();
+    for p in &function.params {
+        if matches!(p.ty, Type::Lookup(_)) {
+            let local = &function.locals[p.id].name;
+            let name = naming.function(local).to_uppercase();
+            // What is said of it names the macro.
+            body = body.replace(&format!("`{local}`"), &format!("`{name}`"));
+            names.push(format!("defined({name})"));
+        }
+    }
     format!("#if {}\n{body}#endif\n", names.join(" && "))
 }
 

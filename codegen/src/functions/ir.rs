@@ -324,6 +324,8 @@ pub struct Library {
     pub docs: Vec<String>,
     /// The licence, as SPDX writes it.
     pub licence: String,
+    /// What the keys in documentation stand for: `[MSM] C. Peters, R. Klein: …`.
+    pub references: Vec<String>,
     /// Structures, each before those that hold it.
     pub structs: Vec<Struct>,
     /// Constants.

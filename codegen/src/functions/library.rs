@@ -9,7 +9,7 @@ use syn::{Token, braced, bracketed};
 
 use super::PRELUDE;
 use super::evaluate::{Evaluator, is_function};
-use super::ir::{Function, Library};
+use super::ir::{Constant, Function, Library};
 use super::refusal::Refusal;
 use super::source::{CrateText, Item, ModuleId, Tree, segments};
 use super::tidy::tidy;
@@ -175,7 +175,24 @@ fn translated(
         };
         constants.push(evaluator.constant(home, &source)?);
     }
+    let docs = list
+        .docs
+        .iter()
+        .chain(functions.iter().flat_map(|it| &it.docs));
+    let docs = docs.chain(constants.iter().flat_map(|it: &Constant| &it.docs));
+    let said = docs
+        .cloned()
+        .collect::<Vec<_>>()
+        .join("\n")
+        .replace('\\', "");
+    let references = tree
+        .references
+        .iter()
+        .filter(|(key, _)| said.contains(&format!("[{key}]")));
     Ok(Library {
+        references: references
+            .map(|(key, text)| format!("[{key}] {text}"))
+            .collect(),
         name: list.name.to_string(),
         krate: krate.name.clone(),
         version: krate.version.clone(),

@@ -1,6 +1,6 @@
 //! Names: unique within a function, and free in every language, so that they are the same in all.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use super::ir::{Function, Id, Kind, Stmt, expressions, walk};
 
@@ -379,6 +379,7 @@ pub fn is_taken(name: &str) -> bool {
 pub fn make_unique(function: &mut Function) {
     let mut taken: HashSet<String> = HashSet::new();
     let mut called: HashSet<String> = HashSet::new();
+    let mut renamed: BTreeMap<String, String> = BTreeMap::new();
     expressions(&function.body, &mut |e| {
         walk(e, &mut |x| {
             if let Kind::Call(name, _) = &x.kind {
@@ -391,7 +392,10 @@ pub fn make_unique(function: &mut Function) {
     for (id, changes) in order {
         let mut base = function.locals[id].name.clone();
         if is_taken(&base) || called.contains(&base) {
+            let old = (!called.contains(&base)).then(|| format!("`{base}`"));
             base.push_str("_value");
+            // Otherwise the function is meant.
+            renamed.extend(old.map(|old| (old, format!("`{base}`"))));
         }
         let fits = |name: &str| !changes || !name.ends_with(|c: char| c.is_ascii_digit());
         let mut name = base.clone();
@@ -405,6 +409,31 @@ pub fn make_unique(function: &mut Function) {
             n += 1;
         }
         function.locals[id].name = name;
+    }
+    // What is said of them has their new names, too.
+    let rename = |text: &mut String| {
+        for (old, new) in &renamed {
+            if text.contains(old) {
+                *text = text.replace(old, new);
+            }
+        }
+    };
+    function.docs.iter_mut().for_each(rename);
+    comments(&mut function.body, &rename);
+}
+
+/// Calls `with` for every comment.
+fn comments(body: &mut [Stmt], with: &dyn Fn(&mut String)) {
+    for stmt in body {
+        match stmt {
+            Stmt::Comment(text) => with(text),
+            Stmt::If(_, a, b) => {
+                comments(a, with);
+                comments(b, with);
+            }
+            Stmt::For(_, _, _, body) => comments(body, with),
+            Stmt::Let(..) | Stmt::Var(..) | Stmt::Assign(..) | Stmt::Return(_) => {}
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use super::ir::{
     Signature, Stmt, Struct, Type, Unary,
 };
 use super::names::pascal;
+use crate::translate;
 
 /// Columns of a line at most.
 pub const WIDTH: usize = 110;
@@ -205,7 +206,7 @@ pub trait Dialect {
 
     /// A line of comment.
     fn comment(&self, text: &str) -> String {
-        format!("// {text}")
+        format!("// {}", translate::comment(text))
     }
 
     /// One step of indentation.
@@ -567,6 +568,10 @@ pub fn ascii(text: &str) -> String {
         }
         raised = false;
         match c {
+            '\u{e4}' => out.push_str("ae"),
+            '\u{f6}' => out.push_str("oe"),
+            '\u{fc}' => out.push_str("ue"),
+            '\u{df}' => out.push_str("ss"),
             '\u{3b1}' => out.push_str("alpha"),
             '\u{3b2}' => out.push_str("beta"),
             '\u{3b5}' => out.push_str("epsilon"),
@@ -668,6 +673,13 @@ pub fn provenance(library: &Library, sha256: &str) -> Vec<String> {
         sha256.get(..12).unwrap_or(sha256),
         crate::VERSION
     ));
+    if !library.references.is_empty() {
+        lines.push(String::new());
+        for reference in &library.references {
+            lines.push(format!("- {reference}"));
+        }
+        lines.push(String::new());
+    }
     lines
 }
 

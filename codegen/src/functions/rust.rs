@@ -98,14 +98,11 @@ impl Dialect for Rust<'_> {
         }
     }
 
-    fn builtin(&self, which: Builtin, args: &[Piece], _: &[&Type]) -> Piece {
-        let method = |name: &str| {
-            let rest: Vec<Piece> = args[1..].to_vec();
-            atom(format!(
-                "{}.{name}({})",
-                bracketed(&args[0], Bond::Atom),
-                list(&rest)
-            ))
+    fn builtin(&self, which: Builtin, args: &[Piece], types: &[&Type]) -> Piece {
+        // No methods: for each, clippy looks through all that its receiver was computed from, in exponential time.
+        let of_type = |name: &str| {
+            let ty = types.first().map_or_else(String::new, |ty| self.ty(ty));
+            called(&format!("{ty}::{name}"), args)
         };
         let cast = |to: &str| {
             (
@@ -114,11 +111,11 @@ impl Dialect for Rust<'_> {
             )
         };
         match which {
-            Builtin::Min => method("min"),
-            Builtin::Max => method("max"),
-            Builtin::Abs => method("abs"),
-            Builtin::Sqrt => method("sqrt"),
-            Builtin::Floor => method("floor"),
+            Builtin::Min => of_type("min"),
+            Builtin::Max => of_type("max"),
+            Builtin::Abs => of_type("abs"),
+            Builtin::Sqrt => of_type("sqrt"),
+            Builtin::Floor => of_type("floor"),
             Builtin::Select => (
                 format!(
                     "if {} {{ {} }} else {{ {} }}",
@@ -129,7 +126,7 @@ impl Dialect for Rust<'_> {
             Builtin::ToF32 => cast("f32"),
             Builtin::ToU32 => cast("u32"),
             Builtin::ToI32 => cast("i32"),
-            Builtin::BitsOf => method("to_bits"),
+            Builtin::BitsOf => of_type("to_bits"),
             Builtin::FromBits => called("f32::from_bits", args),
         }
     }

@@ -90,9 +90,35 @@ pub struct Tree {
     pub constants: HashMap<(String, String), (ModuleId, Rc<syn::ImplItemConst>)>,
     /// The libraries of all crates.
     pub libraries: Vec<Invocation>,
+    /// What keys in documentation stand for: items `- \[KEY\] …` in the documentation of the crates' roots.
+    pub references: BTreeMap<String, String>,
     /// `macro_rules!` by crate and name.
     rules: HashMap<(String, String), Rc<Rules>>,
     impls: Vec<(ModuleId, syn::ItemImpl)>,
+}
+
+/// The items `- \[KEY\] …` of a file's own documentation, without marks of emphasis.
+fn references(text: &str) -> BTreeMap<String, String> {
+    let mut found: BTreeMap<String, String> = BTreeMap::new();
+    let mut last = None;
+    for line in text.lines().map_while(|line| line.strip_prefix("//!")) {
+        let line = line.trim_end();
+        if let Some((key, rest)) = line
+            .strip_prefix(" - \\[")
+            .and_then(|rest| rest.split_once("\\] "))
+        {
+            found.insert(key.into(), rest.replace('*', ""));
+            last = Some(key.to_owned());
+        } else if let (Some(key), Some(more)) = (&last, line.strip_prefix("   ")) {
+            if let Some(text) = found.get_mut(key) {
+                text.push(' ');
+                text.push_str(&more.trim_start().replace('*', ""));
+            }
+        } else {
+            last = None;
+        }
+    }
+    found
 }
 
 impl Tree {
@@ -107,6 +133,8 @@ impl Tree {
             if !krate.files.contains_key("src/lib.rs") {
                 continue;
             }
+            tree.references
+                .extend(references(&krate.files["src/lib.rs"]));
             let name = krate.name.replace('-', "_");
             let id = tree.file(krate, vec![name.clone()], "src/lib.rs", "src")?;
             tree.crates.insert(name, id);

@@ -1,7 +1,7 @@
 //! What several edits need: new ids, and types and constants that are there once.
 
 use rspirv::dr::{Block, Instruction, Module, Operand};
-use rspirv::spirv::{GlslStd450Op as GLOp, Op, Word};
+use rspirv::spirv::{GlslStd450Op as GLOp, Op, StorageClass, Word};
 
 use super::{id, literal, op};
 
@@ -60,6 +60,18 @@ impl<'a> Editor<'a> {
             Operand::LiteralBit32(signed.into()),
         ];
         self.once(Op::TypeInt, None, operands)
+    }
+
+    /// Pointers to values of type `to`.
+    pub fn pointer_type(&mut self, class: StorageClass, to: Word) -> Word {
+        let operands = vec![Operand::StorageClass(class), Operand::IdRef(to)];
+        self.once(Op::TypePointer, None, operands)
+    }
+
+    /// Adds a type or a constant.
+    #[cfg(test)]
+    pub fn declare(&mut self, it: Instruction) {
+        self.module.types_global_values.push(it);
     }
 
     /// 32 bits without a sign.

@@ -7,6 +7,7 @@ pub(crate) mod divide;
 pub(crate) mod edit;
 pub mod exact;
 pub(crate) mod fingerprint;
+pub(crate) mod holders;
 pub mod libm;
 pub mod names;
 pub(crate) mod narrow;

@@ -6,9 +6,9 @@
 //! What rust-gpu 0.10.0 gets wrong. Rotations of 64-bit numbers: it rotates by the amount modulo 32 and takes what falls off from 32
 //! bits (EmbarkStudios/rust-gpu#1062). Constant amounts of 3 and 35 look alike afterwards.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::dr::{Function, Instruction, Module, Operand};
 use rspirv::spirv::{ExecutionModel, Op, Word};
 
 use super::{global, id, literal, op};
@@ -62,6 +62,43 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Looks for references of which nothing tells any more where they lead, in an optimised module.
+///
+/// # Errors
+///
+/// There is one, and it is used.
+pub fn check_references(module: &Module, kernel: &str) -> Result<(), Failure> {
+    let is_handle = |ty: Word| {
+        let found = global(module, ty).map(op);
+        matches!(
+            found,
+            Some(Op::TypePointer | Op::TypeImage | Op::TypeSampler | Op::TypeSampledImage)
+        )
+    };
+    let lost: HashSet<Word> = module
+        .all_inst_iter()
+        .filter(|it| op(it) == Op::Undef && it.result_type.is_some_and(is_handle))
+        .filter_map(|it| it.result_id)
+        .collect();
+    let uses = |it: &Instruction| {
+        let mut used = it.operands.iter().filter_map(Operand::id_ref_any);
+        used.any(|name| lost.contains(&name))
+    };
+    let mut code = module.functions.iter().flat_map(Function::all_inst_iter);
+    if !code.any(uses) {
+        return Ok(());
+    }
+    Err(Failure {
+        kernel: kernel.into(),
+        step: Step::Meaning,
+        construct: None,
+        message: "a buffer, a texture or a reference is kept in a structure, by a closure in an iterator for example, \
+                  and what it leads to is lost there: name it where it is used, in a `for` loop"
+            .into(),
+        panicked: false,
+    })
+}
+
 /// What to write instead of what takes differences between neighbours.
 pub(super) fn of_neighbours(op: Op) -> Option<&'static str> {
     match op {
@@ -107,7 +144,7 @@ fn rotates_wrongly(
 
 #[cfg(test)]
 mod tests {
-    use rspirv::dr::{Block, Function};
+    use rspirv::dr::Block;
 
     use super::*;
 

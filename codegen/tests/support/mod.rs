@@ -55,6 +55,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         summary: "Does what a test\nneeds.".into(),
         file: "/elsewhere/kernels/src/lib.rs".into(),
         line: 7,
+        licence: String::new(),
         stage,
         precision: None,
         params,

@@ -4,6 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
+use hankel_system::input::{self, InputError};
 use serde::{Deserialize, Serialize};
 
 use crate::executor::Timing;
@@ -12,6 +13,9 @@ use crate::truth::Errors;
 /// Why a file of measurements cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
+    /// It is no regular file, or cannot be opened.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// It cannot be read or written.
     #[error("{}: {source}", file.display())]
     Io {
@@ -87,6 +91,11 @@ impl Store {
             file: file.to_path_buf(),
             source,
         };
+        // What is no regular file would make this wait.
+        match input::open(file) {
+            Err(error) if !error.is_missing() => return Err(StoreError::Input(error)),
+            _ => {}
+        }
         let to = OpenOptions::new()
             .read(true)
             .append(true)

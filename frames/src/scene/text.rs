@@ -6,6 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 use hankel_dsl::glam::Vec3;
+use hankel_system::fields::Table;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -23,14 +24,14 @@ use crate::techniques::{self, Map, Technique};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    geometry: Spanned<GeometryText>,
-    camera: CameraText,
+    geometry: Spanned<Table<GeometryText>>,
+    camera: Table<CameraText>,
     light: Spanned<Lights>,
-    medium: Option<MediumText>,
+    medium: Option<Table<MediumText>>,
     #[serde(default)]
-    shadow: ShadowText,
+    shadow: Table<ShadowText>,
     #[serde(default)]
-    output: OutputText,
+    output: Table<OutputText>,
 }
 
 #[derive(Deserialize)]
@@ -126,7 +127,7 @@ impl<'de> Deserialize<'de> for Lights {
                 mut seq: A,
             ) -> std::result::Result<Self::Value, A::Error> {
                 let mut lights = Vec::new();
-                while let Some(light) = seq.next_element()? {
+                while let Some(Table(light)) = seq.next_element()? {
                     lights.push(light);
                 }
                 Ok(Lights(lights))
@@ -347,9 +348,9 @@ impl Reader<'_> {
         Ok(camera)
     }
 
-    fn geometry(&self, given: Spanned<GeometryText>) -> Result<Geometry> {
+    fn geometry(&self, given: Spanned<Table<GeometryText>>) -> Result<Geometry> {
         let span = given.span();
-        let g = given.into_inner();
+        let Table(g) = given.into_inner();
         match (g.model, g.procedural) {
             (Some(model), None) => {
                 if model.get_ref().as_os_str().is_empty() {
@@ -636,20 +637,23 @@ impl Reader<'_> {
     }
 
     fn scene(&self, mut f: File) -> Result<Scene> {
-        let fov = f.camera.fov.take();
+        let fov = f.camera.0.fov.take();
         let [width, height] = Scene::DEFAULT_OUTPUT;
         let pixels = 1..=Scene::MAX_OUTPUT;
-        let shadow = self.shadow(f.shadow)?;
+        let shadow = self.shadow(f.shadow.0)?;
         let lights = self.lights(f.light)?;
-        let medium = f.medium.map(|m| self.medium(m, &lights)).transpose()?;
+        let medium = f
+            .medium
+            .map(|Table(m)| self.medium(m, &lights))
+            .transpose()?;
         Ok(Scene {
             geometry: self.geometry(f.geometry)?,
-            camera: self.camera(&f.camera, fov)?,
+            camera: self.camera(&f.camera.0, fov)?,
             lights,
             medium,
             shadow,
-            width: self.integer("output.width", f.output.width, width, pixels.clone())?,
-            height: self.integer("output.height", f.output.height, height, pixels)?,
+            width: self.integer("output.width", f.output.0.width, width, pixels.clone())?,
+            height: self.integer("output.height", f.output.0.height, height, pixels)?,
             image_passes: ImagePasses::default(),
         })
     }

@@ -76,6 +76,20 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// A number as its type is written: integers have no fraction.
+    #[must_use]
+    pub fn spelled(&self, x: f64) -> String {
+        let is_integer = match self {
+            Self::Scalar(it) => !matches!(it, Scalar::F32 | Scalar::F64),
+            Self::Integer(_) => true,
+            Self::Half | Self::Unorm16 | Self::Unorm8 => false,
+        };
+        match is_integer {
+            true => format!("{x:.0}"),
+            false => format!("{x:?}"),
+        }
+    }
+
     /// The type of a texture's channels.
     #[must_use]
     pub const fn of(format: TexelFormat) -> Self {

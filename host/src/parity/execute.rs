@@ -216,6 +216,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         summary: String::new(),
         file: file!().into(),
         line: line!(),
+        licence: String::new(),
         stage,
         precision: None,
         params,

@@ -118,7 +118,7 @@ impl<'a> Numbers<'a> {
     #[must_use]
     pub fn values(&self, written: &Written) -> Vec<f64> {
         let mut all = Vec::new();
-        self.each(written, written, false, |_, _, d| all.push(d.a));
+        self.each(written, written, false, |_, _, _, d| all.push(d.a));
         all
     }
 
@@ -126,10 +126,10 @@ impl<'a> Numbers<'a> {
     #[must_use]
     pub fn non_finite(&self, case: &Case, written: &Written) -> (u64, Option<Difference>) {
         let (mut n, mut first) = (0, None);
-        self.each(written, written, false, |i, name, d| {
+        self.each(written, written, false, |i, name, kind, d| {
             if !d.a.is_finite() {
                 n += 1;
-                first.get_or_insert_with(|| self.difference(case, i, name, &d));
+                first.get_or_insert_with(|| self.difference(case, i, name, kind, &d));
             }
         });
         (n, first)
@@ -153,14 +153,14 @@ impl<'a> Numbers<'a> {
             found.beyond += 1;
         }
         if case.class == Class::Hostile && !rules.hostile {
-            self.each(reference, written, false, |i, name, d| {
+            self.each(reference, written, false, |i, name, kind, d| {
                 found.values += 1;
                 if d.a.is_finite() && !d.b.is_finite() {
                     found.beyond += 1;
                     found.largest_ulp = found.largest_ulp.max(d.ulp);
                     found.largest_absolute = None;
                     if found.beyond == 1 {
-                        found.first = Some(self.difference(case, i, name, &d));
+                        found.first = Some(self.difference(case, i, name, kind, &d));
                     }
                 }
             });
@@ -168,7 +168,7 @@ impl<'a> Numbers<'a> {
         }
         let tolerance = &rules.tolerance;
         let mut index = 0;
-        self.each(reference, written, rules.flushes, |i, name, d| {
+        self.each(reference, written, rules.flushes, |i, name, kind, d| {
             let interval = intervals.and_then(|all| all.of(index));
             index += 1;
             found.values += 1;
@@ -185,7 +185,7 @@ impl<'a> Numbers<'a> {
                 .map(|x| x.max(d.absolute))
                 .filter(|x| x.is_finite());
             if found.first.is_none() || first_beyond {
-                found.first = Some(self.difference(case, i, name, &d));
+                found.first = Some(self.difference(case, i, name, kind, &d));
             }
         });
     }
@@ -196,7 +196,7 @@ impl<'a> Numbers<'a> {
         reference: &Written,
         written: &Written,
         flush: bool,
-        mut f: impl FnMut(usize, &str, Distance),
+        mut f: impl FnMut(usize, &str, &Kind, Distance),
     ) {
         for ((out, a), b) in self.outputs.iter().zip(reference).zip(written) {
             let (a, b) = if out.unordered {
@@ -207,19 +207,31 @@ impl<'a> Numbers<'a> {
             let elements = a.chunks_exact(out.stride).zip(b.chunks_exact(out.stride));
             for (i, (a, b)) in elements.enumerate() {
                 for (name, kind, offset) in &out.values {
-                    f(i, name, kind.compare(&a[*offset..], &b[*offset..], flush));
+                    f(
+                        i,
+                        name,
+                        kind,
+                        kind.compare(&a[*offset..], &b[*offset..], flush),
+                    );
                 }
             }
         }
     }
 
-    fn difference(&self, case: &Case, i: usize, name: &str, d: &Distance) -> Difference {
+    fn difference(
+        &self,
+        case: &Case,
+        i: usize,
+        name: &str,
+        kind: &Kind,
+        d: &Distance,
+    ) -> Difference {
         Difference {
             class: case.class,
             invocation: i as u64,
             value: name.into(),
-            expected: format!("{:?}", d.a),
-            got: format!("{:?}", d.b),
+            expected: kind.spelled(d.a),
+            got: kind.spelled(d.b),
             ulp: d.ulp,
             inputs: inputs::of_invocation(self.kernel, case, i),
         }

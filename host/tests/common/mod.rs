@@ -58,6 +58,7 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
         summary: format!("Test kernel `{name}`."),
         file: file!().into(),
         line: 1,
+        licence: String::new(),
         stage,
         precision: None,
         params,

@@ -6,6 +6,7 @@ use syn::spanned::Spanned;
 use syn::{Data, DeriveInput, Fields, GenericParam};
 
 use crate::inputs::{Holder, Inputs};
+use crate::kernel::text_of;
 
 pub fn derive(item: &DeriveInput) -> syn::Result<TokenStream> {
     let name = &item.ident;
@@ -98,7 +99,7 @@ fn one(
         })
         .collect();
     let names: Vec<&Ident> = fields.iter().map(|f| f.name).collect();
-    let text = name.to_string();
+    let text = text_of(name);
     let checks = fields.iter().zip(&types).map(|(f, ty)| {
         let message = format!(
             "field `{}` of `{name}` does not start where a shader expects it: its alignment (4 for a number, 8 for f64 and 2-vectors, 16 for 3- and 4-vectors) does not divide the bytes before it; move larger fields to the front or put padding fields before it",
@@ -114,7 +115,7 @@ fn one(
     );
     let descriptions = fields.iter().zip(&types).map(|(f, ty)| {
         let (field, summary) = (f.name, &f.summary);
-        let field_text = field.to_string();
+        let field_text = text_of(field);
         let inputs = f.inputs.describe();
         quote! {
             describe::Field {

@@ -7,6 +7,8 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{FnArg, ItemFn, Pat, Path, ReturnType, Token, Type, braced, bracketed};
 
+use crate::kernel::text_of;
+
 /// `#[function]` on a function: the function, and on the host what calls it without its types.
 pub fn function(args: &TokenStream, item: &ItemFn) -> syn::Result<TokenStream> {
     if !args.is_empty() {
@@ -112,8 +114,8 @@ fn module(item: &ItemFn, native: &TokenStream) -> TokenStream {
 
 fn native(item: &ItemFn, params: &[(Ident, &Type)], result: &Type) -> TokenStream {
     let name = &item.sig.ident;
-    let text = name.to_string();
-    let names = params.iter().map(|(n, _)| n.to_string());
+    let text = text_of(name);
+    let names = params.iter().map(|(n, _)| text_of(n));
     let types = params.iter().map(|(_, ty)| ty);
     let arguments = params.iter().map(|(n, ty)| {
         quote! {

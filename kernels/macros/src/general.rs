@@ -5,7 +5,7 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use crate::kernel::{Compute, Kernel, Param, Role, Stage, Variant};
+use crate::kernel::{Compute, Kernel, Param, Role, Stage, Variant, text_of};
 use crate::range::Range;
 use crate::twin;
 
@@ -124,7 +124,7 @@ impl Kernel {
                 _ => false,
             })
             .map(|p| {
-                let (name, text) = (&p.name, p.name.to_string());
+                let (name, text) = (&p.name, text_of(&p.name));
                 quote!(exec::enough(#text, #name.len() as usize, __count)?;)
             });
         let sizes = (0..self.outputs.len()).map(|i| {
@@ -198,7 +198,7 @@ impl Kernel {
             .filter_map(|p| match &p.role {
                 Role::Shared { ty, length, atomic } => {
                     let (name, memory) = (&p.name, memory(p));
-                    let text = name.to_string();
+                    let text = text_of(name);
                     let (word, handle) = if *atomic {
                         (quote!(u32), quote!(SharedAtomics))
                     } else {

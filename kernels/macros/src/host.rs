@@ -6,7 +6,8 @@ use syn::spanned::Spanned;
 
 use crate::general::{Form, own};
 use crate::kernel::{
-    BuiltIn, Compute, FragmentForm, Kernel, Role, Stage, StorageKind, Variant, texture_type,
+    BuiltIn, Compute, FragmentForm, Kernel, Role, Stage, StorageKind, Variant, text_of,
+    texture_type,
 };
 use crate::shader::{output_name, sampler_type};
 use crate::stage::{Passed, Returned};
@@ -114,7 +115,7 @@ impl Kernel {
             Role::Element(ty)
             | Role::ElementMut(ty)
             | Role::Storage(ty)
-            | Role::StorageMut { ty, .. } => Some((p.name.to_string(), ty)),
+            | Role::StorageMut { ty, .. } => Some((text_of(&p.name), ty)),
             _ => None,
         });
         let compute = matches!(self.stage, Stage::Compute(_));
@@ -175,7 +176,7 @@ impl Kernel {
     }
 
     fn description(&self, variant: &Variant) -> TokenStream {
-        let (entry, function, summary) = (&variant.entry, self.name.to_string(), &self.summary);
+        let (entry, function, summary) = (&variant.entry, text_of(&self.name), &self.summary);
         let stage = match &self.stage {
             _ if variant.fragment => quote!(describe::Stage::Fragment),
             Stage::Vertex => quote!(describe::Stage::Vertex),
@@ -217,7 +218,7 @@ impl Kernel {
         let sized = self.sized_by_subgroups;
         let compensated = match &self.compensated {
             Some(name) => {
-                let name = name.to_string();
+                let name = text_of(name);
                 quote!(Some(describe::text(#name)))
             }
             None => quote!(None),
@@ -230,6 +231,7 @@ impl Kernel {
                 summary: describe::text(#summary),
                 file: describe::text(file!()),
                 line: line!(),
+                licence: describe::text(option_env!("CARGO_PKG_LICENSE").unwrap_or_default()),
                 stage: #stage,
                 precision: #precision,
                 params: [#(#params),*].into(),
@@ -253,7 +255,7 @@ impl Kernel {
         self.params
             .iter()
             .map(|p| {
-                let name = p.name.to_string();
+                let name = text_of(&p.name);
                 let (b, l) = (binding, location);
                 binding += u32::from(p.role.is_bound());
                 location += u32::from(matches!(p.role, Role::Attribute(_) | Role::Varying(_)));
@@ -395,7 +397,7 @@ impl Kernel {
                 .count(),
         );
         let takes = self.params.iter().map(|p| {
-            let (name, text) = (&p.name, p.name.to_string());
+            let (name, text) = (&p.name, text_of(&p.name));
             match &p.role {
                 Role::Uniform(ty) => {
                     let ty = self.concrete(ty, variant);
@@ -555,7 +557,7 @@ impl Kernel {
     fn length_checks(&self) -> TokenStream {
         self.elements()
             .map(|p| {
-                let (name, text) = (&p.name, p.name.to_string());
+                let (name, text) = (&p.name, text_of(&p.name));
                 quote!(exec::enough(#text, #name.len(), __count)?;)
             })
             .collect()
@@ -679,12 +681,12 @@ impl Kernel {
             .collect();
         let returned = self.returned();
         let takes = names.iter().zip(&returned).map(|(name, returned)| {
-            let (ty, text) = (returned.ty(), name.to_string());
+            let (ty, text) = (returned.ty(), text_of(name));
             quote!(let #name = args.slice_mut::<#ty>(#text)?;)
         });
         let first = &names[0];
         let same = names.iter().skip(1).map(|name| {
-            let text = name.to_string();
+            let text = text_of(name);
             quote!(exec::enough(#text, #name.len(), __count)?;)
         });
         let values: Vec<_> = (0..names.len())

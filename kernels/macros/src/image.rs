@@ -3,10 +3,9 @@
 
 use proc_macro2::{Ident, Span, TokenStream};
 use quote::{format_ident, quote};
-use syn::ext::IdentExt;
 
 use crate::general::Form;
-use crate::kernel::{FragmentForm, Kernel, Role, Stage, Variant};
+use crate::kernel::{FragmentForm, Kernel, Role, Stage, Variant, text_of};
 use crate::range::Range;
 
 impl Kernel {
@@ -199,7 +198,7 @@ impl Kernel {
 }
 
 fn entry_of(function: &Ident) -> String {
-    format!("{}_fragment", function.unraw())
+    format!("{}_fragment", text_of(function))
 }
 
 fn target(i: usize) -> Ident {

@@ -9,6 +9,8 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Attribute, BinOp, Expr, ExprLit, Lit, LitInt, LitStr, Meta, RangeLimits, Token};
 
+use crate::kernel::text_of;
+
 /// The attributes' names.
 const WORDS: [&str; 17] = [
     "range",
@@ -448,11 +450,11 @@ impl Inputs {
                     Domain::UnitVector => quote!(UnitVector),
                     Domain::Distinct => quote!(Distinct),
                     Domain::CountOf(param) => {
-                        let param = param.to_string();
+                        let param = text_of(param);
                         quote!(CountOf { param: describe::text(#param) })
                     }
                     Domain::IndexOf(param) => {
-                        let param = param.to_string();
+                        let param = text_of(param);
                         quote!(IndexOf { param: describe::text(#param) })
                     }
                 };
@@ -476,7 +478,7 @@ impl Inputs {
                 quote!(Some(describe::Length::Between { least: #least, most: #most }))
             }
             Some((Length::Of { param, times, plus }, _)) => {
-                let param = param.to_string();
+                let param = text_of(param);
                 quote!(Some(describe::Length::Of { param: describe::text(#param), times: #times, plus: #plus }))
             }
         };

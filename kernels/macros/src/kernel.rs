@@ -973,6 +973,11 @@ fn unordered(role: &Attribute) -> syn::Result<bool> {
     }
 }
 
+/// A name without `r#`, which only Rust needs.
+pub fn text_of(name: &Ident) -> String {
+    name.unraw().to_string()
+}
+
 pub fn last_segment(ty: &Type) -> Option<&syn::PathSegment> {
     match ty {
         Type::Path(p) => p.path.segments.last(),
@@ -1358,7 +1363,7 @@ impl Args {
         let mut variants = Vec::new();
         for scalar in &scalars {
             for format in &formats {
-                let mut entry = name.unraw().to_string();
+                let mut entry = text_of(name);
                 if scalar.as_ref().is_some_and(|s| s == "f64") {
                     entry.push_str("_f64");
                 }

@@ -6,7 +6,7 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Expr, Lit, Token};
 
-use crate::kernel::{Kernel, Param, Role, Stage};
+use crate::kernel::{Kernel, Param, Role, Stage, text_of};
 
 /// How many invocations of a compute kernel run.
 pub enum Range {
@@ -133,7 +133,7 @@ impl Kernel {
         match self.range() {
             Range::Outputs => quote!(describe::Range::Outputs),
             Range::Elements(name) => {
-                let name = name.to_string();
+                let name = text_of(name);
                 quote!(describe::Range::Elements { param: describe::text(#name) })
             }
             Range::Fixed(numbers) => {
@@ -142,7 +142,7 @@ impl Kernel {
                 quote!(describe::Range::Fixed { size: [#(#size),*] })
             }
             Range::Uniform { param, value } => {
-                let (name, fields) = (param.to_string(), fields(value));
+                let (name, fields) = (text_of(param), fields(value));
                 let offset = match (fields.is_empty(), self.uniform_type(param)) {
                     (false, Some(ty)) => quote!(core::mem::offset_of!(#ty, #fields) as u32),
                     _ => quote!(0),

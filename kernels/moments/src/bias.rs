@@ -225,8 +225,7 @@ pub const TRIGONOMETRIC_4_32: Bias = bias(Basis::Trigonometric, 32, [0.0; 8], 1.
 
 /// For the Hausdorff problem, whose depths are known to be in the range: moments of Chebyshev's arcsine distribution on
 /// [0, 1]. Each is in the middle of the interval that those before it leave. The published targets do not suit that
-/// problem with any strength: they are moments of depths at the ends of the range, or of none in it, so that they lie on
-/// the boundary of its valid moments, or outside.
+/// problem with any strength: they lie on the boundary of its valid moments.
 const ARCSINE_UNIT: [f64; 4] = [0.5, 0.375, 0.3125, 0.273_437_5];
 
 /// The same on [-1, 1].

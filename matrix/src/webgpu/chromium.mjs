@@ -101,6 +101,8 @@ async function start() {
     const child = spawn(PROGRAM, [...flags, `http://127.0.0.1:${server.address().port}/${name}/page.html`], {
         stdio: ["ignore", "ignore", "pipe", "pipe", "pipe"],
         detached: true,
+        // What it writes there beside its profile stays when it is killed.
+        env: { ...process.env, TMPDIR: profile },
     });
     // What the pipe says does not matter, nor that it breaks.
     for (const pipe of [child.stdio[3], child.stdio[4]]) pipe?.on("error", () => {});

@@ -201,7 +201,8 @@ pub struct Judged {
     /// rounding.
     pub upper: f64,
     /// The exact bounds are within this of the given ones, in the unit of m0; m0 itself where
-    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`]. Rounding of the
+    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`], and where the solver meets the
+    /// moments only nearly, since hardly any distribution has them. Rounding of the
     /// given moments to `f64` is counted in to first order: where it decides whether any
     /// distribution has them, that is too little.
     pub margin: f64,

@@ -1,9 +1,10 @@
 //! The judge on the rows of a table.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use hankel_system::input::{self, InputError};
+use hankel_system::input::InputError;
 use hankel_system::output::{Output, OutputError};
+use hankel_system::table::{self, CellError, ColumnsError, Place, Table};
 use rayon::prelude::*;
 
 use super::{Judge, JudgeError, Judged};
@@ -21,34 +22,25 @@ pub enum TableError {
     #[error(transparent)]
     Output(#[from] OutputError),
     /// Columns other than the moments and the query.
-    #[error("{}: {problem}; the columns must be: {wanted}", path.display())]
-    Columns {
-        /// The file.
-        path: PathBuf,
-        /// Which is wrong, and how.
-        problem: String,
-        /// The columns that there must be, in any order.
-        wanted: String,
-    },
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
     /// A row or a cell that cannot be used.
-    #[error("{}: row {row} (line {line}){}: {problem}", path.display(), column.as_ref().map_or_else(String::new, |c| format!(", column `{c}`")))]
-    Cell {
-        /// The file.
-        path: PathBuf,
-        /// Row, from 1, without the header.
-        row: u64,
-        /// Line of the file, from 1; empty lines before the row count as its own.
-        line: u64,
-        /// The column; none for the row as a whole.
-        column: Option<String>,
-        /// What is wrong.
-        problem: String,
-    },
+    #[error(transparent)]
+    Cell(#[from] CellError),
+}
+
+impl From<table::TableError> for TableError {
+    fn from(error: table::TableError) -> Self {
+        match error {
+            table::TableError::Input(error) => Self::Input(error),
+            table::TableError::Cell(error) => Self::Cell(error),
+        }
+    }
 }
 
 /// A row as numbers.
 struct Row {
-    line: u64,
+    place: Place,
     moments: Vec<f64>,
     z: f64,
 }
@@ -66,16 +58,12 @@ pub fn table(
     output: &Path,
     progress: &mut dyn FnMut(u64),
 ) -> Result<u64, TableError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(input::open_table(input)?);
-    let unreadable = |e: csv::Error| InputError::Io {
-        path: input.into(),
-        source: e.into(),
-    };
-    let header = reader.headers().map_err(unreadable)?.clone();
-    let places = places(judge, input, &header)?;
+    let mut table = Table::open(input)?;
+    let mut names: Vec<String> = (0..judge.count).map(|k| format!("m{k}")).collect();
+    // The query comes after the last moment.
+    names.push("z".into());
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let columns = table.columns(&names)?;
 
     let unwritable = |e: csv::Error| OutputError::write(output, e);
     let mut writer = csv::Writer::from_writer(Output::create(output, &[input])?);
@@ -84,14 +72,17 @@ pub fn table(
         .map_err(unwritable)?;
 
     let mut done = 0;
-    let mut records = reader.into_records();
+    let mut cells = csv::StringRecord::new();
     loop {
         let mut rows = Vec::new();
         while rows.len() < ROWS
-            && let Some(record) = records.next()
+            && let Some(place) = table.next(&mut cells)?
         {
-            let number = done + 1 + rows.len() as u64;
-            rows.push(read(judge, &places, &header, record, input, number)?);
+            let mut numbers = numbers(&names, &columns, &cells)
+                .map_err(|(column, problem)| table.wrong(&place, Some(column), problem))?;
+            let z = numbers.pop().unwrap_or_default();
+            let moments = numbers;
+            rows.push(Row { place, moments, z });
         }
         if rows.is_empty() {
             break;
@@ -102,13 +93,7 @@ pub fn table(
             .collect();
         for (row, result) in rows.iter().zip(judged) {
             done += 1;
-            let judged = result.map_err(|error| TableError::Cell {
-                path: input.into(),
-                row: done,
-                line: row.line,
-                column: None,
-                problem: error.to_string(),
-            })?;
+            let judged = result.map_err(|e| table.wrong(&row.place, None, e.to_string()))?;
             writer
                 .write_record(
                     [judged.lower, judged.upper, judged.margin, judged.residual]
@@ -125,86 +110,24 @@ pub fn table(
     Ok(done)
 }
 
-/// For each column of the file the moment that it holds; the query comes after the last.
-fn places(
-    judge: &Judge,
-    path: &Path,
-    header: &csv::StringRecord,
-) -> Result<Vec<usize>, TableError> {
-    let mut names: Vec<String> = (0..judge.count).map(|k| format!("m{k}")).collect();
-    names.push("z".into());
-    let bad = |problem: String| TableError::Columns {
-        path: path.into(),
-        problem,
-        wanted: names.join(", "),
-    };
-    if header.iter().all(str::is_empty) {
-        return Err(bad("it has no header".into()));
-    }
-    let mut places = Vec::new();
-    for (i, name) in header.iter().enumerate() {
-        let Some(place) = names.iter().position(|n| n == name) else {
-            return Err(bad(format!(
-                "column {} is `{name}`, which is not read",
-                i + 1
-            )));
-        };
-        if places.contains(&place) {
-            return Err(bad(format!("there are two columns `{name}`")));
-        }
-        places.push(place);
-    }
-    if let Some(missing) = (0..names.len()).find(|p| !places.contains(p)) {
-        return Err(bad(format!("column `{}` is missing", names[missing])));
-    }
-    Ok(places)
-}
-
-/// The numbers of a record.
-fn read(
-    judge: &Judge,
-    places: &[usize],
-    header: &csv::StringRecord,
-    record: csv::Result<csv::StringRecord>,
-    path: &Path,
-    row: u64,
-) -> Result<Row, TableError> {
-    let bad = |line: u64, column: Option<&str>, problem: String| TableError::Cell {
-        path: path.into(),
-        row,
-        line,
-        column: column.map(Into::into),
-        problem,
-    };
-    let record = record.map_err(|e| {
-        let problem = match e.kind() {
-            csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".to_string(),
-            _ => e.to_string(),
-        };
-        bad(e.position().map_or(0, csv::Position::line), None, problem)
-    })?;
-    let line = record.position().map_or(0, csv::Position::line);
-    if record.len() != header.len() {
-        let problem = format!("it has {} cells, the header {}", record.len(), header.len());
-        return Err(bad(line, None, problem));
-    }
-    let mut numbers = vec![0.0; judge.count + 1];
-    for ((cell, &place), name) in record.iter().zip(places).zip(header) {
+/// The numbers of a row by what its columns are; the error is a column, and what is wrong with its cell.
+fn numbers<'a>(
+    names: &[&'a str],
+    columns: &[usize],
+    cells: &csv::StringRecord,
+) -> Result<Vec<f64>, (&'a str, String)> {
+    let mut numbers = vec![0.0; names.len()];
+    for (cell, &column) in cells.iter().zip(columns) {
         let problem = match cell.parse::<f64>() {
             Ok(x) if x.is_finite() => {
-                numbers[place] = x;
+                numbers[column] = x;
                 continue;
             }
             Ok(_) => format!("`{cell}` is not finite"),
             Err(_) if cell.is_empty() => "it is empty".into(),
             Err(_) => format!("`{cell}` is not a number"),
         };
-        return Err(bad(line, Some(name), problem));
+        return Err((names[column], problem));
     }
-    let z = numbers.pop().unwrap_or_default();
-    Ok(Row {
-        line,
-        moments: numbers,
-        z,
-    })
+    Ok(numbers)
 }

@@ -32,12 +32,17 @@ pub enum ReportError {
 impl Report {
     /// Writes `NAME.json`, `NAME.html`, `NAME-TABLE.csv` for each table and `NAME-PLOT.svg` for
     /// each plot into a folder, which is made; returns the paths, the page's first. Files take
-    /// their places only when all are complete.
+    /// their places only when all are complete. `inputs` are the files that the report was made from.
     ///
     /// # Errors
     ///
-    /// The folder cannot be written, or a plot cannot be drawn.
-    pub fn write(&self, folder: &Path, name: &str) -> Result<Vec<PathBuf>, ReportError> {
+    /// The folder cannot be written, a file in it is one of the inputs, or a plot cannot be drawn.
+    pub fn write(
+        &self,
+        folder: &Path,
+        name: &str,
+        inputs: &[&Path],
+    ) -> Result<Vec<PathBuf>, ReportError> {
         let drawn: Vec<String> = self
             .plots
             .iter()
@@ -63,7 +68,7 @@ impl Report {
         output::folder(folder)?;
         let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.join(name)).collect();
         let places: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        let mut outputs = output::create_all(&places, &[])?;
+        let mut outputs = output::create_all(&places, inputs)?;
         for (output, (_, bytes)) in outputs.iter_mut().zip(&files) {
             output
                 .write_all(bytes)

@@ -12,11 +12,13 @@ use hankel_dsl::glam::{IVec4, UVec4, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, StorageMut, kernel};
 
 mod adapters;
+mod closures;
 mod idioms;
 mod integers;
 mod loops;
 
 use adapters::*;
+use closures::*;
 use idioms::*;
 use integers::*;
 use loops::*;
@@ -64,6 +66,9 @@ hankel_dsl::kernels![
     again,
     sieved,
     in_bytes,
+    of_functions,
+    gathered,
+    handed_on,
     counted_by_for,
     counted_by_while,
     window_by_for,

@@ -194,6 +194,7 @@ fn entry(function: &Function) -> KernelEntry {
         summary: String::new(),
         file: "stub".into(),
         line: 1,
+        licence: String::new(),
         stage: Stage::Compute {
             threads: [64, 1, 1],
             dimensions: 1,

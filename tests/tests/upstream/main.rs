@@ -319,6 +319,7 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         summary: "A minimal case.".into(),
         file: file!().into(),
         line: 1,
+        licence: String::new(),
         stage: describe::Stage::Compute {
             threads: [1; 3],
             dimensions: if texel.is_some() { 2 } else { 1 },

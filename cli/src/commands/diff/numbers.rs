@@ -21,7 +21,7 @@ const LIMIT: Duration = Duration::from_secs(120);
 
 /// Runs the old and the new SPIR-V of the kernels called `names`.
 pub fn numbers(args: &Diff, names: &[String], quiet: bool) -> Result<BTreeMap<String, Found>> {
-    let session = Session::open(args.source.manifest_path.as_deref(), quiet)?;
+    let session = Session::open(args.manifest_path.as_deref(), quiet)?;
     let known = session.kernels();
     let names: Vec<&String> = names
         .iter()

@@ -25,6 +25,9 @@ pub struct Kernel {
     pub file: String,
     /// Line of the attribute, from 1.
     pub line: u32,
+    /// The licence of the function's crate, as SPDX writes it; empty if its Cargo.toml says none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub licence: String,
     /// The pipeline stage, with what only that stage has.
     pub stage: Stage,
     /// The floating-point type of a function that is generic over `Real`; `None` for one that is
