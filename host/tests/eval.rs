@@ -169,7 +169,7 @@ fn bad_tables_name_the_place_and_leave_no_output() {
     for (text, words) in [
         ("", &["no header", "x, y"][..]),
         ("x,z\n1,2\n", &["column 2 is `z`", "x, y"]),
-        ("x\n1\n", &["column y is missing"]),
+        ("x\n1\n", &["column `y` is missing"]),
         ("x,y,x\n1,2,3\n", &["two columns `x`"]),
         (
             "x,y\n1,2\n3,four\n",

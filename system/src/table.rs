@@ -132,7 +132,14 @@ impl Table {
         if missing.is_empty() {
             return Ok(found);
         }
-        Err(wrong(format!("column {} is missing", missing.join(", "))))
+        let (columns, are) = match missing.len() {
+            1 => ("column", "is"),
+            _ => ("columns", "are"),
+        };
+        Err(wrong(format!(
+            "{columns} `{}` {are} missing",
+            missing.join("`, `")
+        )))
     }
 
     /// Reads the next row into `cells`, as many as the header has, without blanks around them; none at the end.

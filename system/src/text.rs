@@ -29,7 +29,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
 }
 
 /// Letters of a line of a message; a file that it quotes may have longer ones.
-const LINE: usize = 1000;
+const LINE: usize = 16_000;
 
 /// Text with the middle of very long lines left out.
 pub fn shortened(text: &str) -> Cow<'_, str> {

@@ -26,7 +26,8 @@ Examples:
 The table's columns are m0 (the total weight), m1, m2 and so on (the sums of weight times each
 function) and z. Written are the least weight strictly below z, the greatest at or below z, over all
 distributions with these moments, the margin within which both are exact, and the residual: how far
-the moments of the distributions found are from the given ones, relative to m0.
+the moments of the distributions found are from the given ones, relative to m0. Where one distribution
+alone has the moments, and z is beside one of its depths, the margin is too small.
 
 Functions: z to z^16; z^(1/2), z^(1/3), z^(1/4); 1/(z+1) to 1/(z+1)^4; exp(z) to exp(4z);
 log(z+1) to log(z+4); sin(2pi*z), cos(2pi*z) and 4pi, 6pi, 8pi; cosh(z), sinh(z), asin(z),

@@ -103,7 +103,7 @@ fn inputs_are_not_overwritten() {
 #[test]
 fn inputs_stay_where_generated_files_would_be() {
     let desk = Desk::new();
-    let places = "[vsm.rows]\nwgsl = { binding = 7 }\n";
+    let places = "[vsm.receiver]\nwgsl = { binding = 7 }\n";
     desk.write("frame.json", SCENE);
     desk.write("manifest.json", places);
     for line in [

@@ -201,10 +201,11 @@ pub struct Judged {
     /// rounding.
     pub upper: f64,
     /// The exact bounds are within this of the given ones, in the unit of m0; m0 itself where
-    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`], and where the solver meets the
-    /// moments only nearly, since hardly any distribution has them. Rounding of the
-    /// given moments to `f64` is counted in to first order: where it decides whether any
-    /// distribution has them, that is too little.
+    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`]. Rounding of the
+    /// given moments to `f64`, and what the solver misses of them (up to about 1e-8, see
+    /// [`residual`](Self::residual)), is counted in to first order. Where that decides which
+    /// distributions have them, it is too little: where there is only one, and the query is beside
+    /// one of its depths, without being it.
     pub margin: f64,
     /// How far the moments of the supports are from the given ones, beyond rounding: the larger sum
     /// of distances of the two, in an orthogonal basis, relative to the total weight.

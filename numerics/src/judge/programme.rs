@@ -107,9 +107,6 @@ struct Solution {
     weights: Vec<f64>,
 }
 
-/// What missed moments may cost, as a share of the total weight.
-const PAID: f64 = 1e-6;
-
 /// Solves the programme `rounds` times, each time with more samples near the support points, or
 /// until it is exact to [`TOLERANCE`].
 pub fn least(
@@ -143,7 +140,7 @@ pub fn least(
         let worst = peaks.iter().fold(0.0_f64, |a, &(_, excess)| a.max(excess));
         let atoms = programme.atoms(&solution.weights);
         let found = programme.judged(&solution, &atoms, worst);
-        let is_bounded = programme.has_decided(&found);
+        let is_bounded = found.sensitivity > 0.5 * programme.price;
         let before = best.as_ref().map_or(f64::INFINITY, |b| b.margin);
         stalled = if found.margin < 0.5 * before {
             0
@@ -166,7 +163,7 @@ pub fn least(
     }
     // Prices that have decided, not the moments, leave the exact bound unknown.
     if let Some(best) = &mut best
-        && programme.has_decided(best)
+        && best.sensitivity > 0.5 * programme.price
     {
         best.margin = f64::INFINITY;
     }
@@ -176,11 +173,6 @@ pub fn least(
 }
 
 impl Programme<'_> {
-    /// Whether prices have decided, and not the moments: P reaches them, or something was paid.
-    fn has_decided(&self, found: &Least) -> bool {
-        found.sensitivity > 0.5 * self.price || found.residual * self.price > PAID
-    }
-
     fn sample(&self, t: f64) -> Sample {
         Sample {
             t,
@@ -344,9 +336,7 @@ impl Programme<'_> {
             .sum();
         Least {
             value,
-            // What the weights' moments miss costs their price: those of P may be far too low where hardly any
-            // distribution has the moments.
-            margin: (cost - repair - value).abs() + uncertain + self.price * missed,
+            margin: (cost - repair - value).abs() + uncertain + sensitivity * missed,
             residual: missed,
             sensitivity,
             support: atoms.iter().map(|a| (a.t, a.weight)).collect(),

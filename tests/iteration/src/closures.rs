@@ -9,8 +9,9 @@ use hankel_dsl::{Buffer, Sampler, Texture2d, kernel, math};
     compute,
     threads(64),
     parity(
+        non_finite,
         ulp = 64,
-        why = "drivers may reorder the sums within `exp`, and those of its results"
+        why = "exponentials overflow, and drivers may reorder sums within them and of them"
     )
 )]
 pub fn of_functions(

@@ -14,7 +14,7 @@ mod tsl;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use hankel_codegen::Language;
@@ -950,6 +950,28 @@ fn the_rust_module_computes_the_native_bits() {
         rustc.arg(binary).arg(source);
         rustc
     });
+}
+
+/// It looks through all that a method's receiver was computed from, each time anew: with methods, it did not end in ten
+/// minutes.
+#[test]
+fn clippy_comes_to_an_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = folder.path().join("hankel_shadows.rs");
+    std::fs::write(&source, text("rust")).expect("the module");
+    let mut clippy = Command::new("timeout");
+    clippy.args([
+        "60",
+        "clippy-driver",
+        "--edition",
+        "2024",
+        "--crate-type",
+        "lib",
+    ]);
+    clippy.args(["--emit", "metadata", "--out-dir"]);
+    clippy.arg(folder.path()).arg(&source).stderr(Stdio::null());
+    let status = clippy.status();
+    assert!(status.expect("`timeout` runs").success());
 }
 
 #[test]
