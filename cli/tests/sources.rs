@@ -310,6 +310,17 @@ fn a_new_crate_is_built_and_checked() {
     let text = fs::read_to_string(&path).expect("it was made");
     fs::write(&path, text.replace("lit!(3.0)", "lit!(3.5)")).expect("it can be written");
     desk.hankel(check).code(1);
+    // What rust-gpu refuses of rustc's optimiser is compiled without that.
+    let case = root().join("tests/upstream/rust-gpu-equal-branches/case.rs");
+    let case = fs::read_to_string(case).expect("the case is there");
+    let uses = "#![no_std]\nuse hankel_dsl::glam::UVec2;\nuse hankel_dsl::{Buffer, kernel};\n";
+    fs::write(
+        &path,
+        format!("{uses}{case}hankel_dsl::kernels![nearer];\n"),
+    )
+    .expect("it can be written");
+    desk.hankel("build --manifest-path Cargo.toml --out guarded")
+        .code(0);
 }
 
 const EIGHT_KERNELS: &str = r#"

@@ -244,7 +244,13 @@ pub fn compile(
         // cargo has no other word for where the library's sources are.
         cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", &library);
         cargo.arg("--").args(&flags).args(separately.flag());
-        let said = run(cargo, &manifest, wanted.names(), progress)?;
+        let said = match run(cargo, &manifest, wanted.names(), progress) {
+            Err(error) if joins_arms(&error) && !flags.contains(&UNTHREADED.into()) => {
+                flags.push(UNTHREADED.into());
+                continue;
+            }
+            other => other?,
+        };
         let messages = Messages::read(&said).map_err(|error| Error::Inputs {
             path: folder.to_owned(),
             problem: format!("a message of cargo cannot be read: {error}"),
@@ -309,6 +315,16 @@ pub fn compile(
         path: folder.to_owned(),
         problem: "its files change while they are compiled".into(),
     })
+}
+
+/// Where both arms of a branch come to one block, rust-gpu 0.10 writes SPIR-V that it does not read itself
+/// (tests/upstream/rust-gpu-equal-branches). This pass of rustc makes such arms of a `match` of two values with a guard.
+const UNTHREADED: &str = "-Zmir-enable-passes=-JumpThreading";
+
+/// Whether rust-gpu has failed for that.
+fn joins_arms(error: &Error) -> bool {
+    matches!(error, Error::Compile { output, .. }
+        if output.contains("OpBranchConditional") && output.contains("is duplicated"))
 }
 
 /// rustc's flags for a crate whose kernels do such things with arrays.

@@ -84,8 +84,7 @@ const KNOWN: [(&[&str], &str); 25] = [
     (
         &["OpBranchConditional", "is duplicated"],
         "two arms become one, which rust-gpu 0.10 refuses, and it tells no line. A `match` of two values with a guard \
-         does so, `match (a, b) { (Some(a), Some(b)) if a < b => …, … }`: write `if let (Some(a), Some(b)) = (a, b) \
-         && a < b { … } else { … }`",
+         may do so: write `if let … && … { … } else { … }`",
     ),
     (
         &["is not a logical pointer"],
