@@ -48,6 +48,21 @@ fn libraries_are_built_and_checked_inside_a_checkout_and_outside() {
         words.contains("msl/hankel_shadows.h.metal is missing"),
         "{words}"
     );
+    // What differs is shown.
+    let edited = Path::new(out).join("hlsl/hankel_shadows.hlsl");
+    let text = std::fs::read_to_string(&edited).unwrap();
+    std::fs::write(&edited, text.replacen("0.628f", "0.629f", 1)).unwrap();
+    let checked = hankel(&["check", out], &root());
+    let words = String::from_utf8_lossy(&checked.stdout).into_owned();
+    for part in [
+        "hlsl/hankel_shadows.hlsl differs",
+        "\n-static",
+        "0.629f",
+        "\n+static",
+        "2 files no longer follow",
+    ] {
+        assert!(words.contains(part), "`{part}` is not in {words}");
+    }
 }
 
 #[test]

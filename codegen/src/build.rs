@@ -19,6 +19,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Language;
+use crate::comment;
 use crate::error::{Error, Failure, Result, Step};
 use crate::files::sha256;
 use crate::finish::{self, Finished};
@@ -30,7 +31,7 @@ use crate::manifest::{
     self, FileEntry, KernelEntry, LanguageEntry, Manifest, Versions, WriteOptions,
 };
 use crate::spirv;
-use crate::translate::{self, Ir, Options, Place, Written};
+use crate::translate::{Ir, Options, Place, Written};
 use crate::translated::Translated;
 
 pub use crate::folder::is_own;
@@ -356,14 +357,14 @@ pub(crate) fn assemble(
     }
     let known = request.kernels.first().map_or("", |it| it.licence.as_str());
     for (path, text) in headers::files(&layouts, &kernels, &in_wgsl) {
-        let line = match translate::licence("//", known) {
+        let licence = comment::licence(known).map_or_else(String::new, |it| {
             // C before 1999 has no other comments.
-            line if path.ends_with(".h") && !line.is_empty() => {
-                format!("/*{} */\n", line["//".len()..].trim_end())
+            match path.ends_with(".h") {
+                true => format!("/* {it} */\n"),
+                false => format!("// {it}\n"),
             }
-            line => line,
-        };
-        files.insert(path.into(), (line + &text).into_bytes());
+        });
+        files.insert(path.into(), (licence + &text).into_bytes());
     }
     let file_entry = |bytes: &Vec<u8>| FileEntry {
         sha256: sha256(bytes),

@@ -17,6 +17,7 @@
 pub mod build;
 pub mod bundle;
 pub mod check;
+mod comment;
 pub mod compile;
 pub mod cost;
 pub mod diagnostics;

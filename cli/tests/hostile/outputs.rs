@@ -124,6 +124,11 @@ fn inputs_stay_where_generated_files_would_be() {
     desk.hankel(&format!("{bench} --multisampling 1 --out report"))
         .fails(2, &["is read", "another name"]);
     assert_eq!(desk.read("scene.toml"), SCENE);
+    // What no regular file gives would be waited for.
+    fs::create_dir(desk.path("other")).expect("a folder");
+    desk.fifo("other/measured.jsonl");
+    desk.hankel(&format!("{bench} --multisampling 1 --out other"))
+        .fails(2, &["measured.jsonl", "a pipe"]);
 }
 
 #[test]

@@ -20,10 +20,14 @@ const PRINT: [&str; 8] = [
     "--help",
 ];
 
+/// One that is asked for a table on the standard output stream.
+const EVAL: &str = "-q eval vsm --input rows.csv --output /dev/stdout";
+
 #[test]
 fn a_reader_that_is_gone_ends_a_command_without_a_word() {
-    for line in PRINT {
+    for line in PRINT.into_iter().chain([EVAL]) {
         let desk = Desk::new();
+        desk.write("rows.csv", "b1,b2,depth\n0.5,0.3,0.2\n");
         let mut command = desk.command(line);
         let (reader, writer) = std::io::pipe().expect("a pipe");
         drop(reader);

@@ -6,7 +6,7 @@ use super::ir::{
     Signature, Stmt, Struct, Type, Unary,
 };
 use super::names::pascal;
-use crate::translate;
+use crate::comment;
 
 /// Columns of a line at most.
 pub const WIDTH: usize = 110;
@@ -206,7 +206,7 @@ pub trait Dialect {
 
     /// A line of comment.
     fn comment(&self, text: &str) -> String {
-        format!("// {}", translate::comment(text))
+        format!("// {}", comment::line(text))
     }
 
     /// One step of indentation.
@@ -660,10 +660,7 @@ pub fn reflowed(lines: &[String]) -> Vec<String> {
 
 /// The lines that every file begins with.
 pub fn provenance(library: &Library, sha256: &str) -> Vec<String> {
-    let mut lines = Vec::new();
-    if !library.licence.is_empty() {
-        lines.push(format!("SPDX-License-Identifier: {}", library.licence));
-    }
+    let mut lines: Vec<String> = comment::licence(&library.licence).into_iter().collect();
     lines.push(format!(
         "{} {}, library `{}`, API {} (sources sha256 {}), written by hankel {}. Do not edit.",
         library.krate,
