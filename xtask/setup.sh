@@ -17,6 +17,16 @@ first() {
     done
 }
 
+# What a file of xtask/tools names is installed by its versions and checksums: a copy of it is the last thing that is
+# written, so that what was interrupted, or is of another version, is installed again.
+is_installed() { # is_installed FILE
+    cmp -s "xtask/tools/$1" "$HANKEL_TOOLS/$1.installed"
+}
+
+installed() { # installed FILE
+    cp "xtask/tools/$1" "$HANKEL_TOOLS/$1.installed"
+}
+
 missing=
 need c++ g++
 need_library libvulkan.so.1 libvulkan1
@@ -61,17 +71,15 @@ if [ "${for_tests:-no}" = yes ]; then
     HANKEL_TOOLS=${HANKEL_TOOLS:-${XDG_CACHE_HOME:-$HOME/.cache}/hankel/tools}
     export HANKEL_TOOLS
     mkdir -p "$HANKEL_TOOLS"
-    if ! cmp -s xtask/tools/package-lock.json "$HANKEL_TOOLS/package-lock.json" ||
-        [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ] ||
-        [ ! -e "$HANKEL_TOOLS/node_modules/three/package.json" ] ||
-        [ ! -e "$HANKEL_TOOLS/node_modules/typescript/package.json" ] ||
-        [ ! -e "$HANKEL_TOOLS/node_modules/wesl/package.json" ]; then
+    if ! is_installed package-lock.json || [ ! -e "$HANKEL_TOOLS/node_modules/webgpu/package.json" ]; then
         echo "Installing Dawn for Node.js, three.js, TypeScript and WESL's linker (npm: webgpu, MIT and" \
             "BSD-3-Clause; three, @types/three and wesl, MIT; typescript, Apache-2.0)"
         cp xtask/tools/package.json xtask/tools/package-lock.json "$HANKEL_TOOLS"
         npm ci --silent --prefix "$HANKEL_TOOLS"
+        installed package-lock.json
     fi
-    if ! command -v dxc >/dev/null 2>&1 && [ ! -e "$HANKEL_TOOLS/libdxcompiler_x86_64.so.3.7" ]; then
+    if ! command -v dxc >/dev/null 2>&1 &&
+        ! { is_installed requirements.txt && [ -e "$HANKEL_TOOLS/libdxcompiler_x86_64.so.3.7" ]; }; then
         echo "Installing DXC's library (PyPI: compushady, MIT; DXC: NCSA)"
         pip3 download --quiet --no-deps --no-binary :all: --dest "$HANKEL_TOOLS" \
             --require-hashes --requirement xtask/tools/requirements.txt
@@ -79,16 +87,19 @@ if [ "${for_tests:-no}" = yes ]; then
             compushady-0.17.5/compushady/backends/libdxcompiler_x86_64.so.3.7
         tar -xzOf "$HANKEL_TOOLS/compushady-0.17.5.tar.gz" compushady-0.17.5/LICENSE \
             >"$HANKEL_TOOLS/compushady-LICENSE"
+        installed requirements.txt
     fi
     slang=$HANKEL_TOOLS/slang
-    if ! command -v slangc >/dev/null 2>&1 && [ ! -x "$slang/slangtorch/bin/slangc" ]; then
+    if ! command -v slangc >/dev/null 2>&1 &&
+        ! { is_installed wheels.txt && [ -x "$slang/slangtorch/bin/slangc" ]; }; then
         echo "Installing slangc (PyPI: slangtorch, Apache-2.0 with LLVM exceptions)"
         pip3 download --quiet --no-deps --only-binary :all: --platform manylinux_2_27_x86_64 \
             --python-version 3.11 --dest "$HANKEL_TOOLS" --require-hashes --requirement xtask/tools/wheels.txt
         python3 -m zipfile -e "$HANKEL_TOOLS/slangtorch-1.3.22-py3-none-manylinux_2_27_x86_64.whl" "$slang"
         chmod +x "$slang/slangtorch/bin/slangc"
+        installed wheels.txt
     fi
-    if [ ! -e "$HANKEL_TOOLS/bevy/bevy_render/LICENSE-MIT" ]; then
+    if ! is_installed crates.txt || [ ! -e "$HANKEL_TOOLS/bevy/bevy_render/LICENSE-MIT" ]; then
         echo "Fetching Bevy's shaders (crates.io: bevy_pbr, bevy_render 0.19.1, MIT or Apache-2.0)"
         while read -r sha256 crate; do
             # cargo downloads a crate to say what it is.
@@ -99,6 +110,7 @@ if [ "${for_tests:-no}" = yes ]; then
             tar -xzf "$archive" -C "$HANKEL_TOOLS/bevy/${crate%-*}" --strip-components=1 --wildcards \
                 '*.wgsl' '*/LICENSE-*'
         done <xtask/tools/crates.txt
+        installed crates.txt
     fi
 fi
 

@@ -21,11 +21,11 @@ use hankel_frames::scene::Scene;
     after_help = "\
 Examples:
   hankel build --out shaders              all built-in kernels in every language
-  hankel list                             what there is, and what it costs
+  hankel list                             the kernels, and what they cost
   hankel parity                           does every backend compute the same?
   hankel render scenes/scan.toml --out scan.png --compare
   hankel bench bounds --quick             how fast are moment bounds here?
-  hankel stress                           how wrong are they, on every kind of input?"
+  hankel stress                           how large are their errors, on every kind of input?"
 )]
 pub struct Arguments {
     /// Print nothing but results and errors.
@@ -39,7 +39,7 @@ pub struct Arguments {
 pub enum Command {
     /// Generate shaders, headers and a manifest.
     Build(Build),
-    /// Fail if committed shaders no longer follow from their sources.
+    /// Fail if committed shaders are not what their sources give now.
     Check(Check),
     /// Show what changed between two builds.
     Diff(Diff),
@@ -49,8 +49,8 @@ pub enum Command {
     New(New),
     /// Run every kernel on every backend and compare.
     Parity(Parity),
-    /// Run kernels natively with every access looked at, in several orders: data races, memory that is
-    /// read before it is written, results that depend on order, overflow, what is out of range.
+    /// Run kernels natively and check every memory access, in several orders: finds data races, memory
+    /// that is read before it is written, results that depend on order, overflow, indices out of range.
     Sanitize(Sanitize),
     /// Run a kernel on the rows of a table.
     Eval(Eval),
@@ -69,7 +69,7 @@ Examples:
   hankel toolchain status      which compiler would be used, and what is missing
   hankel toolchain install     install it, the first way that is possible")]
     Toolchain(Toolchain),
-    /// What of other people's compilers, drivers and browsers is there, and what installs the rest.
+    /// Show which compilers, drivers and browsers are installed, and how to install the others.
     Doctor(Doctor),
     /// Print a completion script for a shell.
     #[command(after_help = "\
@@ -77,13 +77,13 @@ Examples:
   hankel completions bash >/etc/bash_completion.d/hankel
   hankel completions fish >~/.config/fish/completions/hankel.fish")]
     Completions(Completions),
-    /// A process that native kernels of another crate run in.
+    /// Serve as the process that runs native kernels of another crate.
     #[command(name = crate::session::WORKER, hide = true)]
     KernelWorker {
         /// The crate's plug-in.
         library: PathBuf,
     },
-    /// A process that the matrix runs kernels in.
+    /// Serve as a process that runs kernels for the matrix.
     #[command(name = "matrix-runner", hide = true)]
     MatrixRunner {
         /// `vulkan` or `gl`.
@@ -118,31 +118,26 @@ pub struct Generate {
     /// the end of the name; may be repeated.
     #[arg(long = "variant", value_name = "SUFFIX:CONSTANT=VALUE[,…]")]
     pub variants: Vec<String>,
-    /// Let the specialisation constants that are not fixed be set in HLSL and GLSL (by a macro) and
-    /// MSL (as function constants), too, as they can be in SPIR-V and WGSL.
+    /// Leave the specialisation constants that are not fixed open in HLSL and GLSL (as macros) and MSL (as
+    /// function constants), too, as they are in SPIR-V and WGSL.
     #[arg(long)]
     pub open_constants: bool,
     #[command(flatten)]
     pub placement: Placed,
     /// Bounds checks in HLSL, MSL and GLSL beyond the one guard of each invocation
-    /// [unchecked, restrict, readzwrite].
-    #[arg(long, value_name = "POLICY", default_value = BOUNDS_CHECKS)]
-    pub bounds_checks: String,
-    /// HLSL's shader model [5.1, 6.0 to 6.9].
-    #[arg(long, value_name = "VERSION", default_value = SHADER_MODEL)]
-    pub shader_model: String,
-    /// Metal's language version [1.0 to 4.0].
-    #[arg(long, value_name = "VERSION", default_value = MSL_VERSION)]
-    pub msl_version: String,
+    /// [unchecked, restrict, readzwrite; default: unchecked].
+    #[arg(long, value_name = "POLICY")]
+    pub bounds_checks: Option<String>,
+    /// HLSL's shader model [5.1, 6.0 to 6.9; default: 6.0].
+    #[arg(long, value_name = "VERSION")]
+    pub shader_model: Option<String>,
+    /// Metal's language version [1.0 to 4.0; default: 2.4].
+    #[arg(long, value_name = "VERSION")]
+    pub msl_version: Option<String>,
 }
 
-const BOUNDS_CHECKS: &str = "unchecked";
-const SHADER_MODEL: &str = "6.0";
-const MSL_VERSION: &str = "2.4";
-
 impl Generate {
-    /// The first option that is not as it is by default: of what is chosen and how it is written, not of where
-    /// its source is.
+    /// The first option that is given: of what is chosen and how it is written, not of where its source is.
     pub fn first_option(&self) -> Option<&'static str> {
         let placed = &self.placement;
         [
@@ -151,15 +146,15 @@ impl Generate {
             ("--set", !self.set.is_empty()),
             ("--variant", !self.variants.is_empty()),
             ("--open-constants", self.open_constants),
-            ("--hlsl-space", placed.hlsl_space != 0),
-            ("--register-base", placed.register_base != 0),
-            ("--wgsl-group", placed.wgsl_group != 0),
-            ("--msl-slot-base", placed.msl_slot_base != 0),
-            ("--glsl-binding-base", placed.glsl_binding_base != 0),
+            ("--hlsl-space", placed.hlsl_space.is_some()),
+            ("--register-base", placed.register_base.is_some()),
+            ("--wgsl-group", placed.wgsl_group.is_some()),
+            ("--msl-slot-base", placed.msl_slot_base.is_some()),
+            ("--glsl-binding-base", placed.glsl_binding_base.is_some()),
             ("--bindings", placed.bindings.is_some()),
-            ("--bounds-checks", self.bounds_checks != BOUNDS_CHECKS),
-            ("--shader-model", self.shader_model != SHADER_MODEL),
-            ("--msl-version", self.msl_version != MSL_VERSION),
+            ("--bounds-checks", self.bounds_checks.is_some()),
+            ("--shader-model", self.shader_model.is_some()),
+            ("--msl-version", self.msl_version.is_some()),
         ]
         .into_iter()
         .find_map(|(option, given)| given.then_some(option))
@@ -169,21 +164,21 @@ impl Generate {
 /// Where bindings are in the texts.
 #[derive(Debug, Args)]
 pub struct Placed {
-    /// HLSL: the register space of every binding.
-    #[arg(long, value_name = "SPACE", default_value_t = 0)]
-    pub hlsl_space: u8,
-    /// HLSL: the first register of every class (t, u, b, s).
-    #[arg(long, value_name = "REGISTER", default_value_t = 0)]
-    pub register_base: u16,
-    /// WGSL: the group of every binding.
-    #[arg(long, value_name = "GROUP", default_value_t = 0)]
-    pub wgsl_group: u8,
-    /// MSL: the first slot of buffers, of textures and of samplers.
-    #[arg(long, value_name = "SLOT", default_value_t = 0)]
-    pub msl_slot_base: u8,
-    /// GLSL 4.50 and GLSL ES 3.10: what is added to every binding.
-    #[arg(long, value_name = "BINDING", default_value_t = 0)]
-    pub glsl_binding_base: u8,
+    /// HLSL: the register space of every binding [default: 0].
+    #[arg(long, value_name = "SPACE")]
+    pub hlsl_space: Option<u8>,
+    /// HLSL: the first register of every class (t, u, b, s) [default: 0].
+    #[arg(long, value_name = "REGISTER")]
+    pub register_base: Option<u16>,
+    /// WGSL: the group of every binding [default: 0].
+    #[arg(long, value_name = "GROUP")]
+    pub wgsl_group: Option<u8>,
+    /// MSL: the first slot of buffers, of textures and of samplers [default: 0].
+    #[arg(long, value_name = "SLOT")]
+    pub msl_slot_base: Option<u8>,
+    /// GLSL 4.50 and GLSL ES 3.10: what is added to every binding [default: 0].
+    #[arg(long, value_name = "BINDING")]
+    pub glsl_binding_base: Option<u8>,
     /// Places of single bindings (TOML).
     #[arg(long, value_name = "FILE")]
     pub bindings: Option<PathBuf>,
@@ -203,8 +198,8 @@ Examples:
   hankel build --scene scenes/fence.toml --out frame
   hankel build --scene scenes/fence.toml --technique auto --error 0.1 --target wgsl --out frame
 
-The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. Files that are right already
-are left alone. A build that was stopped is finished by the next one.
+The folder gets LANGUAGE/KERNEL.EXTENSION, manifest.json and include/. Files that are up to date
+are not written. A build that was interrupted is completed by the next one.
 
 The file of --bindings puts single bindings elsewhere, with names as in manifest.json:
   [shade_hamburger.map]
@@ -225,27 +220,31 @@ pub struct Build {
     #[cfg(feature = "frames")]
     #[command(flatten)]
     pub frame: OfScene,
-    /// What is generated: shaders with entry points, or libraries of functions.
+    /// What to generate: shaders with entry points, or libraries of functions.
     #[arg(long, value_enum, default_value_t)]
     pub form: Form,
-    /// Libraries: what their names begin with [default: hankel].
+    /// Libraries: the prefix of their names [default: hankel].
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
     /// Libraries: only this function, and what it calls; `*` stands for any letters; may be repeated.
     #[arg(long = "function", value_name = "NAME")]
     pub functions: Vec<String>,
-    /// Folder for what is generated.
+    /// Folder for the output.
     #[arg(long, value_name = "FOLDER", default_value = "shaders")]
     pub out: PathBuf,
-    /// Overwrite files that hankel did not write or that were edited since.
+    /// Overwrite files that hankel did not write, or that were edited after it wrote them.
     #[arg(long)]
     pub force: bool,
-    /// Write what the shaders or libraries are made from to this file, as a rule in Make's syntax for
-    /// OUT/manifest.json or OUT/functions.json.
+    /// Write the list of files that the shaders or libraries are made from to this file, as a rule in
+    /// Make's syntax for OUT/manifest.json or OUT/functions.json.
     #[arg(long, value_name = "FILE")]
     pub depfile: Option<PathBuf>,
-    /// Stay, and build again after each edit. A kernel that does not compile is reported, and what
-    /// was built before stays.
+    /// Write the names of the environment variables that the shaders follow from to this file, one a line. For
+    /// `hankel_build`: cargo follows variables, rules of Make do not.
+    #[arg(long, value_name = "FILE", hide = true)]
+    pub environment: Option<PathBuf>,
+    /// Keep running, and build again after each edit. A kernel that does not compile is reported, and
+    /// the output of the last good build stays.
     #[arg(long)]
     pub watch: bool,
     /// How the report is printed.
@@ -280,7 +279,8 @@ A budget is a TOML file:
 It limits arithmetic, operations, registers, branches, texture, total (see `hankel list`), and findings:
 loops that cannot be unrolled and dynamic indices into a function's own arrays.
 
-Without options, they are those that manifest.json holds. If you give one, give all that the folder was built with.")]
+Without options, the command takes them from manifest.json. If you give one, give all that the folder was built
+with.")]
 pub struct Check {
     /// The committed folder.
     #[arg(value_name = "FOLDER")]
@@ -307,9 +307,9 @@ pub struct Check {
 /// What changes `hankel diff` fails for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Deny {
-    /// Of the interface.
+    /// Fail if an interface changed.
     Interface,
-    /// All.
+    /// Fail on any change.
     Any,
 }
 
@@ -321,9 +321,9 @@ Examples:
   hankel diff old/shaders shaders --run
   hankel diff old/shaders shaders --scene scenes/hard.toml --out hard.png
 
-A change is of the interface where code that binds or calls a shader may have to change, too: bindings,
-layouts, workgroup sizes, entry points, signatures. Everything else is a change of the text, of what it
-costs (see `hankel list`), or of what is said of it.")]
+An interface changed if code that binds or calls the shader may have to change, too: bindings, layouts,
+workgroup sizes, entry points, signatures. All other changes are of the text, of its cost (see
+`hankel list`), or of its description.")]
 pub struct Diff {
     /// The folder of the old build.
     #[arg(value_name = "OLD")]
@@ -332,10 +332,10 @@ pub struct Diff {
     #[arg(value_name = "NEW")]
     pub new: PathBuf,
     /// Run the old and the new SPIR-V on Vulkan with the inputs of `hankel parity`, and compare the
-    /// numbers. For kernels of which the interface is the same.
+    /// numbers. Only for kernels whose interface is the same.
     #[arg(long)]
     pub run: bool,
-    /// With --run: Cargo.toml of the kernel crate whose descriptions say what the inputs are.
+    /// With --run: Cargo.toml of the kernel crate; its descriptions define the inputs.
     #[arg(long, value_name = "FILE", requires = "run")]
     pub manifest_path: Option<PathBuf>,
     /// Seed of the generated inputs.
@@ -347,7 +347,7 @@ pub struct Diff {
         requires = "run"
     )]
     pub seed: u64,
-    /// Render this scene (TOML) on Vulkan with the shaders of either build, and compare the pictures.
+    /// Render this scene (TOML) on Vulkan with the shaders of each build, and compare the pictures.
     #[cfg(feature = "frames")]
     #[arg(long, value_name = "SCENE", requires = "out")]
     pub scene: Option<PathBuf>,
@@ -356,7 +356,7 @@ pub struct Diff {
     #[cfg(feature = "frames")]
     #[arg(long, value_name = "FILE", requires = "scene")]
     pub out: Option<PathBuf>,
-    /// Exit with 1 if there is such a change.
+    /// Exit with code 1 if there is such a change.
     #[arg(long, value_enum)]
     pub deny: Option<Deny>,
     /// How the changes are printed.
@@ -405,9 +405,9 @@ Examples:
   hankel parity --matrix --require all --html matrix.html
   hankel parity --matrix --column hlsl-dxc --column msl --kernel 'shade_*'
 
-With --matrix, every generated language goes through the compilers that will meet it; `hankel doctor`
-shows which are there. VK_DRIVER_FILES chooses among several Vulkan drivers; HANKEL_SIMD the lanes'
-instruction set.")]
+With --matrix, every generated language is compiled and run by compilers and drivers of others;
+`hankel doctor` shows which are installed. VK_DRIVER_FILES chooses among several Vulkan drivers;
+HANKEL_SIMD chooses the instruction set of the SIMD lanes.")]
 pub struct Parity {
     #[command(flatten)]
     pub source: Source,
@@ -480,16 +480,17 @@ pub struct OfMatrix {
     /// wgsl-chromium].
     #[arg(long = "column", value_name = "NAME", requires = "matrix")]
     pub columns: Vec<String>,
-    /// A column that must run, or `all`: what is not installed fails; may be repeated.
+    /// A column that must run, or `all`: if its tools are not installed, the command fails; may be
+    /// repeated.
     #[arg(long, value_name = "NAME", requires = "matrix")]
     pub require: Vec<String>,
-    /// Writes the report as a page.
+    /// Write the report as an HTML page.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// Writes the report as JSON.
+    /// Write the report as JSON.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Writes the table in Markdown.
+    /// Write the table as Markdown.
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
     /// List of known differences; without it, the built-in kernels have their own.
@@ -499,7 +500,7 @@ pub struct OfMatrix {
     /// with all kernels in all columns is compared with it.
     #[arg(long, value_name = "FILE", requires = "matrix")]
     pub absent: Option<PathBuf>,
-    /// Writes that table, as this run finds it.
+    /// Write that table as this run finds it.
     #[arg(
         long,
         value_name = "FILE",
@@ -507,7 +508,7 @@ pub struct OfMatrix {
         conflicts_with = "absent"
     )]
     pub write_absent: Option<PathBuf>,
-    /// Runs everything anew, as it is done where CI=true.
+    /// Run everything again, without cached results, as with CI=true.
     #[arg(long, requires = "matrix")]
     pub no_cache: bool,
 }
@@ -555,7 +556,8 @@ pub struct Eval {
     /// A uniform's field or a specialisation constant; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Run the kernel as it is, where another one computes the same in about twice the digits.
+    /// Run the kernel that is named, even if there is another one that computes the same in about twice
+    /// the digits.
     #[arg(long)]
     pub fast: bool,
     /// Seconds that a kernel of another crate may run natively for 65536 rows.
@@ -589,31 +591,31 @@ pub struct Render {
     /// Render on both backends and compare.
     #[arg(long)]
     pub compare: bool,
-    /// With --compare: fails if more than this share of the pixels, in percent, differs by more than
-    /// 1/255. Without it, the share is what rounding can do at the scene's edges.
+    /// With --compare: fail if more than this share of the pixels, in percent, differs by more than
+    /// 1/255. The default is the share that rounding can change at the scene's edges.
     #[arg(long, value_name = "PERCENT", requires = "compare",
           value_parser = percentage)]
     pub limit: Option<f64>,
-    /// The technique, whatever the scene says; `auto`: the fastest within --error, as `hankel plan`
+    /// The technique, instead of the scene's; `auto`: the fastest within --error, as `hankel plan`
     /// finds it for the backend, with its map's size, filter and format.
     #[arg(long, value_name = "NAME", conflicts_with = "compare")]
     pub technique: Option<String>,
     /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
-    /// --filter, --fit and --multisampling are what is chosen from.
+    /// --filter, --fit and --multisampling limit the choice.
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true, requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
     #[command(flatten)]
     pub maps: Maps,
-    /// How passes run that give a texel for each index: as compute passes, or as draws into render targets, as
-    /// far as their kernels can: compute, fragment.
+    /// How passes run that give one texel for each index: as compute passes (`compute`), or as draws into
+    /// render targets where the kernel has a fragment form (`fragment`).
     #[arg(long, value_name = "FORM", default_value_t)]
     pub image_passes: ImagePasses,
     /// How much the difference picture is amplified.
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, default_value_t = hankel_frames::AMPLIFICATION, requires = "compare",
         value_parser = clap::value_parser!(u32).range(1..))]
     pub amplify: u32,
-    /// Also tells how wrong the shadow is, against rays and against filtering without moments; takes
-    /// some minutes for a large picture.
+    /// Also measure the shadow's error, against ray-traced light and against filtering without moments;
+    /// takes some minutes for a large picture.
     #[arg(long)]
     pub errors: bool,
     /// How the report is printed.
@@ -628,12 +630,12 @@ pub struct OfScene {
     /// Write the shaders of the frame of this scene (TOML) only, and frame.json.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// With --scene: the technique, whatever the scene says; `auto`: the fastest within --error, as
+    /// With --scene: the technique, instead of the scene's; `auto`: the fastest within --error, as
     /// `hankel plan` finds it for the backend, with its map's size, filter and format.
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub technique: Option<String>,
     /// With --technique auto: the greatest root mean square error of the light, against rays. --size,
-    /// --filter, --fit and --multisampling are what is chosen from.
+    /// --filter, --fit and --multisampling limit the choice.
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true, requires = "technique", value_parser = budget)]
     pub error: Option<f64>,
     /// With --technique auto: where the frame will run [default: native].
@@ -641,8 +643,8 @@ pub struct OfScene {
     pub backend: Option<Backend>,
     #[command(flatten)]
     pub maps: Maps,
-    /// With --scene: how passes run that give a texel for each index: as compute passes, or as draws into render
-    /// targets, as far as their kernels can: compute, fragment [default: compute].
+    /// With --scene: how passes run that give one texel for each index: as compute passes (`compute`), or as
+    /// draws into render targets where the kernel has a fragment form (`fragment`) [default: compute].
     #[arg(long, value_name = "FORM", requires = "scene")]
     pub image_passes: Option<ImagePasses>,
 }
@@ -719,11 +721,12 @@ Examples:
   hankel plan scenes/fence.toml --error 0.05 --backend vulkan --time 20 --memory 30
   hankel plan scenes/fence.toml --error 0.1 --technique hamburger,vsm --format json
 
-The error is the root mean square of the light that arrives (1 minus the shadow; 0 where a surface is turned from
-the light) against rays; in a scene with a medium, of the light that comes through it with what it scatters. The plan is
-found by probes on the backend: times of small maps, and pictures against rays through some of their pixels.
+The error is the root mean square difference from ray-traced light. Light is 1 minus the shadow, and 0 where a
+surface faces away from the light. In a scene with a medium, it is the light that comes through the medium, plus the
+light that the medium scatters. To find the plan, the command measures on the backend: times of small maps, and
+errors against rays through some of the pixels.
 
-Exit code 1: nothing is within the budgets.")]
+Exit code 1: no configuration is within the limits.")]
 pub struct Plan {
     /// Scene file (TOML). What it says of its shadow is not used.
     #[arg(value_name = "SCENE")]
@@ -762,14 +765,14 @@ Examples:
   hankel toolchain status --format json  the same for a program
 
 Environment:
-  HANKEL_TOOLCHAIN          folder of a toolchain to use, whatever else there is
+  HANKEL_TOOLCHAIN          folder of a toolchain to use before all others
   HANKEL_TOOLCHAIN_ARCHIVE  archive to unpack when nothing is installed
   HANKEL_CACHE              folder for what is kept between runs")]
     Status(ToolchainStatus),
     /// Install the compiler, from an archive, through rustup or from source.
     #[command(after_help = "\
 Examples:
-  hankel toolchain install                      the first way that is possible
+  hankel toolchain install                      in the first way that is possible
   hankel toolchain install --from FILE.tar.zst  from an archive
   hankel toolchain install --method source      from Debian's rust-src and crates.io, without LLVM")]
     Install(ToolchainInstall),
@@ -792,7 +795,7 @@ pub struct ToolchainInstall {
     /// Archive to install from.
     #[arg(long, value_name = "FILE")]
     pub from: Option<PathBuf>,
-    /// SHA-256 of the archive, for one that hankel does not know.
+    /// SHA-256 of the archive, if hankel does not know it.
     #[arg(long, value_name = "HEX", requires = "from")]
     pub sha256: Option<String>,
     /// How to install [default: the first that is possible].

@@ -9,7 +9,7 @@ use hankel_system::signals;
 use hankel_system::text::visible;
 use serde::Serialize;
 
-/// Exit code of what is the machine's fault: a full disk, a name that is no text.
+/// Exit code of what is the machine's fault: a full disk, a name that is not text.
 const MACHINE: i32 = 3;
 
 /// A line of the result, on the standard output stream.
@@ -32,14 +32,14 @@ pub fn json(value: &impl Serialize) {
         // The path of something that the machine has, of the cache for example.
         Err(error) => {
             note(format_args!(
-                "Error: the report has no JSON form: {error}; leave out --format json"
+                "Error: the report cannot be written as JSON: {error}; leave out --format json"
             ));
             signals::exit(MACHINE)
         }
     }
 }
 
-/// Paths of a report in JSON. What is no UTF-8 in them comes out as `\u{fffd}`, as on a terminal.
+/// Paths of a report in JSON. What is not UTF-8 in them comes out as `\u{fffd}`, as on a terminal.
 #[cfg(feature = "frames")]
 pub fn paths<S: serde::Serializer>(all: &[std::path::PathBuf], to: S) -> Result<S::Ok, S::Error> {
     to.collect_seq(all.iter().map(|path| path.to_string_lossy()))

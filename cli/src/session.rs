@@ -17,7 +17,7 @@ use hankel_codegen::bundle::Bundle;
 use hankel_codegen::compile::{Compiled, Compiler, Wanted, compile};
 use hankel_codegen::diff;
 use hankel_codegen::finished::{self, finish_all};
-use hankel_codegen::inputs::{Inputs, normal};
+use hankel_codegen::inputs::Inputs;
 use hankel_codegen::manifest::WriteOptions;
 use hankel_codegen::placement::Placement;
 use hankel_codegen::spirv::words;
@@ -43,6 +43,9 @@ const BUILT_IN: &str = "kernels/shadows/Cargo.toml";
 /// The committed SPIR-V within a checkout.
 const COMMITTED: &str = "snapshots/spirv";
 
+/// The file beside kept SPIR-V that tells the compiler that made it from others of its version.
+const STAMP: &str = "compiler.stamp";
+
 /// The hidden command that runs kernels of another crate, see [`hankel_host::worker`].
 pub const WORKER: &str = "kernel-worker";
 
@@ -52,6 +55,15 @@ const DESCRIBING: Duration = Duration::from_secs(60);
 /// SPIR-V by the names of entry points.
 #[cfg(any(feature = "frames", feature = "measure"))]
 pub type Words = BTreeMap<String, Vec<u32>>;
+
+/// What an output follows from.
+#[derive(Clone, Debug, Default)]
+pub struct Followed {
+    /// Files and folders, as absolute paths.
+    pub paths: Vec<PathBuf>,
+    /// Names of environment variables.
+    pub environment: Vec<String>,
+}
 
 /// A kernel crate.
 pub struct Session {
@@ -138,22 +150,18 @@ impl Session {
         }
     }
 
-    /// Every file and folder that the SPIR-V of a request was made from, as absolute paths; none for the
-    /// built-in kernels outside of a checkout.
-    pub fn inputs(&self, request: &Request) -> Result<Vec<PathBuf>> {
+    /// What the SPIR-V of a request was made from: files and folders as absolute paths, and names of environment
+    /// variables; nothing for the built-in kernels outside of a checkout.
+    pub fn inputs(&self, request: &Request) -> Result<Followed> {
         let Some(manifest) = &self.manifest else {
-            return Ok(Vec::new());
+            return Ok(Followed::default());
         };
-        let folder = std::path::absolute(folder_of(manifest))
-            .map_err(|e| Failure::machine(format!("{}: {e}", manifest.display()), None))?;
         let inputs = self.bundle(&chosen(request)?)?.origin.inputs;
-        let present = |all: &BTreeMap<String, Option<String>>| -> Vec<PathBuf> {
-            all.iter()
-                .filter(|(_, hash)| hash.is_some())
-                .map(|(name, _)| normal(&folder.join(name)))
-                .collect()
-        };
-        Ok([present(&inputs.files), present(&inputs.folders)].concat())
+        let paths = inputs.paths(folder_of(manifest));
+        Ok(Followed {
+            paths: paths.map_err(Error::from)?.into_iter().collect(),
+            environment: inputs.environment.into_keys().collect(),
+        })
     }
 
     /// The crate with the native code of the entry points called `names`. What is not linked into
@@ -227,9 +235,9 @@ impl Session {
             .map(|t| Language::from_str(t))
             .collect::<std::result::Result<_, _>>()?;
         let options = Options {
-            bounds_checks: args.bounds_checks.parse()?,
-            shader_model: args.shader_model.parse()?,
-            msl_version: args.msl_version.parse()?,
+            bounds_checks: parsed(args.bounds_checks.as_deref())?,
+            shader_model: parsed(args.shader_model.as_deref())?,
+            msl_version: parsed(args.msl_version.as_deref())?,
             constants: constants("--set ", &args.set)?,
             open_constants: args.open_constants,
             variants: variants(&args.variants)?,
@@ -370,22 +378,26 @@ impl Session {
         let kept = final_folder(&target, &self.krate.name);
         let some = some_folder(&target, &self.krate.name);
         let toolchain = hankel_toolchain::find(&hankel_toolchain::Options::from_env());
-        let known = toolchain
-            .as_ref()
-            .map(|found| found.as_ref().map(|it| &it.rustc_version));
+        // Another compiler may make something else of the same sources.
+        let is_made_by_this = |bundle: &Bundle, folder: &Path| match &toolchain {
+            Ok(Some(found)) => {
+                found.rustc_version == bundle.origin.made_by.compiler
+                    && std::fs::read_to_string(folder.join(STAMP))
+                        .is_ok_and(|stamp| stamp == compiler(found.clone()).stamp())
+            }
+            Ok(None) => true,
+            Err(_) => false,
+        };
         for folder in [&kept, &some] {
             if let Ok(bundle) = Bundle::read(folder)
                 && fits(&bundle)
                 && names.iter().all(|name| bundle.modules.contains_key(*name))
-                // Another compiler may make something else of the same sources.
-                && known.as_ref().is_ok_and(|version| {
-                    version.is_none_or(|it| *it == bundle.origin.made_by.compiler)
-                })
+                && is_made_by_this(&bundle, folder)
             {
                 return Ok(bundle);
             }
         }
-        let compiled = self.compile(manifest, &target, names, reason.take())?;
+        let (compiled, stamp) = self.compile(manifest, &target, names, reason.take())?;
         let (modules, kept) = if is_all {
             let finished = finished::folder(&target, &self.krate.name);
             (
@@ -404,18 +416,22 @@ impl Session {
             &compiled,
             modules,
         );
+        let file = kept.join(STAMP);
+        // The stamp of another compiler must not stay beside what this one has made; without one, it is made again.
+        let _ = std::fs::remove_file(&file);
         bundle.write(&kept)?;
+        let _ = std::fs::write(&file, stamp);
         Ok(bundle)
     }
 
-    /// Raw SPIR-V of the entry points called `names` from rust-gpu.
+    /// Raw SPIR-V of the entry points called `names` from rust-gpu, and the compiler's [stamp](Compiler::stamp).
     fn compile(
         &self,
         manifest: &Path,
         target: &Path,
         names: &[&str],
         reason: Option<String>,
-    ) -> Result<Compiled> {
+    ) -> Result<(Compiled, String)> {
         let mut progress = Progress::new(self.quiet);
         let options = hankel_toolchain::Options::from_env();
         let toolchain = hankel_toolchain::ensure(&options, &mut progress).map_err(|error| {
@@ -433,6 +449,7 @@ impl Session {
             )
         })?;
         let compiler = compiler(toolchain);
+        let stamp = compiler.stamp();
         let is_all = names.len() == self.krate.entries.len();
         let (what, wanted) = if is_all {
             (self.krate.name.clone(), Wanted::All(names))
@@ -446,11 +463,12 @@ impl Session {
         if let Some(ahead) = self.ahead.take()
             && let Some(compiled) = ahead.finish(&compiler, wanted)
         {
-            return Ok(compiled);
+            return Ok((compiled, stamp));
         }
         // Called from another thread: only the text is handed over.
         let line = |line: &str| progress.detail(line);
-        Ok(compile(manifest, &compiler, target, wanted, &mut { line })?)
+        let compiled = compile(manifest, &compiler, target, wanted, &mut { line })?;
+        Ok((compiled, stamp))
     }
 }
 
@@ -480,8 +498,12 @@ fn chosen(request: &Request) -> Result<Vec<&str>> {
 
 /// Where this program lies.
 pub fn this_program() -> Result<PathBuf> {
-    std::env::current_exe()
-        .map_err(|e| Failure::machine(format!("this program does not find itself: {e}"), None))
+    std::env::current_exe().map_err(|e| {
+        Failure::machine(
+            format!("cannot find the path of the running program: {e}"),
+            None,
+        )
+    })
 }
 
 /// This program, to be started again for the kernels of other crates.
@@ -582,14 +604,19 @@ fn is_ours(path: &Path) -> bool {
     path.exists()
 }
 
+/// An option's value, or what it is by default.
+fn parsed<T: FromStr<Err = Error> + Default>(value: Option<&str>) -> Result<T> {
+    Ok(value.map(str::parse).transpose()?.unwrap_or_default())
+}
+
 /// Where bindings are.
 fn placement(args: &Placed) -> Result<Placement> {
     let mut placement = Placement::default();
-    placement.hlsl_space = args.hlsl_space;
-    placement.register_base = args.register_base;
-    placement.wgsl_group = args.wgsl_group;
-    placement.msl_slot_base = args.msl_slot_base;
-    placement.glsl_binding_base = args.glsl_binding_base;
+    placement.hlsl_space = args.hlsl_space.unwrap_or_default();
+    placement.register_base = args.register_base.unwrap_or_default();
+    placement.wgsl_group = args.wgsl_group.unwrap_or_default();
+    placement.msl_slot_base = args.msl_slot_base.unwrap_or_default();
+    placement.glsl_binding_base = args.glsl_binding_base.unwrap_or_default();
     if let Some(file) = &args.bindings {
         placement.read(file)?;
     }
@@ -653,7 +680,7 @@ pub fn cases(entry: &KernelEntry, seed: u64) -> Result<Vec<Case>> {
     inputs::of_entry(entry, seed).map_err(|e| {
         Failure::input(
             format!("kernel `{}`: there are no inputs: {e}", entry.kernel.name),
-            "Mend the function that makes them, or the attributes of its parameters.",
+            "Fix the function that makes them, or the attributes of its parameters.",
         )
     })
 }

@@ -103,7 +103,7 @@ fn misuse_is_explained() {
         folder.path(),
         &format!("{quick} --rounds 1 --out file"),
         2,
-        &["cannot write file", "should be a folder"],
+        &["cannot write file", "a folder is expected"],
     );
 }
 

@@ -227,7 +227,7 @@ fn misuse_of_build_is_explained() {
     desk.hankel("build --out file/deeper")
         .fails(2, &["file/deeper", "Not a directory"]);
     desk.hankel("check file")
-        .fails(2, &["file", "it is no folder"]);
+        .fails(2, &["file", "it is not a folder"]);
     desk.hankel("build --set nosuch=1").fails(2, &["nosuch"]);
     desk.hankel("build --manifest-path nowhere/Cargo.toml")
         .fails(2, &["nowhere", "no such file"]);

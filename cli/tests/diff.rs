@@ -66,6 +66,32 @@ fn numbers_of_two_builds_are_compared() {
         changes.iter().any(|it| it["what"] == "cost.operations"),
         "{text}"
     );
+
+    // What is not run is said, and why.
+    says(
+        &desk,
+        "build --out moved --kernel shade_hamburger --hlsl-space 3",
+    );
+    let text = says(&desk, "diff one moved --run");
+    assert!(
+        text.contains("shade_hamburger: not run: its interface changed"),
+        "{text}"
+    );
+    says(
+        &desk,
+        "build --out wgsl --kernel shade_hamburger --target wgsl",
+    );
+    desk.hankel("diff one wgsl --run")
+        .fails(2, &["--run", "wgsl", "no SPIR-V", "--target spirv"]);
+    for (out, value) in [("first", 1), ("second", 2)] {
+        let options = format!("--kernel shade_hamburger --variant _v:encoding={value}");
+        says(&desk, &format!("build --out {out} {options}"));
+    }
+    let text = says(&desk, "diff first second --run");
+    assert!(
+        text.contains("shade_hamburger_v: not run: the crate has no kernel"),
+        "{text}"
+    );
 }
 
 #[test]

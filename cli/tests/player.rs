@@ -1,4 +1,4 @@
-//! A frame to take along: what `build --scene` writes is played by a program that knows nothing of
+//! Exported frames: what `build --scene` writes is played by a program that knows nothing of
 //! Hankel, and gives the picture of `render`.
 
 mod desk;
@@ -592,7 +592,7 @@ fn options_that_make_no_sense_together_are_refused() {
         ("--technique magic", "no technique magic"),
         ("--technique auto", "needs --error"),
         ("--size 64", "need --technique auto"),
-        ("--wgsl-group 255", "fragment shaders come after it"),
+        ("--wgsl-group 255", "fragment shaders need the next one"),
     ] {
         desk.hankel(&format!("{build} {options}"))
             .fails(2, &[words]);

@@ -103,7 +103,7 @@ fn the_same_program_gives_the_same_archive_and_bad_input_none() {
     };
     let out = none.to_str().unwrap();
     bad(&[], "", 2, "usage: ");
-    bad(&["../x", out], "", 2, "`../x` is no target");
+    bad(&["../x", out], "", 2, "`../x` is not a target");
     bad(
         &[TARGET, out],
         "/nothing/here",

@@ -301,6 +301,23 @@ fn a_new_crate_is_built_and_checked() {
         .code(0)
         .out();
     assert!(out.contains(" 0 files written"), "{out}");
+    // Texts name the licence, which no SPIR-V does.
+    let manifest = desk.path("my-kernels/Cargo.toml");
+    let text = fs::read_to_string(&manifest).expect("it was made");
+    let licensed = text.replacen("[package]\n", "[package]\nlicense = \"Zlib\"\n", 1);
+    desk.write("my-kernels/Cargo.toml", &licensed);
+    desk.hankel(check).code(1);
+    desk.hankel("build --manifest-path Cargo.toml").code(0);
+    for file in fs::read_dir(desk.path("my-kernels/shaders/wgsl")).expect("it was built") {
+        let file = file.expect("it can be read").path();
+        let text = fs::read_to_string(&file).expect("a text");
+        assert!(
+            text.starts_with("// SPDX-License-Identifier: Zlib\n"),
+            "{text}"
+        );
+    }
+    desk.write("my-kernels/Cargo.toml", &text);
+    desk.hankel("build --manifest-path Cargo.toml").code(0);
     // An editor's lock on a file that is being edited is no source.
     #[cfg(unix)]
     std::os::unix::fs::symlink("user@host.1:2", desk.path("my-kernels/src/.#lib.rs"))
@@ -406,6 +423,18 @@ fn errors_name_the_line_where_it_is_now() {
             );
         }
     }
+    // What rust-gpu refuses of rustc's optimiser is compiled without that.
+    let case = root().join("tests/upstream/rust-gpu-equal-branches/case.rs");
+    let case = fs::read_to_string(case).expect("the case is there");
+    let text = EIGHT_KERNELS
+        .replace(
+            "use hankel_dsl::{Element,",
+            "use hankel_dsl::glam::UVec2;\nuse hankel_dsl::{Buffer, Element,",
+        )
+        .replace("kernels![", "kernels![nearer, ")
+        + &case;
+    desk.write("my-kernels/src/lib.rs", &text);
+    desk.hankel(line).code(0);
     desk.write("my-kernels/src/lib.rs", EIGHT_KERNELS);
     desk.hankel(line).code(0);
     let noted = root().join("target").join(LINKS_AT_ONCE);

@@ -223,13 +223,14 @@ fn stale(reasons: Vec<String>) -> Result<()> {
     Err(Error::Stale { reason })
 }
 
-/// Hash of what SPIR-V follows from: all but where a kernel stands and what is said of it.
+/// Hash of what SPIR-V follows from: all but where a kernel stands, what is said of it and its licence.
 fn hash_of(kernels: &[Kernel]) -> String {
     let mut kernels = kernels.to_vec();
     kernels.sort_by(|a, b| a.name.cmp(&b.name));
     for kernel in &mut kernels {
         kernel.file.clear();
         kernel.line = 0;
+        kernel.licence.clear();
         kernel.summary.clear();
     }
     // Nothing in it can fail to become JSON.

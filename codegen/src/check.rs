@@ -139,7 +139,7 @@ pub struct Changed {
 /// What a check found.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Report {
-    /// Files that are as they should be.
+    /// Files that are up to date.
     pub same: usize,
     /// A build of the folder was stopped before its end.
     pub stopped: bool,
@@ -153,7 +153,7 @@ pub struct Report {
     pub invalid: Vec<String>,
     /// Kernels past their budget.
     pub over_budget: Vec<OverBudget>,
-    /// Kernels in the budget that there are not.
+    /// Names in the budget that are not names of kernels.
     pub unknown_in_budget: Vec<String>,
 }
 
@@ -184,7 +184,7 @@ impl Report {
 ///
 /// # Errors
 ///
-/// It is no folder, or a file that is there cannot be read.
+/// It is not a folder, or a file that is there cannot be read.
 pub fn check(generated: &Generated, committed: &Path, budget: &Budget) -> Result<Report> {
     let mut report = Report::default();
     let folder = Folder::open(committed)?;
@@ -272,7 +272,7 @@ fn invalid(name: &str, bytes: &[u8]) -> Option<Failure> {
         .err()
 }
 
-/// A unified diff from what is committed to what the sources give; sizes of what is no text.
+/// A unified diff from what is committed to what the sources give; sizes of what is not text.
 pub(crate) fn unified_diff(name: &str, there: &[u8], expected: &[u8]) -> String {
     match (std::str::from_utf8(there), std::str::from_utf8(expected)) {
         (Ok(there), Ok(expected)) => similar::TextDiff::from_lines(there, expected)
@@ -288,8 +288,8 @@ pub(crate) fn unified_diff(name: &str, there: &[u8], expected: &[u8]) -> String 
     }
 }
 
-/// Files in the folders of a build that are none of it. What else lies beside them is none of its
-/// business; hidden files are an editor's or the system's.
+/// Files in the folders of a build that do not belong to it. Other files beside these folders are ignored, and so
+/// are hidden files, which are an editor's or the system's.
 fn extra(folder: &Folder, generated: &Generated) -> Result<Vec<String>> {
     let mut extra = Vec::new();
     let has_frame = generated.files.contains_key(FRAME_FILE);
@@ -330,7 +330,7 @@ impl fmt::Display for Report {
         if self.stopped {
             writeln!(
                 f,
-                "{STAGE}: a build of this folder was stopped; the next `hankel build` finishes it"
+                "{STAGE}: a build of this folder was interrupted; the next `hankel build` completes it"
             )?;
         }
         for file in &self.missing {
@@ -359,11 +359,14 @@ impl fmt::Display for Report {
             }
         }
         for kernel in &self.unknown_in_budget {
-            writeln!(f, "in the budget, but no kernel: {kernel}")?;
+            writeln!(
+                f,
+                "the budget names `{kernel}`, but there is no such kernel"
+            )?;
         }
         write!(
             f,
-            "{} files as they should be, {} changed, {} missing, {} extra, {} over budget",
+            "{} files up to date, {} changed, {} missing, {} extra, {} over budget",
             self.same,
             self.changed.len(),
             self.missing.len(),

@@ -7,13 +7,12 @@
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
 use hankel_system::overlooked::LastBuild;
-use hankel_system::process::Program;
+use hankel_system::process::follow;
 use rspirv::spirv::Capability;
 use rustc_codegen_spirv_types::{SpirvTarget, TargetSpec, TargetSpecVersion};
 use semver::Version;
@@ -89,6 +88,17 @@ impl Compiler {
         let rustc = self.bin.as_ref().map(|bin| bin.join("rustc"));
         let rustc = rustc.map(|it| it.with_extension(std::env::consts::EXE_EXTENSION));
         rustc.into_iter().chain([self.backend.clone()])
+    }
+
+    /// What tells it from others of the same version: sizes and times of its files, as far as they are known.
+    #[must_use]
+    pub fn stamp(&self) -> String {
+        let files = self.files().map(|file| {
+            let data = std::fs::metadata(&file).ok();
+            let of = |data: std::fs::Metadata| format!("{} {:?}", data.len(), data.modified().ok());
+            format!("{} {}", file.display(), data.map(of).unwrap_or_default())
+        });
+        files.collect::<Vec<_>>().join("\n")
     }
 
     /// What `rustc --version` prints.
@@ -236,7 +246,9 @@ pub fn compile(
     let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
     let spec = target_spec(&version, &target_dir)?;
     let flags_of_all = flags_of_all(compiler);
-    let mut separately = Separately::of(links_at_once, &version, wanted.names().len());
+    let separately_or_not =
+        || Separately::of(links_at_once.clone(), &version, wanted.names().len());
+    let mut separately = separately_or_not();
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -247,6 +259,8 @@ pub fn compile(
         let said = match run(cargo, &manifest, wanted.names(), progress) {
             Err(error) if joins_arms(&error) && !flags.contains(&UNTHREADED.into()) => {
                 flags.push(UNTHREADED.into());
+                // That linking failed before says nothing of the compiler.
+                separately = separately_or_not();
                 continue;
             }
             other => other?,
@@ -355,50 +369,17 @@ fn run(
     progress: &mut (dyn FnMut(&str) + Send),
 ) -> Result<String> {
     let program = PathBuf::from(cargo.get_program());
-    cargo.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut running = Program::start(&mut cargo).map_err(|source| Error::Run {
-        program: program.clone(),
-        source,
-    })?;
-    let (stdout, stderr) = (running.child.stdout.take(), running.child.stderr.take());
-    let (messages, said) = std::thread::scope(|scope| {
-        let said = scope.spawn(move || {
-            let mut said = String::new();
-            for line in stderr
-                .into_iter()
-                .flat_map(|pipe| BufReader::new(pipe).split(b'\n'))
-            {
-                let Ok(line) = line else { break };
-                let line = String::from_utf8_lossy(&line);
-                progress(&line);
-                said.push_str(line.trim_end());
-                said.push('\n');
-            }
-            said
-        });
-        let mut messages = Vec::new();
-        if let Some(mut pipe) = stdout {
-            // A broken pipe shows in the exit status.
-            let _ = pipe.read_to_end(&mut messages);
-        }
-        (
-            String::from_utf8_lossy(&messages).into_owned(),
-            said.join().unwrap_or_default(),
-        )
-    });
-    let status = running
-        .wait()
-        .map_err(|source| Error::Run { program, source })?;
-    if !status.success() {
-        return Err(failure(manifest, names, &said, &messages));
+    let said = follow(&mut cargo, progress).map_err(|source| Error::Run { program, source })?;
+    if !said.status.success() {
+        return Err(failure(manifest, names, &said.stderr, &said.stdout));
     }
-    Ok(messages)
+    Ok(said.stdout)
 }
 
 fn target_spec(version: &str, target_dir: &Path) -> Result<TargetSpec> {
     let number = parse_version(version).ok_or_else(|| Error::Run {
         program: "rustc".into(),
-        source: std::io::Error::other(format!("its version is no version: {version}")),
+        source: std::io::Error::other(format!("its version is not a version: {version}")),
     })?;
     let target = SpirvTarget::parse(TARGET).map_err(|error| Error::Option {
         option: "SPIR-V target",

@@ -1,5 +1,5 @@
-//! A frame to take along: `frame.json`, which says all that a player in another engine needs to run a
-//! graph of passes with the shaders beside it. It need not know Hankel.
+//! An exported frame: `frame.json`, which says all that a player in another engine needs to run a
+//! graph of passes with the shaders beside it. The player needs nothing of Hankel.
 //!
 //! ```text
 //! OUT/frame.json            resources, passes, shaders with their bindings, uniforms by meaning
@@ -106,7 +106,7 @@ pub struct Shadow {
     pub moment_bias: f32,
     /// What is taken off a receiver's depth, in units of the map's whole depth.
     pub depth_bias: f32,
-    /// Shadow below this much is light.
+    /// Light up to this share counts as none, and the rest is scaled to reach from 0 to 1: against light leaks.
     pub leak_cut: f32,
     /// Whether the map has mip levels.
     #[serde(skip_serializing_if = "core::ops::Not::not", default)]
@@ -344,7 +344,7 @@ pub enum Pass {
         /// A buffer that says how many invocations have something to do, fewer than `invocations`. A player may
         /// dispatch all workgroups, or as many as that needs.
         #[serde(skip_serializing_if = "Option::is_none", default)]
-        said_in: Option<SaidIn>,
+        workgroups_from: Option<WorkgroupsFrom>,
     },
     /// Draws a triangle that covers all pixels of its targets: three vertices without attributes and indices, one
     /// sample of a pixel, no depth, no blending, nothing culled.
@@ -364,7 +364,7 @@ pub enum Pass {
 
 /// Where a buffer says how many invocations of a compute pass have something to do.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct SaidIn {
+pub struct WorkgroupsFrom {
     /// The buffer, which an earlier pass writes.
     pub buffer: String,
     /// Bytes from its start to the first number.
@@ -512,7 +512,7 @@ impl Frame {
     ///
     /// # Errors
     ///
-    /// It is none, or of another format.
+    /// It is not a frame, or has another format.
     pub fn from_json(text: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
         struct Format {
@@ -751,9 +751,8 @@ fn jobs(request: &Request, draft: &Draft) -> Result<Vec<Variant>> {
 fn beyond(placement: &Placement, after: usize) -> Result<Placement> {
     let fail = |option: &str, value: u8| Error::Frame {
         what: format!("{option} {value}"),
-        problem:
-            "fragment shaders come after it, and there is no such place: give a smaller number"
-                .into(),
+        problem: "fragment shaders need the next one, which does not exist: give a smaller number"
+            .into(),
     };
     let (group, space, base) = (
         placement.wgsl_group,
@@ -820,8 +819,8 @@ fn check_draws(frame: &Frame) -> Result<()> {
                     return Err(Error::Frame {
                         what: format!("pass `{}`", draw.label),
                         problem: format!(
-                            "`{}` of `{}` and `{}` of `{}` are in one place in {language}: give one \
-                             of them another one in the file of `--bindings`",
+                            "`{}` of `{}` and `{}` of `{}` have the same place in {language}: give one \
+                             of them another place in the file of `--bindings`",
                             vertex.name, draw.vertex.shader, other.name, fragment.shader
                         ),
                     });

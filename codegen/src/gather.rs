@@ -47,7 +47,7 @@ pub(crate) fn gather(build: &Build<'_>) -> Result<Names> {
         let asked = info.environment.into_iter();
         names
             .environment
-            .extend(asked.filter(|name| !set.contains(name.as_str()) && !is_cargos(name)));
+            .extend(asked.filter(|name| !set.contains(name.as_str()) && !is_given_to_rustc(name)));
         if !is_local(&artifact.package_id) {
             continue;
         }
@@ -80,7 +80,7 @@ pub(crate) fn gather(build: &Build<'_>) -> Result<Names> {
         let asked = watched.environment.into_iter();
         names
             .environment
-            .extend(asked.filter(|name| !is_cargos(name)));
+            .extend(asked.filter(|name| !is_given_to_scripts(name)));
         if !is_local(&script.package_id) {
             continue;
         }
@@ -127,8 +127,25 @@ fn package(id: &str) -> String {
     }
 }
 
-/// Variables that cargo sets from what is recorded anyway.
-fn is_cargos(name: &str) -> bool {
+/// Variables that cargo sets for rustc, from what is recorded anyway. Not those that it sets for build scripts alone:
+/// `option_env!("PROFILE")` is the user's variable.
+fn is_given_to_rustc(name: &str) -> bool {
+    const NAMES: [&str; 8] = [
+        "CARGO",
+        "CARGO_BIN_NAME",
+        "CARGO_CRATE_NAME",
+        "CARGO_MANIFEST_DIR",
+        "CARGO_MANIFEST_PATH",
+        "CARGO_PRIMARY_PACKAGE",
+        "CARGO_TARGET_TMPDIR",
+        "OUT_DIR",
+    ];
+    const PREFIXES: [&str; 2] = ["CARGO_BIN_EXE_", "CARGO_PKG_"];
+    NAMES.contains(&name) || PREFIXES.iter().any(|prefix| name.starts_with(prefix))
+}
+
+/// Variables that cargo sets for build scripts, from what is recorded anyway.
+fn is_given_to_scripts(name: &str) -> bool {
     const NAMES: [&str; 9] = [
         "DEBUG",
         "HOST",
@@ -291,7 +308,9 @@ mod tests {
         );
         let names: Vec<_> = info.environment.iter().map(String::as_str).collect();
         assert_eq!(names, ["CARGO_PKG_NAME", "NOT_SET", "WEIGHT"]);
-        assert!(is_cargos("CARGO_PKG_NAME") && !is_cargos("WEIGHT"));
+        assert!(is_given_to_rustc("CARGO_PKG_NAME") && !is_given_to_rustc("WEIGHT"));
+        // cargo sets it for build scripts alone.
+        assert!(is_given_to_scripts("PROFILE") && !is_given_to_rustc("PROFILE"));
     }
 
     #[test]

@@ -141,6 +141,26 @@ impl Inputs {
         }
     }
 
+    /// The files and folders that are there of what was recorded, as absolute paths: `Cargo.lock`, and the files of
+    /// cargo's settings that count among them.
+    ///
+    /// # Errors
+    ///
+    /// One of the latter cannot be read.
+    pub fn paths(&self, folder: &Path) -> Result<BTreeSet<PathBuf>, InputError> {
+        let folder = normal(&std::path::absolute(folder).map_err(|error| fail(folder, error))?);
+        let recorded = self.files.iter().chain(&self.folders);
+        let present = recorded.filter(|(_, hash)| hash.is_some());
+        let mut paths: BTreeSet<PathBuf> = present
+            .map(|(name, _)| normal(&folder.join(name)))
+            .collect();
+        let lock = workspace_of(&folder)?.join("Cargo.lock");
+        paths.extend(lock.is_file().then_some(lock));
+        let files = self.files.keys().cloned().collect();
+        paths.extend(Settings::find(&folder, &files)?.read);
+        Ok(paths)
+    }
+
     /// When the last of the files was changed.
     #[must_use]
     pub fn newest(&self, folder: &Path) -> Option<SystemTime> {
@@ -281,6 +301,49 @@ fn is_generated(folder: &Path) -> bool {
     read.is_ok() && start.contains("\"made_by\"") && start.contains("\"hankel\"")
 }
 
+/// What counts of a configuration file of cargo's, and of those that it includes: the nearest first, as cargo looks
+/// settings up. Each file is read once.
+fn read_configuration(
+    file: &Path,
+    seen: &mut BTreeSet<PathBuf>,
+    configuration: &mut Vec<Table>,
+) -> Result<(), InputError> {
+    // Other tables say how to fetch, link, print, and where to: SPIR-V does not follow from these.
+    const TABLES: [&str; 6] = ["env", "include", "patch", "paths", "profile", "unstable"];
+    if !seen.insert(file.to_owned()) {
+        return Ok(());
+    }
+    let mut table = read_toml(file)?;
+    table.retain(|name, _| TABLES.contains(&name));
+    let included: Vec<PathBuf> = match table.get("include") {
+        Some(Value::Array(all)) => all.iter().filter_map(included_path).collect(),
+        Some(one) => included_path(one).into_iter().collect(),
+        None => Vec::new(),
+    };
+    if !table.is_empty() {
+        configuration.push(table);
+    }
+    let folder = file.parent().unwrap_or(Path::new("."));
+    // A later one has precedence over those before it.
+    for path in included.iter().rev() {
+        let path = normal(&folder.join(path));
+        // cargo refuses one that is not there, unless it is optional.
+        if path.is_file() {
+            read_configuration(&path, seen, configuration)?;
+        }
+    }
+    Ok(())
+}
+
+/// The path in an entry of `include`: text, or a table.
+fn included_path(value: &Value) -> Option<PathBuf> {
+    let path = match value {
+        Value::Table(table) => table.get("path")?,
+        other => other,
+    };
+    path.as_str().map(PathBuf::from)
+}
+
 /// What counts of cargo's settings.
 struct Settings {
     /// Tables of configuration files, nearest first.
@@ -288,15 +351,14 @@ struct Settings {
     /// What the crates inherit from the Cargo.toml of their workspaces, and what the workspace
     /// decides.
     workspaces: BTreeMap<String, Value>,
+    /// The files that these are from.
+    read: BTreeSet<PathBuf>,
 }
 
 impl Settings {
     /// For the crate in `folder`, with the files of its record: the Cargo.toml among them are those
     /// of the crates in folders that belong to it.
     fn find(folder: &Path, files: &BTreeSet<String>) -> Result<Self, InputError> {
-        // Other tables say how to fetch, link, print, and where to: SPIR-V does not follow from
-        // these.
-        const TABLES: [&str; 6] = ["env", "include", "patch", "paths", "profile", "unstable"];
         let mut configuration = Vec::new();
         let home = std::env::var_os("CARGO_HOME")
             .map(PathBuf::from)
@@ -308,19 +370,15 @@ impl Settings {
                 .map(|name| place.join(name))
                 .into_iter()
                 .find(|file| file.is_file());
-            let Some(file) = file.filter(|file| seen.insert(file.clone())) else {
-                continue;
-            };
-            let mut table = read_toml(&file)?;
-            table.retain(|name, _| TABLES.contains(&name));
-            if !table.is_empty() {
-                configuration.push(table);
+            if let Some(file) = file {
+                read_configuration(&file, &mut seen, &mut configuration)?;
             }
         }
         let mut workspaces = BTreeMap::new();
         let root = workspace_of(folder)?;
         let mut keep = |root: &Path, path: &[&str]| -> Result<(), InputError> {
             let manifest = root.join("Cargo.toml");
+            seen.insert(manifest.clone());
             let mut value = Value::Table(read_toml(&manifest)?);
             for key in path {
                 match value.get(key) {
@@ -355,6 +413,7 @@ impl Settings {
         Ok(Self {
             configuration,
             workspaces,
+            read: seen,
         })
     }
 

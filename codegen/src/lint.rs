@@ -9,7 +9,7 @@
 //! constant once in each turn, and is compared with a constant in the only place where the loop
 //! is left. Specialisation constants are constants here: they are when a pipeline is made.
 //!
-//! Findings are no errors: a filter whose radius is an input needs its loop. `hankel check` fails
+//! Findings are not errors: a filter whose radius is an input needs its loop. `hankel check` fails
 //! on more than a budget allows, and the project's own tests hold every kernel to none that maps
 //! rows to rows.
 
@@ -32,7 +32,7 @@ pub struct Finding {
     pub function: String,
     /// What it is.
     pub construct: Construct,
-    /// What is indexed, or why the number of turns is not known.
+    /// What is indexed, or why the number of iterations is not known.
     pub message: String,
     /// Line in the source, from 1, if that was given.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -43,9 +43,9 @@ pub struct Finding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Construct {
-    /// An index that is no constant, into a function's own array, vector or matrix.
+    /// An index that is not constant, into a function's own array, vector or matrix.
     DynamicIndex,
-    /// A loop without a constant number of turns.
+    /// A loop without a constant number of iterations.
     Loop,
 }
 
@@ -130,7 +130,7 @@ impl<'a> Lint<'a> {
                 continue;
             }
             if let Some(what) = self.own(base) {
-                let message = format!("{what} is indexed by what is no constant");
+                let message = format!("{what} has an index that is not constant");
                 let span = self.function.expressions.get_span(handle);
                 self.found.push((Construct::DynamicIndex, message, span));
             }
@@ -215,7 +215,7 @@ impl<'a> Lint<'a> {
         let condition = match (turn.exits, turn.condition) {
             (0, _) => return Err("it is never left"),
             (1, Some(condition)) => condition,
-            (1, None) => return Err("it is left from where not every turn comes"),
+            (1, None) => return Err("it is left at a place that not every iteration reaches"),
             _ => return Err("it is left in several places"),
         };
         let counter = self.compared(condition, turn)?;
@@ -227,13 +227,13 @@ impl<'a> Lint<'a> {
         let in_all = self.stores(turn.blocks, counter);
         let step = match values[..] {
             [value] if in_all == 1 && !self.is_passed(counter) => value,
-            _ => return Err("its counter does not change once in each turn"),
+            _ => return Err("its counter does not change exactly once in each iteration"),
         };
         if self.linear(step, turn) != Some((counter, true)) {
-            return Err("its counter changes by what is no constant");
+            return Err("its counter does not change by a constant");
         }
         if !self.starts_constant(counter, around) {
-            return Err("its counter starts from what is no constant");
+            return Err("its counter does not start from a constant");
         }
         Ok(())
     }
@@ -254,13 +254,13 @@ impl<'a> Lint<'a> {
             right,
         } = self.function.expressions[condition]
         else {
-            return Err("what ends it is no comparison of a counter");
+            return Err("the loop does not end by comparing a counter");
         };
         let counters = [left, right].map(|side| self.linear(side, turn));
         match (counters, self.is_constant(left), self.is_constant(right)) {
             ([Some((counter, _)), _], _, true) | ([_, Some((counter, _))], true, _) => Ok(counter),
-            ([None, None], ..) => Err("what ends it is no comparison of a counter"),
-            _ => Err("its counter is compared with what is no constant"),
+            ([None, None], ..) => Err("the loop does not end by comparing a counter"),
+            _ => Err("its counter is not compared with a constant"),
         }
     }
 

@@ -48,7 +48,7 @@ pub fn scaffold(folder: &Path, dsl: &Dsl) -> Result<Vec<PathBuf>> {
         });
     if !fits {
         return Err(fail(format!(
-            "`{name}` is no name for a crate: use small letters, digits, - and _, a letter first"
+            "`{name}` is not a name for a crate: use small letters, digits, - and _, a letter first"
         )));
     }
     if OTHER_CRATES.contains(&name.as_str())

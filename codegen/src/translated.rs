@@ -107,7 +107,6 @@ impl Translated {
         // An edit above a kernel moves its line, and nothing else.
         let kernel = Kernel {
             line: 0,
-            licence: String::new(),
             ..kernel.clone()
         };
         let description = serde_json::to_string(&kernel).ok()?;

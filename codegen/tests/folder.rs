@@ -408,7 +408,7 @@ fn a_check_shows_what_differs() {
     assert!(
         report
             .to_string()
-            .contains("a build of this folder was stopped"),
+            .contains("a build of this folder was interrupted"),
         "{report}"
     );
     // An editor's own files do not.
@@ -451,7 +451,7 @@ fn budgets_are_read() {
     }
     fs::write(&path, vec![b'#'; 2 << 20]).unwrap();
     let error = Config::read(&path).unwrap_err().to_string();
-    assert!(error.contains("more than the 1 MiB"), "{error}");
+    assert!(error.contains("the limit of 1 MiB"), "{error}");
 }
 
 /// A crate with a path dependency, a workspace and a lock file, and the record of a build of it.
@@ -610,6 +610,51 @@ fn a_record_of_inputs_follows_what_was_read() {
             expected
         );
     }
+}
+
+#[test]
+fn configuration_files_that_others_include_count() {
+    let place = tempfile::tempdir().unwrap();
+    let names = write_crates(place.path());
+    let folder = place.path().join("a");
+    let write = |path: &str, text: &str| {
+        let path = folder.join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    };
+    // In a circle, too: each is read once.
+    write(
+        ".cargo/config.toml",
+        "include = [{ path = \"one.toml\" }, \"../two.toml\"]\n",
+    );
+    write(".cargo/one.toml", "include = \"config.toml\"\n");
+    write("two.toml", "[env]\nHANKEL_TEST_WEIGHT = \"1\"\n");
+    let recorded = Inputs::take(&folder, &names).unwrap();
+    assert_eq!(recorded.changes(&folder), [""; 0]);
+    let paths = recorded.paths(&folder).unwrap();
+    for name in [
+        ".cargo/config.toml",
+        ".cargo/one.toml",
+        "two.toml",
+        "src/lib.rs",
+        "data",
+    ] {
+        assert!(paths.contains(&folder.join(name)), "{name}: {paths:?}");
+    }
+    for name in ["Cargo.lock", "Cargo.toml", "coef.txt"] {
+        assert!(
+            paths.contains(&place.path().join(name)),
+            "{name}: {paths:?}"
+        );
+    }
+    write("two.toml", "[env]\nHANKEL_TEST_WEIGHT = \"2\"\n");
+    assert_eq!(
+        recorded.changes(&folder),
+        [
+            "the environment variable `HANKEL_TEST_WEIGHT` has changed",
+            "cargo's configuration or the workspace's Cargo.toml has changed"
+        ]
+    );
 }
 
 /// The folder that a build script watches when it says nothing is the whole package: with the

@@ -62,35 +62,35 @@ fn other_loops_are_found_with_the_reason() {
     for (body, why) in [
         (
             "for (var i = 0u; i < n; i++) { rows[id.x].v.x += 1.0; }",
-            "its counter is compared with what is no constant",
+            "its counter is not compared with a constant",
         ),
         (
             "for (var i = n; i < 4u; i++) { rows[id.x].v.x += 1.0; }",
-            "its counter starts from what is no constant",
+            "its counter does not start from a constant",
         ),
         (
             "var i = 0u; if id.y > 3u { i = 1u; } while (i < 4u) { rows[id.x].v.x += 1.0; i++; }",
-            "its counter starts from what is no constant",
+            "its counter does not start from a constant",
         ),
         (
             "for (var i = 0u; i < 4u; i += n) { rows[id.x].v.x += 1.0; }",
-            "its counter changes by what is no constant",
+            "its counter does not change by a constant",
         ),
         (
             "var i = 1u; while (i < 64u) { i *= 3u; }",
-            "its counter changes by what is no constant",
+            "its counter does not change by a constant",
         ),
         (
             "var i = 0u; while (i < 4u) { i += 0u; }",
-            "its counter changes by what is no constant",
+            "its counter does not change by a constant",
         ),
         (
             "for (var i = 0u; i < 9u; i++) { if rows[i].v.x > 0.0 { i++; } }",
-            "its counter does not change once in each turn",
+            "its counter does not change exactly once in each iteration",
         ),
         (
             "var i = 0u; while (i < 9u) { if rows[i].v.x > 0.0 { continue; } i++; }",
-            "its counter does not change once in each turn",
+            "its counter does not change exactly once in each iteration",
         ),
         (
             "for (var i = 0u; i < 4u; i++) { if rows[i].v.x > 0.0 { break; } }",
@@ -102,19 +102,19 @@ fn other_loops_are_found_with_the_reason() {
         ),
         (
             "var i = 0u; loop { i++; if n > 2u { if i > 3u { break; } } }",
-            "it is left from where not every turn comes",
+            "it is left at a place that not every iteration reaches",
         ),
         (
             "var x = 1.0; while (x < 4.0) { x += 1.0; }",
-            "what ends it is no comparison of a counter",
+            "the loop does not end by comparing a counter",
         ),
         (
             "while (rows[id.x].v.x < 4.0) { rows[id.x].v.x += 1.0; }",
-            "what ends it is no comparison of a counter",
+            "the loop does not end by comparing a counter",
         ),
         (
             "for (var i = 0u; i < 4u && rows[i].v.x > 0.0; i++) { rows[i].v.x -= 1.0; }",
-            "what ends it is no comparison of a counter",
+            "the loop does not end by comparing a counter",
         ),
         ("loop { rows[id.x].v.x += 1.0; }", "it is never left"),
     ] {
@@ -132,7 +132,7 @@ fn other_loops_are_found_with_the_reason() {
         "var j = 0u; for (var i = 0u; i < 3u; i++) { while (j < 3u) { rows[i].v.x += 1.0; j++; } }",
     );
     assert_eq!(found.len(), 1, "{found:?}");
-    assert!(found[0].message.contains("starts"), "{found:?}");
+    assert!(found[0].message.contains("does not start"), "{found:?}");
 }
 
 #[test]
@@ -140,26 +140,26 @@ fn dynamic_indices_into_what_is_not_memory_are_found() {
     for (body, what) in [
         (
             "var a = array<f32, 3>(); rows[id.x].v.x = a[id.y];",
-            "`a` is indexed",
+            "`a` has an index",
         ),
         (
             "var a = array<f32, 3>(); a[id.y] = 1.0; rows[id.x].v.x = a[1];",
-            "`a` is indexed",
+            "`a` has an index",
         ),
         (
             "var m = mat3x3<f32>(); rows[id.x].v.x = m[1][id.y];",
-            "`m` is indexed",
+            "`m` has an index",
         ),
         (
             "let row = rows[id.x]; rows[id.y].v.x = row.a[n];",
-            "`rows` is indexed",
+            "`rows` has an index",
         ),
         (
             "var a = array<f32, 3>(); rows[id.x].v.x = part(&a, n);",
-            "`p` is indexed",
+            "`p` has an index",
         ),
-        ("rows[id.x].v.x = TABLE[id.y];", "indexed"),
-        ("rows[id.x].v.x = f32(id[n]);", "`id` is indexed"),
+        ("rows[id.x].v.x = TABLE[id.y];", "has an index"),
+        ("rows[id.x].v.x = f32(id[n]);", "`id` has an index"),
     ] {
         let found = findings(body);
         assert_eq!(found.len(), 1, "{body}: {found:?}");
@@ -187,7 +187,7 @@ fn findings_tell_lines_of_text() {
     assert_eq!(lines, [Some(13), Some(14)]);
     assert_eq!(
         found[0].to_string(),
-        "`kernel`, line 13: a dynamic index: `a` is indexed by what is no constant"
+        "`kernel`, line 13: a dynamic index: `a` has an index that is not constant"
     );
     assert_eq!(
         found[1].to_string(),

@@ -1,12 +1,12 @@
-//! A frame to take along: a graph as `frame.json` says it. Resources, passes and uniforms come from the
+//! An exported frame: a graph as `frame.json` says it. Resources, passes and uniforms come from the
 //! graph and from the kernels' descriptions; nothing here knows a technique, a pass or a format by name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use hankel_codegen::frame::{
     self, Attribute, BlendComponent, Buffer, BufferUsage, Call as ShaderCall, ColourTarget,
-    DepthTarget, Draft, Draw, Frame, Frozen, Indices, Pass as FramePass, Resource, SaidIn, Texture,
-    TextureUsage, Uniform,
+    DepthTarget, Draft, Draw, Frame, Frozen, Indices, Pass as FramePass, Resource, Texture,
+    TextureUsage, Uniform, WorkgroupsFrom,
 };
 use hankel_codegen::manifest::Versions;
 use hankel_dsl::glam::Vec4;
@@ -19,6 +19,7 @@ use crate::frame::{Show, graph as graph_of};
 use crate::graph::{
     Argument, Call, Graph, GraphError, Handle, Origin, Result, Shape, Surfaces, Target, Work,
 };
+use crate::lights::light_view;
 use crate::scattering::Scattering;
 use crate::scene::{Fit, Medium, Mesh, Scene, Shadow};
 use crate::techniques::Technique;
@@ -32,6 +33,8 @@ use crate::visibility::{CULL, FAR, SEEN, TOPOLOGY};
 pub fn export(scene: &Scene, file: &str, mesh: &Mesh) -> Result<Draft> {
     let (graph, _, picture) = graph_of(scene, mesh, Show::Picture)?;
     let shadow = &scene.shadow;
+    // Each light has its own in its uniforms.
+    let view = light_view(scene, &scene.lights[0], mesh);
     let shadow = frame::Shadow {
         technique: shadow.technique.name.into(),
         format: shadow.map.format.name().into(),
@@ -42,7 +45,7 @@ pub fn export(scene: &Scene, file: &str, mesh: &Mesh) -> Result<Draft> {
         fit: shadow.fit.name().into(),
         samples: shadow.samples,
         moment_bias: shadow.moment_bias,
-        depth_bias: shadow.depth_bias,
+        depth_bias: shadow.depth_bias.share(&view, shadow.radius()),
         leak_cut: shadow.leak_cut,
         mips: shadow.mips,
         anisotropy: shadow.anisotropy,
@@ -424,18 +427,19 @@ impl<'g> Export<'g> {
                     Stage::Vertex | Stage::Fragment => [1; 3],
                 };
                 let groups = |i: usize| invocations[i].div_ceil(threads[i].max(1));
-                let said_in = self.graph.said_in(call);
-                let said_in = said_in.map(|(handle, offset, dimensions)| SaidIn {
-                    buffer: self.name(handle),
-                    offset,
-                    dimensions,
-                });
+                let workgroups_from = self.graph.workgroups_from(call);
+                let workgroups_from =
+                    workgroups_from.map(|(handle, offset, dimensions)| WorkgroupsFrom {
+                        buffer: self.name(handle),
+                        offset,
+                        dimensions,
+                    });
                 FramePass::Compute {
                     label: label.into(),
                     call: self.call(label, call)?.0,
                     invocations,
                     workgroups: [0, 1, 2].map(groups),
-                    said_in,
+                    workgroups_from,
                 }
             }
             Work::FullScreen { vertex, fragment } => {

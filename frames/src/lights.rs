@@ -22,11 +22,16 @@ pub fn light_view(scene: &Scene, light: &Light, mesh: &Mesh) -> LightView {
         Fit::Scene => None,
         Fit::Camera => Some(camera_view(scene, &scene.camera, mesh)),
     };
+    // Other techniques shade from the light's middle alone.
+    let radius = match shadow.technique.is_soft {
+        true => light.area.radius,
+        false => 0.0,
+    };
     match (light.source, camera) {
         (Source::Spot(spot), camera) => {
             // A medium scatters in all of the cone.
             let camera = camera.filter(|_| scene.medium.is_none());
-            LightView::spot(&spot, mesh, size, margin, camera.as_ref())
+            LightView::spot(&spot, mesh, size, margin, camera.as_ref(), radius)
         }
         (Source::Directional { direction }, None) => LightView::new(direction, mesh, size, margin),
         (Source::Directional { direction }, Some(camera)) => {
@@ -34,7 +39,7 @@ pub fn light_view(scene: &Scene, light: &Light, mesh: &Mesh) -> LightView {
                 Some(_) => LightView::fitted_to_space,
                 None => LightView::fitted,
             };
-            fitted(direction, mesh, size, margin, &camera)
+            fitted(direction, mesh, size, margin, &camera, radius)
         }
     }
 }
@@ -88,7 +93,7 @@ pub fn uniform(scene: &Scene, lit: &Lit<'_>, show: Show) -> Uniform {
         ambient,
         bias_target: Vec4::from_array(shadow.map.bias_target),
         moment_bias: shadow.moment_bias,
-        depth_bias: shadow.depth_bias * view.slope,
+        depth_bias: shadow.depth_bias.share(view, shadow.radius()) * view.slope,
         light_leak: shadow.leak_cut,
         filter_radius: shadow.filter / 2,
     }
@@ -265,7 +270,7 @@ mod tests {
             light.area.radius = 0.2;
             light.area.shape = AreaShape::Square;
             let view = match light.source {
-                Source::Spot(spot) => LightView::spot(&spot, &mesh, size, 3, None),
+                Source::Spot(spot) => LightView::spot(&spot, &mesh, size, 3, None, 0.2),
                 Source::Directional { direction } => LightView::new(direction, &mesh, size, 3),
             };
             let area = area(&light, &view);

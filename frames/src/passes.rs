@@ -17,7 +17,7 @@ use hankel_shadows::soft::{Halving, Level, Pyramid, PyramidLines};
 
 use crate::graph::{AddCompute, AddDraw, Graph, Handle, Result, Shape, Surfaces};
 use crate::scene::{Area, DepthRange, Shadow};
-use crate::techniques::Map;
+use crate::techniques::{DepthBias, Map};
 
 /// How maps are looked up.
 pub const BILINEAR: Sampler = Sampler::new(Filter::Linear, Address::ClampToEdge);
@@ -96,8 +96,11 @@ pub struct Translucent {
     pub opacities: Handle,
 }
 
-/// What [`Graph::omit`] calls translucent casters that cast no shadow.
+/// What [`Graph::omit`] calls translucent casters that cast no shadow on surfaces.
 pub const TRANSLUCENT: &str = "shadow of translucent casters";
+
+/// The same of those that cast no shadow in a medium.
+pub const TRANSLUCENT_IN_MEDIUM: &str = "shadow of translucent casters in the medium";
 
 /// The name of `kernel` for textures with as many samples as the scene asks for: that of one sample has `_single` after
 /// the first word of its name.
@@ -216,14 +219,6 @@ const fn resolve_moments(given: &Given) -> &'static str {
         encoding::SYMMETRIC => "resolve_symmetric",
         _ => "resolve_plain",
     }
-}
-
-/// The mean of four power moments of each texel's samples, as one of [`POWER_MOMENTS`].
-///
-/// # Errors
-/// See [`light_depth`].
-pub fn moments(graph: &mut Graph, given: &Given, depth: Handle) -> Result<Handle> {
-    resolve_depth(graph, given, resolve_moments(given), depth).image([given.shadow.size; 2])
 }
 
 /// The map of four power moments, as one of [`POWER_MOMENTS`], of opaque and translucent casters.
@@ -614,7 +609,7 @@ pub fn shade(
 
 /// Begins the pass that draws the picture; `vertex` hands on at least `world`, `normal` and `colour`.
 fn surface<'g>(graph: &'g mut Graph, given: &Given, vertex: &'static str) -> AddDraw<'g> {
-    if given.shadow.depth_bias == 0.0 {
+    if given.shadow.depth_bias == DepthBias::NONE {
         graph.omit("depth bias", "it is 0");
     }
     let surfaces = Surfaces {

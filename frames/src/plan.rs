@@ -160,8 +160,10 @@ impl fmt::Display for Plan {
         };
         writeln!(
             f,
-            "the map is {fitted}: fitting makes texels {:.2} times smaller, depths {:.2} times shorter",
-            self.gain.area, self.gain.depth
+            "the map is {fitted}: a texel of the fitted map has {:.0} % of the area, and the map {:.0} % of the depth, \
+             that they have without fitting",
+            100.0 / self.gain.area,
+            100.0 / self.gain.depth
         )?;
         writeln!(
             f,
@@ -777,7 +779,7 @@ impl Reasons {
             say(count(|r| matches!(r, Reason::Error(Some(_)))), &far);
             say(
                 count(|r| matches!(r, Reason::Error(None))),
-                "too far off, as half their size is",
+                "not tried, as maps of half the size are too far off for one step to make up",
             );
             say(
                 count(|r| matches!(r, Reason::Slower)),
@@ -793,7 +795,7 @@ impl Reasons {
             );
             let is_chosen = chosen.is_some_and(|c| Self::names(c).any(|name| name == *method));
             let what = if is_chosen {
-                format!("{method} otherwise")
+                format!("{method}, in other configurations")
             } else {
                 method.clone()
             };

@@ -376,7 +376,7 @@ fn draws_are_checked_as_well() {
     };
     refused(
         g.draw("depth", bad, "light_depth").depth([4, 4]),
-        &["its clip_from_world: `light` is no buffer of Transform"],
+        &["its clip_from_world: `light` is not a buffer of Transform"],
     );
     let whole = shade(&mut g, surfaces, [normals; 2], "shade_hamburger")
         .arg("light", light)

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use hankel_dsl::glam::{DVec3, Vec3};
 use hankel_frames::measure::{Ask, Choices, Pictures, Session, Subject};
+use hankel_frames::passes::{TRANSLUCENT, TRANSLUCENT_IN_MEDIUM};
 use hankel_frames::plan::{Wanted, plan};
 use hankel_frames::scattering::{self, Scattering};
 use hankel_frames::scene::{CameraView, Fit, Light, Mesh, Scene, Source};
@@ -304,6 +305,98 @@ fn scattered_light_is_near_the_rays() {
         let marched = &compared.errors[..3];
         assert!(marched.is_sorted_by(|a, b| a.rms > b.rms), "{name}");
     }
+}
+
+/// A pane of glass over the ground, with light straight through it.
+fn under_glass(shadow: &str, medium: &str) -> (Scene, Mesh) {
+    let (scene, mut mesh) = parsed(&format!(
+        "[geometry]\nprocedural = 'empty'\n[camera]\neye = [9.0, 1.5, 0.0]\ntarget = [0.0, 1.2, 0.0]\nfov = 50.0\n\
+         [light]\ndirection = [0.05, -1.0, 0.0]\n[medium]\nextinction = 0.15\n{medium}\n\
+         [shadow]\nsize = 128\nfilter = 3\n{shadow}\n[output]\nwidth = 40\nheight = 22\n"
+    ));
+    mesh.fade(1.0);
+    let corners = [[-2.5, 2.5], [2.5, 2.5], [2.5, -2.5], [-2.5, -2.5]];
+    mesh.quad(corners.map(|[x, z]| Vec3::new(x, 3.0, z)));
+    mesh.paint(Vec3::ONE);
+    mesh.fade(0.8);
+    (scene, mesh)
+}
+
+/// Translucent casters shade a medium by their opacity, where what they are looked up in holds them, whatever the
+/// technique of the surfaces' shadows is.
+#[test]
+fn glass_shades_a_medium() {
+    for shadow in [
+        "technique = 'hamburger'",
+        "technique = 'hamburger'\nformat = 'rgba32float'",
+        "technique = 'pcf'",
+    ] {
+        let (scene, mesh) = under_glass(shadow, "");
+        let mut without = mesh.clone();
+        without.triangles.truncate(2);
+        for technique in ["prefiltered", "prefiltered-6"] {
+            let [glass, none] = [&mesh, &without].map(|mesh| by(&scene, mesh, technique, 1));
+            let (compared, _) = compare(&scene, &mesh, &[&glass, &none], &mut |_| ())
+                .unwrap()
+                .unwrap();
+            let [errors, unshaded] = [compared.errors[0], compared.errors[1]];
+            println!("{shadow:?}, {technique}: {errors}; without glass {unshaded}");
+            // It is a little too dark without any caster, too.
+            let lit = [errors, unshaded].map(|e| e.wrongly_lit);
+            assert!(lit[0] < 0.2 * lit[1], "{technique}: {errors}; {unshaded}");
+            assert!(
+                errors.rms < 0.6 * unshaded.rms,
+                "{technique}: {errors}; {unshaded}"
+            );
+        }
+    }
+}
+
+/// A map that surfaces have is not made again for the medium; what a technique cannot show is said.
+#[test]
+fn glass_in_a_medium_is_made_once_and_what_is_left_out_is_said() {
+    let told = |shadow: &str, medium: &str| {
+        let (scene, mesh) = under_glass(shadow, medium);
+        let (graph, ..) = graph_of(&scene, &mesh, Show::Picture).unwrap();
+        let omitted = graph.omitted().iter().map(|o| o.what.to_string());
+        let passes = graph.passes().iter().map(|pass| pass.label.to_string());
+        (passes.collect::<Vec<_>>(), omitted.collect::<Vec<_>>())
+    };
+    let count = |passes: &[String], label: &str| passes.iter().filter(|p| *p == label).count();
+    for technique in ["prefiltered", "prefiltered-6"] {
+        let medium = format!("technique = '{technique}'");
+        for (shadow, resolves, halves) in [
+            ("technique = 'hamburger'", 1, 1),
+            ("technique = 'vsm'", 1, 1),
+            // Another format; and one whose surfaces have no map.
+            ("technique = 'hamburger'\nformat = 'rgba32float'", 2, 2),
+            ("technique = 'pcf'", 1, 1),
+        ] {
+            let (passes, omitted) = told(shadow, &medium);
+            assert_eq!(count(&passes, "resolve"), resolves, "{shadow}: {passes:?}");
+            assert_eq!(
+                count(&passes, "blur rows"),
+                resolves,
+                "{shadow}: {passes:?}"
+            );
+            assert_eq!(
+                count(&passes, "blend first half"),
+                halves,
+                "{shadow}: {passes:?}"
+            );
+            let is_left_out = |what: &String| what.starts_with(TRANSLUCENT);
+            assert!(!omitted.iter().any(is_left_out), "{shadow}: {omitted:?}");
+        }
+    }
+    let (_, omitted) = told("technique = 'hamburger'", "technique = 'ray-marching'");
+    assert!(
+        omitted.contains(&TRANSLUCENT_IN_MEDIUM.into()),
+        "{omitted:?}"
+    );
+    assert!(!omitted.contains(&TRANSLUCENT.into()), "{omitted:?}");
+    // Of surfaces it is said as without a medium.
+    let (_, omitted) = told("technique = 'esm'", "technique = 'prefiltered'");
+    assert!(omitted.contains(&TRANSLUCENT.into()), "{omitted:?}");
 }
 
 fn small(steps: &[u32]) -> Choices {

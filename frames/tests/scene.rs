@@ -10,7 +10,7 @@ use hankel_frames::scene::{
     Area, AreaShape, DepthRange, Fit, Geometry, Light, MAX_TRIANGLES, MAX_VERTICES, Medium, Mesh,
     Procedural, Scene, SceneError, Shadow, Source,
 };
-use hankel_frames::techniques::Technique;
+use hankel_frames::techniques::{DepthBias, Technique};
 
 const LEAST: &str = r#"
 [geometry]
@@ -51,9 +51,9 @@ fn the_least_scene_has_the_documented_defaults() {
     assert_eq!(medium.medium, Some(Medium::default()));
     assert_eq!(scene.shadow.moment_bias, 6e-5);
     let pcf = parse(&format!("{LEAST}[shadow]\ntechnique = 'pcf'")).unwrap();
-    assert_eq!(pcf.shadow.depth_bias, 2e-3);
+    assert_eq!(pcf.shadow.depth_bias, DepthBias::COMPARED);
     let hausdorff = parse(&format!("{LEAST}[shadow]\ntechnique = 'hausdorff'")).unwrap();
-    assert_eq!(hausdorff.shadow.depth_bias, 0.0);
+    assert_eq!(hausdorff.shadow.depth_bias, DepthBias::NONE);
     assert_eq!(hausdorff.shadow.moment_bias, 5.7e-5);
     let unit = parse(&format!("{LEAST}[shadow]\ndepth_range = 'unit'")).unwrap();
     assert_eq!(unit.shadow.moment_bias, 3e-5);
@@ -150,13 +150,46 @@ fn every_field_is_read() {
             fit: Fit::Camera,
             samples: [16, 24],
             moment_bias: 1e-4,
-            depth_bias: 0.001,
+            depth_bias: DepthBias::Share(0.001),
             leak_cut: 0.1,
             mips: true,
             anisotropy: 8,
         }
     );
     assert_eq!((scene.width, scene.height), (320, 200));
+}
+
+/// Another technique changes nothing of what a scene says but biases, and the scene's own nothing at all.
+#[test]
+fn another_technique_keeps_what_belongs_to_none() {
+    let own = parse(&format!(
+        "{LEAST}[shadow]\ntechnique = 'hamburger'\nformat = 'rgba32float'\nsize = 512\nmultisampling = 1\n\
+         filter = 9\nfit = 'camera'\nsamples = [16, 24]\nmoment_bias = 1e-4\ndepth_bias = 0.001\nleak_cut = 0.1\n\
+         mips = true\nanisotropy = 8"
+    ))
+    .unwrap()
+    .shadow;
+    assert_eq!(own.by(own.technique, own.map), own);
+    assert_eq!(own.by_technique(own.technique), own);
+    let pcss = Technique::named("pcss").unwrap();
+    let other = own.by_technique(pcss);
+    let wanted = Shadow {
+        technique: pcss,
+        map: pcss.maps[0],
+        moment_bias: pcss.maps[0].moment_bias,
+        depth_bias: pcss.depth_bias,
+        ..own
+    };
+    assert_eq!(other, wanted);
+    assert_eq!((other.samples, other.leak_cut), ([16, 24], 0.1));
+    // The bias of moments is for the format that they are in.
+    let map = own.technique.maps[0];
+    let wanted = Shadow {
+        map,
+        moment_bias: map.moment_bias,
+        ..own
+    };
+    assert_eq!(own.by(own.technique, map), wanted);
 }
 
 #[test]
@@ -584,13 +617,18 @@ impl Model {
     }
 
     fn load_bytes(&self, bytes: &[u8]) -> Result<Mesh, SceneError> {
+        self.load_on(bytes, 0.0, 1.0)
+    }
+
+    /// The same on a ground, and as translucent.
+    fn load_on(&self, bytes: &[u8], ground: f32, opacity: f32) -> Result<Mesh, SceneError> {
         let file = self.folder.path().join("m.gltf");
         fs::write(&file, bytes).unwrap();
         let mut scene = parse(LEAST).unwrap();
         scene.geometry = Geometry::Model {
             file,
-            ground: 0.0,
-            opacity: 1.0,
+            ground,
+            opacity,
         };
         scene.mesh()
     }
@@ -813,6 +851,71 @@ fn colours_of_materials_are_from_0_to_1() {
     // No 32-bit float: refused by the JSON reader, or as infinite, by how serde_json is built.
     let message = load(serde_json::json!([1e39, 1, 1, 1])).unwrap_err();
     assert!(message.contains("m.gltf"), "{message}");
+}
+
+/// The modes of alpha as glTF has them, without textures: opaque materials ignore it, blended ones have it as their
+/// opacity, and masked ones are there or not.
+#[test]
+fn alpha_of_materials_is_opacity() {
+    let load = |materials: [serde_json::Value; 2], ground, opacity| {
+        let mut model = Model::new();
+        model.json["materials"] = materials.into_iter().collect();
+        let primitive = model.json["meshes"][0]["primitives"][0].clone();
+        let with = |material: u32| {
+            let mut primitive = primitive.clone();
+            primitive["material"] = material.into();
+            primitive
+        };
+        model.json["meshes"][0]["primitives"] = serde_json::json!([with(0), with(1)]);
+        model.json["nodes"] = serde_json::json!([{ "mesh": 0 }]);
+        model.json["scenes"][0]["nodes"] = serde_json::json!([0]);
+        fs::write(model.folder.path().join("data file.bin"), &model.buffer).unwrap();
+        let text = model.json.to_string();
+        model.load_on(text.as_bytes(), ground, opacity)
+    };
+    let material = |alpha: f32, mode: &str, cutoff: Option<f32>| {
+        let mut material = serde_json::json!({
+            "alphaMode": mode,
+            "pbrMetallicRoughness": { "baseColorFactor": [1.0, 1.0, 1.0, alpha] },
+        });
+        if let Some(cutoff) = cutoff {
+            material["alphaCutoff"] = cutoff.into();
+        }
+        material
+    };
+    let opaque = || material(0.25, "OPAQUE", None);
+    let blended = || material(0.25, "BLEND", None);
+    // Four vertices and four triangles each, and two triangles of ground.
+    let mesh = load([opaque(), blended()], 0.0, 1.0).unwrap();
+    assert_eq!(mesh.all_opacities(), [[1.0; 4], [0.25; 4]].concat());
+    assert_eq!((mesh.opaque().len(), mesh.translucent().len()), (4, 4));
+    let mesh = load([blended(), opaque()], 2.0, 0.5).unwrap();
+    let wanted = [[0.125; 4], [0.5; 4], [1.0; 4]].concat();
+    assert_eq!(mesh.all_opacities(), wanted);
+    assert_eq!((mesh.opaque().len(), mesh.translucent().len()), (2, 8));
+    // A blended material of alpha 1 is as an opaque one.
+    let mesh = load([material(1.0, "BLEND", None), opaque()], 0.0, 1.0).unwrap();
+    assert!(mesh.translucent().is_empty());
+    for (masked, count) in [
+        (material(0.5, "MASK", None), 8),
+        (material(0.49, "MASK", None), 4),
+        (material(0.49, "MASK", Some(0.3)), 8),
+        (material(1.0, "MASK", Some(1.1)), 4),
+    ] {
+        let mesh = load([opaque(), masked], 0.0, 1.0).unwrap();
+        assert_eq!(mesh.opaque().len(), count);
+        assert!(mesh.translucent().is_empty());
+    }
+    // With nothing opaque there is nothing to see a shadow on.
+    let message = load([blended(), blended()], 0.0, 1.0).unwrap_err();
+    let message = message.to_string();
+    assert!(
+        message.contains("m.gltf") && message.contains("`ground`"),
+        "{message}"
+    );
+    assert!(load([blended(), blended()], 2.0, 1.0).is_ok());
+    let hidden = || material(0.1, "MASK", None);
+    assert!(load([hidden(), hidden()], 0.0, 1.0).is_err());
 }
 
 #[test]

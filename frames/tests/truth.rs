@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hankel_frames::scene::{Mesh, Scene, Shadow};
-use hankel_frames::techniques::{self, Map, Technique};
+use hankel_frames::techniques::{self, DepthBias, Map, Technique};
 use hankel_frames::truth::{Arriving, by_rays, by_technique, filtered};
 
 /// A scene whose surfaces are all shaded as if they faced the light, so that no pixel is left out of a comparison.
@@ -24,7 +24,7 @@ fn scene(geometry: &str, size: u32, shadow: &str) -> (Scene, Mesh) {
     (scene, mesh)
 }
 
-fn technique(scene: &Scene, mesh: &Mesh) -> Arriving {
+fn technique_of(scene: &Scene, mesh: &Mesh) -> Arriving {
     by_technique(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -64,7 +64,7 @@ fn with_map(technique: &str, map: &Map) -> String {
 fn lower_bounds_are_nowhere_darker_than_all_samples_filtered() {
     for geometry in ["box", "yard"] {
         for bias in ["", "depth_bias = 0.002"] {
-            let mut truths: Vec<(f32, Arriving)> = Vec::new();
+            let mut truths: Vec<(DepthBias, Arriving)> = Vec::new();
             for t in techniques::ALL.iter().filter(|t| t.is_lower_bound) {
                 for map in t.maps {
                     let settings = format!("{}\n{bias}", with_map(t.name, map));
@@ -75,7 +75,7 @@ fn lower_bounds_are_nowhere_darker_than_all_samples_filtered() {
                         truths.push((bias, filtered(&scene, &mesh, &mut |_| ())));
                     }
                     let truth = truths.iter().find(|(b, _)| *b == bias).map(|(_, t)| t);
-                    let picture = technique(&scene, &mesh);
+                    let picture = technique_of(&scene, &mesh);
                     let by = darker(&picture, truth.unwrap());
                     println!("{geometry}, {settings:?}: darker by {by}");
                     assert!(
@@ -93,7 +93,7 @@ fn lower_bounds_are_nowhere_darker_than_all_samples_filtered() {
 fn lower_bounds_of_single_samples_are_nowhere_darker() {
     let mut truths: Vec<Arriving> = Vec::new();
     for bias in ["", "depth_bias = 0.002"] {
-        let mut all: Vec<(f32, Arriving)> = Vec::new();
+        let mut all: Vec<(DepthBias, Arriving)> = Vec::new();
         let techniques = techniques::ALL.iter();
         for t in techniques.filter(|t| t.is_lower_bound) {
             for map in t.maps {
@@ -104,7 +104,7 @@ fn lower_bounds_of_single_samples_are_nowhere_darker() {
                     all.push((bias, filtered(&scene, &mesh, &mut |_| ())));
                 }
                 let truth = all.iter().find(|(b, _)| *b == bias).map(|(_, t)| t);
-                let by = darker(&technique(&scene, &mesh), truth.unwrap());
+                let by = darker(&technique_of(&scene, &mesh), truth.unwrap());
                 println!("{settings:?}: darker by {by}");
                 assert!(by <= allowed(&scene.shadow), "{settings:?}: darker by {by}");
             }
@@ -124,9 +124,59 @@ fn filtering_comparisons_of_all_samples_is_the_truth() {
         let shadow = format!("technique = 'pcf-gaussian'\nfilter = {filter}\nfit = '{fit}'");
         let (scene, mesh) = scene("yard", 256, &shadow);
         let truth = filtered(&scene, &mesh, &mut |_| ());
-        let errors = technique(&scene, &mesh).errors(&truth).unwrap();
+        let errors = technique_of(&scene, &mesh).errors(&truth).unwrap();
         // A place is rounded to 256 * 2^-24 texels.
         assert!(errors.worst < 1e-4, "{filter}, {fit}: {errors}");
+    }
+}
+
+/// With its default bias, a comparison of depths leaves open ground lit, whatever the map's texels and the filter are.
+#[test]
+fn open_ground_does_not_shade_itself() {
+    for technique in ["pcf", "pcf-gaussian", "pcf-gaussian-tiles"] {
+        for (size, filter) in [(64, 1), (64, 9), (256, 5), (256, 15), (512, 3)] {
+            let shadow = format!("technique = '{technique}'\nfilter = {filter}\nmultisampling = 1");
+            let (scene, mesh) = scene("empty", size, &shadow);
+            let picture = technique_of(&scene, &mesh);
+            let darkest = picture.values.iter().copied().fold(1.0, f32::min);
+            assert!(darkest > 0.999, "{technique}, {size}, {filter}: {darkest}");
+        }
+    }
+}
+
+/// The default bias of comparisons is near the best one for scenes that differ, and far nearer the rays than none that
+/// follows the map.
+#[test]
+fn a_depth_bias_that_follows_the_map_is_near_the_best() {
+    for name in ["contact", "foliage", "room", "wires"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenes/{name}.toml"));
+        let mut scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        (scene.width, scene.height) = (96, 54);
+        scene.shadow = scene
+            .shadow
+            .by_technique(Technique::named("pcf-gaussian").unwrap());
+        scene.shadow = Shadow {
+            size: 256,
+            filter: 5,
+            multisampling: 1,
+            ..scene.shadow
+        };
+        let mesh = scene.mesh().unwrap_or_else(|e| panic!("{e}"));
+        let truth = by_rays(&scene, &mesh, &mut |_| ());
+        let error = |bias: DepthBias| {
+            let mut scene = scene.clone();
+            scene.shadow.depth_bias = bias;
+            technique_of(&scene, &mesh).errors(&truth).unwrap().rms
+        };
+        let default = error(scene.shadow.technique.depth_bias);
+        let constant = error(DepthBias::Share(0.002));
+        let slopes = [0.5, 0.75, 1.5, 2.0].map(|slope| error(DepthBias::Slope(slope)));
+        println!(
+            "{name}: {default:.4}; 0.002 {constant:.4}; slopes of 0.5, 0.75, 1.5 and 2 {slopes:.4?}"
+        );
+        let best = slopes.into_iter().fold(default, f64::min);
+        assert!(default < 1.25 * best, "{name}: {default} {slopes:?}");
+        assert!(default < 0.5 * constant, "{name}: {default} {constant}");
     }
 }
 
@@ -172,7 +222,7 @@ fn more_moments_and_warps_leak_less() {
         let format = map.format.name();
         let shadow = format!("technique = '{name}'\nformat = '{format}'");
         let (scene, mesh) = scene("yard", 1024, &shadow);
-        let errors = technique(&scene, &mesh).errors(&sharp).unwrap();
+        let errors = technique_of(&scene, &mesh).errors(&sharp).unwrap();
         println!("{name}: {errors}; without shadow {without}");
         assert!(errors.rms < 0.8 * without, "{name}: {errors}");
         errors.wrongly_lit
@@ -201,7 +251,7 @@ fn more_terms_of_a_series_leak_less() {
     let without = lit.errors(&sharp).unwrap();
     let errors = |shadow: &str| {
         let (scene, mesh) = scene("yard", 1024, shadow);
-        let errors = technique(&scene, &mesh).errors(&sharp).unwrap();
+        let errors = technique_of(&scene, &mesh).errors(&sharp).unwrap();
         println!("{shadow}: {errors}; without shadow {without}");
         errors
     };
@@ -234,7 +284,7 @@ fn nothing_arrives_where_a_surface_is_turned_away() {
         faced.normals.fill(-scene.lights[0].direction());
         let pictures = |mesh: &Mesh| {
             [
-                technique(&scene, mesh),
+                technique_of(&scene, mesh),
                 by_rays(&scene, mesh, &mut |_| ()),
                 filtered(&scene, mesh, &mut |_| ()),
             ]

@@ -3,7 +3,6 @@
 
 use std::ffi::{OsStr, OsString};
 use std::fmt;
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -15,7 +14,7 @@ use hankel_dsl::native::plugin;
 use hankel_dsl::native::{Call, CallError, Entry};
 use hankel_system::input;
 use hankel_system::overlooked::{LastBuild, RecordError};
-use hankel_system::process::Program as Running;
+use hankel_system::process::{Said, follow};
 use serde::Deserialize;
 
 use crate::device::{Program, Shader};
@@ -485,33 +484,14 @@ impl Package {
             .arg("--target-dir")
             .arg(&target_dir)
             .arg("--")
-            .args(flags)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        let mut cargo = Running::start(&mut command).map_err(|e| no_cargo(&e))?;
-        // Both pipes are drained at once: either could fill up while the other is waited for.
-        let mut stdout = cargo.child.stdout.take();
-        let messages = std::thread::spawn(move || {
-            let mut text = Vec::new();
-            if let Some(out) = &mut stdout {
-                // A pipe that breaks ends the text; cargo's status tells the rest.
-                let _ = out.read_to_end(&mut text);
-            }
-            text
-        });
-        let mut words = String::new();
-        if let Some(stderr) = cargo.child.stderr.take() {
-            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                progress(&line);
-                words.push_str(&line);
-                words.push('\n');
-            }
-        }
-        let status = cargo.wait().map_err(|e| no_cargo(&e))?;
-        let messages = messages.join().unwrap_or_default();
+            .args(flags);
+        let Said {
+            status,
+            stdout: messages,
+            stderr: words,
+        } = follow(&mut command, progress).map_err(|e| no_cargo(&e))?;
         let mut diagnostics = String::new();
         let mut library = None;
-        let messages = String::from_utf8_lossy(&messages);
         for line in messages.lines().filter(|l| !l.is_empty()) {
             match serde_json::from_str(line) {
                 Ok(Message::Compiler { message }) if message.level == "error" => {

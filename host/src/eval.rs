@@ -444,13 +444,13 @@ fn parse(scalar: Scalar, text: &str) -> Result<Number, String> {
         Scalar::U64 => {
             let number = text.parse().map(Number::U64);
             return number
-                .map_err(|_| format!("`{text}` is no whole number from 0 to {}", u64::MAX));
+                .map_err(|_| format!("`{text}` is not a whole number from 0 to {}", u64::MAX));
         }
         Scalar::I64 => {
             let number = text.parse().map(Number::I64);
             return number.map_err(|_| {
                 format!(
-                    "`{text}` is no whole number from {} to {}",
+                    "`{text}` is not a whole number from {} to {}",
                     i64::MIN,
                     i64::MAX
                 )

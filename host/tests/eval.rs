@@ -184,9 +184,12 @@ fn bad_tables_name_the_place_and_leave_no_output() {
         ("x,y\n1e99,2\n", &["column `x`", "too large for f32"]),
         (
             "x,y\n1,2\n3\n",
-            &["row 2 (line 3)", "1 cells, the header 2"],
+            &["row 2 (line 3)", "1 cells, the header has 2"],
         ),
-        ("x,y\n1,2,3\n", &["row 1 (line 2)", "3 cells, the header 2"]),
+        (
+            "x,y\n1,2,3\n",
+            &["row 1 (line 2)", "3 cells, the header has 2"],
+        ),
     ] {
         let input = folder.write("in.csv", text);
         let error = run(&mut NativeDevice::new(), &affine(), &input, &output, &[]).unwrap_err();

@@ -21,7 +21,8 @@ source=()
 if [ -n "${HANKEL_MANIFEST_PATH:-}" ]; then source=(--manifest-path "$HANKEL_MANIFEST_PATH"); fi
 budget=()
 if [ -n "${HANKEL_BUDGET:-}" ]; then budget=(--budget "$HANKEL_BUDGET"); fi
-read -r -a options <<<"${HANKEL_OPTIONS:-}"
+# Options may be on several lines. `read` ends with an error at the end of its input.
+read -r -d '' -a options <<<"${HANKEL_OPTIONS:-}" || true
 mkdir -p "$report" || exit 3
 
 # With `set -u`, bash before 4.4 takes an empty array for one that is not set.
@@ -38,7 +39,7 @@ checked=${PIPESTATUS[0]}
 
 compared=0
 if [ "${HANKEL_MATRIX:-false}" = true ]; then
-    read -r -a chosen <<<"${HANKEL_MATRIX_OPTIONS:-}"
+    read -r -d '' -a chosen <<<"${HANKEL_MATRIX_OPTIONS:-}" || true
     "$hankel" parity --matrix ${source[@]+"${source[@]}"} ${chosen[@]+"${chosen[@]}"} --html "$report/matrix.html" \
         --json "$report/matrix.json" --markdown "$report/matrix.md"
     compared=$?

@@ -18,7 +18,7 @@ fi
 target=$1
 out=${2:-release}
 case $target in *[!A-Za-z0-9_.-]* | [!a-z]*)
-    echo "$0: \`$target\` is no target: \`rustc --print target-list\` shows all" >&2
+    echo "$0: \`$target\` is not a target: \`rustc --print target-list\` shows all" >&2
     exit 2
     ;;
 esac

@@ -129,7 +129,7 @@ fn split(b: &mut Builder, binding: u32, sampler: Option<u32>) -> Result<(), Stri
     let combined = global(module, variable)
         .and_then(|v| v.result_type)
         .and_then(pointee)
-        .ok_or_else(|| format!("binding {binding} is no variable"))?;
+        .ok_or_else(|| format!("binding {binding} is not a variable"))?;
     let image = match global(module, combined) {
         Some(i) if i.class.opcode == Op::TypeSampledImage => match i.operands.first() {
             Some(Operand::IdRef(image)) => *image,

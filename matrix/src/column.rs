@@ -182,7 +182,7 @@ impl FromStr for Column {
             .find(|c| c.id() == name)
             .ok_or_else(|| {
                 let known: Vec<&str> = Self::ALL.iter().map(|c| c.id()).collect();
-                format!("`{name}` is no column; there are {}", known.join(", "))
+                format!("`{name}` is not a column; there are {}", known.join(", "))
             })
     }
 }

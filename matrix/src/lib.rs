@@ -42,6 +42,8 @@ pub fn serve(which: &str) -> Result<(), String> {
         "vulkan" => vulkan::serve(false),
         "vulkan-as-it-is" => vulkan::serve(true),
         "gl" => gl::serve(),
-        _ => Err(format!("`{which}` is no runner; there are vulkan and gl")),
+        _ => Err(format!(
+            "`{which}` is not a runner; there are vulkan and gl"
+        )),
     }
 }

@@ -237,7 +237,7 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
                     location: *location,
                     value: value(ty)?,
                 },
-                _ => return Err(format!("`{}` is no output of a stage", slot.name)),
+                _ => return Err(format!("`{}` is not an output of a stage", slot.name)),
             }
         }
     })

@@ -1,20 +1,20 @@
 //! Programs of others: started with a time limit, in a process group of their own, with all that
 //! they say kept.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
 pub use hankel_system::process::Finished;
-use hankel_system::process::{Log, Program};
+use hankel_system::process::{Log, Program, kill_group};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::job::{Driver, Kind, Reply};
 
-/// How a program let us down.
+/// How a program failed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Failure {
@@ -88,6 +88,12 @@ pub fn run(command: &mut Command, limit: Duration) -> Result<Finished, Failure> 
     Ok(hankel_system::process::run(command, limit)?)
 }
 
+/// Lines of a runner that nobody has asked for yet: more wait in its pipe.
+const MOST_LINES: usize = 64;
+
+/// Bytes of the longest line that a runner may write.
+const MOST_BYTES: u64 = 64 << 20;
+
 /// A program that answers one job after the other, see [`crate::job`].
 #[derive(Debug)]
 pub struct Runner {
@@ -118,12 +124,23 @@ impl Runner {
             log.follow(stderr)
                 .map_err(|e| Failure::refused(format!("cannot follow a program: {e}")))?;
         }
-        let (sender, lines) = channel();
+        let (sender, lines) = sync_channel(MOST_LINES);
         if let Some(stdout) = program.child.stdout.take() {
             thread::spawn(move || {
-                for line in BufReader::new(stdout).lines() {
-                    let Ok(line) = line else { break };
-                    if sender.send(line).is_err() {
+                let mut stdout = BufReader::new(stdout);
+                loop {
+                    let mut line = Vec::new();
+                    let read = stdout
+                        .by_ref()
+                        .take(MOST_BYTES)
+                        .read_until(b'\n', &mut line);
+                    // One that is longer ends here, and the rest is no answer.
+                    let is_whole = line.ends_with(b"\n") || (line.len() as u64) < MOST_BYTES;
+                    let line = String::from_utf8_lossy(&line);
+                    if !matches!(read, Ok(1..))
+                        || !is_whole
+                        || sender.send(line.trim_end().to_owned()).is_err()
+                    {
                         break;
                     }
                 }
@@ -136,27 +153,43 @@ impl Runner {
             log,
             driver: Driver::default(),
         };
-        runner.driver = runner.answer(limit, &|value| Driver::deserialize(value).ok())?;
+        runner.driver = runner.answer(limit, limit, &|value| Driver::deserialize(value).ok())?;
         Ok(runner)
     }
 
     /// Has a job done.
     ///
     /// # Errors
-    /// [`Failure::Refused`] or [`Failure::Lacks`] with the runner's words, or how it let us down.
+    /// [`Failure::Refused`] or [`Failure::Lacks`] with the runner's words, or how it failed.
     pub fn ask(&mut self, job: &impl Serialize, id: u64, limit: Duration) -> Result<(), Failure> {
         let mut line = serde_json::to_string(job)
             .map_err(|e| Failure::refused(format!("the job is no JSON: {e}")))?;
         line.push('\n');
+        let until = Instant::now() + limit;
+        // A runner that does not read lets this wait.
+        let (done, waits) = channel::<()>();
+        let group = self.program.group();
+        let watch = thread::spawn(move || {
+            let is_late = waits.recv_timeout(limit) == Err(RecvTimeoutError::Timeout);
+            if is_late {
+                kill_group(group);
+            }
+            is_late
+        });
         let written = self.input.as_mut().map(|input| {
             input
                 .write_all(line.as_bytes())
                 .and_then(|()| input.flush())
         });
+        drop(done);
+        if watch.join().unwrap_or(false) {
+            return Err(self.is_late(limit));
+        }
         if !matches!(written, Some(Ok(()))) {
             return Err(self.crashed());
         }
-        let reply = self.answer(limit, &|value| {
+        let left = until.saturating_duration_since(Instant::now());
+        let reply = self.answer(left, limit, &|value| {
             let reply: Reply = serde_json::from_value(value.clone()).ok()?;
             (reply.id == id).then_some(reply)
         })?;
@@ -185,13 +218,14 @@ impl Runner {
         matches!(self.program.try_wait(), Ok(None))
     }
 
-    /// Waits for a line that `take` takes; other lines are kept as words.
+    /// Waits for a line that `take` takes, for what is left of the limit; other lines are kept as words.
     fn answer<T>(
         &mut self,
+        left: Duration,
         limit: Duration,
         take: &dyn Fn(&Value) -> Option<T>,
     ) -> Result<T, Failure> {
-        let until = Instant::now() + limit;
+        let until = Instant::now() + left;
         loop {
             let left = until.saturating_duration_since(Instant::now());
             match self.lines.recv_timeout(left) {
@@ -202,16 +236,19 @@ impl Runner {
                     }
                     self.log.push(&format!("{line}\n"));
                 }
-                Err(RecvTimeoutError::Timeout) => {
-                    self.program.kill();
-                    return Err(Failure::TimedOut {
-                        program: self.program.name().to_owned(),
-                        seconds: limit.as_secs(),
-                        log: self.log.text(),
-                    });
-                }
+                Err(RecvTimeoutError::Timeout) => return Err(self.is_late(limit)),
                 Err(RecvTimeoutError::Disconnected) => return Err(self.crashed()),
             }
+        }
+    }
+
+    /// It has had its time: it ends.
+    fn is_late(&mut self, limit: Duration) -> Failure {
+        self.program.kill();
+        Failure::TimedOut {
+            program: self.program.name().to_owned(),
+            seconds: limit.as_secs(),
+            log: self.log.text(),
         }
     }
 

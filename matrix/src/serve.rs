@@ -34,7 +34,7 @@ pub(crate) fn serve<J: DeserializeOwned>(
     say(driver)?;
     for line in io::stdin().lock().lines() {
         let line = line.map_err(|e| format!("standard input: {e}"))?;
-        let job = serde_json::from_str(&line).map_err(|e| format!("this is no job: {e}"))?;
+        let job = serde_json::from_str(&line).map_err(|e| format!("this is not a job: {e}"))?;
         let (id, done) = run(&job);
         let (error, kind) = match done {
             Ok(()) => (None, Kind::default()),

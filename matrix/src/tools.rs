@@ -10,6 +10,7 @@ use std::process::Command;
 use std::thread;
 use std::time::Duration;
 
+use hankel_system::process::which;
 use hankel_system::temporary::Folder;
 use serde::{Deserialize, Serialize};
 
@@ -515,17 +516,10 @@ fn program(names: &[&str], override_: &str) -> Option<PathBuf> {
         return if path.components().count() > 1 {
             path.is_file().then_some(path)
         } else {
-            in_path(&path)
+            which(&path)
         };
     }
-    names.iter().find_map(|name| in_path(Path::new(name)))
-}
-
-fn in_path(name: &Path) -> Option<PathBuf> {
-    let name = name.with_extension(env::consts::EXE_EXTENSION);
-    env::split_paths(&env::var_os("PATH")?)
-        .map(|folder| folder.join(&name))
-        .find(|path| path.is_file())
+    names.iter().find_map(|name| which(Path::new(name)))
 }
 
 /// The first line that names a version.

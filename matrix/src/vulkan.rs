@@ -145,7 +145,7 @@ fn cases(job: &Job, inputs: &[u8]) -> Result<Vec<Case>, String> {
                     Format::Depth32
                 } else {
                     let texel: TexelFormat = serde_json::from_value(format.as_str().into())
-                        .map_err(|_| format!("`{format}` is no format"))?;
+                        .map_err(|_| format!("`{format}` is not a format"))?;
                     Format::Texel(texel)
                 };
                 Input::Texture {

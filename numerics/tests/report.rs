@@ -211,7 +211,10 @@ fn a_file_stands_where_the_folder_should() {
     std::fs::write(&file, "x").unwrap();
     let error = sample().write(&file, "bounds", &[]).unwrap_err();
     assert!(matches!(&error, ReportError::Output(error) if !error.is_machine()));
-    assert!(error.to_string().contains("should be a folder"), "{error}");
+    assert!(
+        error.to_string().contains("a folder is expected"),
+        "{error}"
+    );
     assert_eq!(std::fs::read(&file).unwrap(), b"x");
 }
 

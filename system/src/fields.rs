@@ -36,7 +36,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Table<T> {
 /// A `T` that is read from a table alone, for `#[serde(deserialize_with)]`.
 ///
 /// # Errors
-/// What is no table, or a table that is no `T`.
+/// What is not a table, or a table that is not a `T`.
 pub fn table<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<T, D::Error> {
@@ -46,7 +46,7 @@ pub fn table<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
 /// An `Option<T>` that is read from a table alone, for `#[serde(deserialize_with)]`.
 ///
 /// # Errors
-/// What is no table, or a table that is no `T`.
+/// What is not a table, or a table that is not a `T`.
 pub fn optional<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
@@ -56,7 +56,7 @@ pub fn optional<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
 /// A map of `T`s that are read from tables alone, for `#[serde(deserialize_with)]`.
 ///
 /// # Errors
-/// What is no table, or a table that is no `T`.
+/// What is not a table, or a table that is not a `T`.
 pub fn map<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<BTreeMap<String, T>, D::Error> {

@@ -1,4 +1,4 @@
-//! Files of others. What is no regular file could block for ever or never end, and what is too
+//! Files of others. What is not a regular file could block for ever or never end, and what is too
 //! large could take all memory: both are refused before anything is read.
 
 use std::fs::File;
@@ -25,14 +25,14 @@ pub enum InputError {
         what: &'static str,
     },
     /// A file that is larger than it may be.
-    #[error("{}: it has more than the {} that are read at most", path.display(), size(*most))]
+    #[error("{}: it is larger than the limit of {}", path.display(), size(*most))]
     TooLarge {
         /// The file.
         path: PathBuf,
         /// Bytes that it may have.
         most: u64,
     },
-    /// Bytes that are no text.
+    /// Bytes that are not text.
     #[error("{}: it is not UTF-8 text", path.display())]
     NotText {
         /// The file.
@@ -48,7 +48,7 @@ impl InputError {
             Self::Io { source, .. } => source.to_string(),
             Self::NotRegular { what, .. } => format!("it is {what}; a regular file is expected"),
             Self::TooLarge { most, .. } => {
-                format!("it has more than the {} that are read at most", size(*most))
+                format!("it is larger than the limit of {}", size(*most))
             }
             Self::NotText { .. } => "it is not UTF-8 text".into(),
         }
@@ -139,7 +139,7 @@ fn open_any(path: &Path) -> Result<File, InputError> {
     })
 }
 
-/// What is no regular file, in words.
+/// What it is, if it is not a regular file, in words.
 fn what(file: &File, path: &Path) -> Result<Option<&'static str>, InputError> {
     let metadata = file.metadata().map_err(|source| InputError::Io {
         path: path.into(),
@@ -148,7 +148,7 @@ fn what(file: &File, path: &Path) -> Result<Option<&'static str>, InputError> {
     Ok(kind(&metadata.file_type()))
 }
 
-/// What is no regular file, in words.
+/// What it is, if it is not a regular file, in words.
 pub(crate) fn kind(file: &std::fs::FileType) -> Option<&'static str> {
     #[cfg(unix)]
     {
@@ -166,7 +166,7 @@ pub(crate) fn kind(file: &std::fs::FileType) -> Option<&'static str> {
     match (file.is_file(), file.is_dir()) {
         (true, _) => None,
         (_, true) => Some("a folder"),
-        _ => Some("no regular file"),
+        _ => Some("not a regular file"),
     }
 }
 
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(read(&path, 5).unwrap(), b"12345");
         let error = read(&path, 4).unwrap_err();
         assert!(
-            error.to_string().contains("more than the 4 bytes"),
+            error.to_string().contains("the limit of 4 bytes"),
             "{error}"
         );
         let error = read(folder.path(), 10).unwrap_err().to_string();

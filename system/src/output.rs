@@ -3,7 +3,7 @@
 //! [`Output::create`] finds out before the work whether the file can be written, and refuses one
 //! that is also read. A regular file gets its new content at once, by [`Output::commit`]: until
 //! then, and after an error, the old content stays. Its mode stays too, and where the name is a
-//! symbolic link, what it points to is written. What is no regular file, a device or a pipe, is
+//! symbolic link, what it points to is written. What is not a regular file, a device or a pipe, is
 //! written to as it is.
 
 use std::fs::{File, Metadata};
@@ -59,7 +59,7 @@ impl OutputError {
                 Kind::NotFound => "there is no such folder".into(),
                 Kind::IsADirectory => "it is a folder".into(),
                 Kind::NotADirectory | Kind::AlreadyExists => {
-                    "what should be a folder is none".into()
+                    "there is a file where a folder is expected".into()
                 }
                 // Without the name of a temporary file, which the user never gave.
                 Kind::PermissionDenied => "this user may not write there".into(),
@@ -115,7 +115,7 @@ enum Way {
     },
     /// A new file elsewhere, which is copied over the target: what cannot be replaced.
     Copy { new: BufWriter<File>, into: File },
-    /// Straight into what is no regular file.
+    /// Straight into what is not a regular file.
     InPlace(BufWriter<File>),
 }
 
@@ -329,9 +329,7 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
             None => next,
         };
     }
-    Err(io::Error::other(
-        "too many symbolic links, one behind the other",
-    ))
+    Err(io::Error::other("too many symbolic links in a row"))
 }
 
 /// Whether a name means what is open already, such as `/dev/stdout`. Files of `/dev/shm` are files.
@@ -495,7 +493,7 @@ mod tests {
         let file = folder.path().join("file");
         fs::write(&file, "x").unwrap();
         let error = super::folder(&file).unwrap_err().to_string();
-        assert!(error.contains("should be a folder"), "{error}");
+        assert!(error.contains("a folder is expected"), "{error}");
         assert!(Output::create(&file.join("below"), &[]).is_err());
     }
 

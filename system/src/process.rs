@@ -1,8 +1,8 @@
 //! Programs of others: each in a process group of its own, so that it can be ended with all that
 //! it has started, and with a time limit.
 
-use std::io::{self, Read};
-use std::path::Path;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,7 +19,8 @@ pub struct Program {
     name: String,
     /// The process, whose pipes may be taken. To wait for it or to end it, use the methods.
     pub child: Child,
-    ended: bool,
+    /// Whether it has ended and its number may be another's.
+    reaped: bool,
 }
 
 impl Program {
@@ -51,7 +52,7 @@ impl Program {
         Ok(Self {
             name: name(command),
             child,
-            ended: false,
+            reaped: false,
         })
     }
 
@@ -67,14 +68,15 @@ impl Program {
         self.child.id()
     }
 
-    /// How it ended, if it did.
+    /// How it ended, if it did. What it has started may still run.
     ///
     /// # Errors
     /// The system's words.
     pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
-        let status = self.child.try_wait()?;
-        self.ended |= status.is_some();
-        Ok(status)
+        #[cfg(unix)]
+        return status(self.child.id(), false);
+        #[cfg(not(unix))]
+        self.child.try_wait()
     }
 
     /// Waits for its end.
@@ -82,9 +84,11 @@ impl Program {
     /// # Errors
     /// The system's words.
     pub fn wait(&mut self) -> io::Result<ExitStatus> {
-        let status = self.child.wait()?;
-        self.ended = true;
-        Ok(status)
+        #[cfg(unix)]
+        if let Some(status) = status(self.child.id(), true)? {
+            return Ok(status);
+        }
+        self.child.wait()
     }
 
     /// Waits for its end, but not for longer than this.
@@ -110,17 +114,41 @@ impl Program {
         // Where there are no groups; what fails here has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        self.ended = true;
+        self.reaped = true;
     }
 }
 
 impl Drop for Program {
     fn drop(&mut self) {
-        if !self.ended {
+        if !self.reaped {
             self.kill();
         }
         ours().groups.remove(&self.child.id());
     }
+}
+
+/// How a child of this process ended, if it did; `waits` for that. It is not reaped: until it is, its number is that of
+/// its group and of no other, and what it has started can be ended by it.
+#[cfg(unix)]
+fn status(child: u32, waits: bool) -> io::Result<Option<ExitStatus>> {
+    use std::os::unix::process::ExitStatusExt;
+
+    use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
+    let Some(child) = i32::try_from(child).ok().and_then(Pid::from_raw) else {
+        return Ok(None);
+    };
+    let mut options = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
+    options.set(WaitIdOptions::NOHANG, !waits);
+    let found = rustix::io::retry_on_intr(|| waitid(WaitId::Pid(child), options))?;
+    // As `wait` gives it: the exit code in the second byte, or the signal in the first.
+    Ok(found.and_then(|it| {
+        let code = it.exit_status().map(|code| (code & 0xff) << 8);
+        let signal = it.terminating_signal().map(|signal| {
+            let has_core = if it.dumped() { 0x80 } else { 0 };
+            signal | has_core
+        });
+        code.or(signal).map(ExitStatus::from_raw)
+    }))
 }
 
 /// Ends a process group of a [`Program`] that still lives, from any thread.
@@ -136,6 +164,19 @@ pub fn kill_group(leader: u32) {
     }
     #[cfg(not(unix))]
     let _ = leader;
+}
+
+/// Where a program is in `PATH`.
+#[must_use]
+pub fn which(program: &Path) -> Option<PathBuf> {
+    let mut file = program.as_os_str().to_owned();
+    let suffix = std::env::consts::EXE_SUFFIX;
+    if !file.to_string_lossy().ends_with(suffix) {
+        file.push(suffix);
+    }
+    std::env::split_paths(&std::env::var_os("PATH")?)
+        .map(|folder| folder.join(&file))
+        .find(|path| path.is_file())
 }
 
 /// The file name of the program that a command starts.
@@ -267,6 +308,55 @@ pub enum Failure {
     },
 }
 
+/// What a program that was [followed](follow) left.
+#[derive(Clone, Debug)]
+pub struct Said {
+    /// Its exit status.
+    pub status: ExitStatus,
+    /// What it wrote to standard output.
+    pub stdout: String,
+    /// What it wrote to standard error, without blanks at the ends of lines.
+    pub stderr: String,
+}
+
+/// Runs a program to its end, however long that takes, and gives `each` the lines that it writes to standard error: for
+/// cargo, which may have much to compile. What is not UTF-8 is replaced.
+///
+/// # Errors
+/// The system's words.
+pub fn follow(command: &mut Command, each: &mut dyn FnMut(&str)) -> io::Result<Said> {
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut running = Program::start(command)?;
+    let (out, err) = (running.child.stdout.take(), running.child.stderr.take());
+    // Both pipes are drained at once: either could fill up while the other is waited for.
+    let reader = thread::Builder::new().spawn(move || {
+        let mut bytes = Vec::new();
+        if let Some(mut pipe) = out {
+            // A pipe that breaks ends the text; the status tells the rest.
+            let _ = pipe.read_to_end(&mut bytes);
+        }
+        bytes
+    })?;
+    let mut stderr = String::new();
+    for line in err
+        .into_iter()
+        .flat_map(|pipe| BufReader::new(pipe).split(b'\n'))
+    {
+        let Ok(line) = line else { break };
+        let line = String::from_utf8_lossy(&line);
+        let line = line.trim_end();
+        each(line);
+        stderr.push_str(line);
+        stderr.push('\n');
+    }
+    let stdout = reader.join().unwrap_or_default();
+    Ok(Said {
+        status: running.wait()?,
+        stdout: String::from_utf8_lossy(&stdout).into_owned(),
+        stderr,
+    })
+}
+
 /// Runs a program to its end, without input, and keeps what it says.
 ///
 /// # Errors
@@ -373,6 +463,46 @@ mod tests {
             gone(&n)
         });
         assert!(ended);
+    }
+
+    /// Of a program that has ended by itself, too.
+    #[test]
+    fn what_a_program_leaves_behind_ends_with_it() {
+        let mut program = Program::start(&mut shell("sleep 60 & exit 7")).unwrap();
+        assert_eq!(program.wait().unwrap().code(), Some(7));
+        let group = program.group();
+        let lives = || {
+            let group = rustix::process::Pid::from_raw(group.cast_signed()).unwrap();
+            rustix::process::test_kill_process_group(group).is_ok()
+        };
+        assert!(lives());
+        assert_eq!(program.try_wait().unwrap().unwrap().code(), Some(7));
+        drop(program);
+        let ended = (0..200).any(|_| {
+            thread::sleep(Duration::from_millis(10));
+            !lives()
+        });
+        assert!(ended);
+    }
+
+    #[test]
+    fn lines_are_followed_to_the_end() {
+        let script = r"echo out; printf 'a\n\377\nb  \n' >&2; exit 3";
+        let mut lines = Vec::new();
+        let said = follow(&mut shell(script), &mut |line| lines.push(line.to_owned())).unwrap();
+        assert_eq!(lines, ["a", "\u{fffd}", "b"]);
+        assert_eq!(said.status.code(), Some(3));
+        assert_eq!(
+            (said.stdout.as_str(), said.stderr.as_str()),
+            ("out\n", "a\n\u{fffd}\nb\n")
+        );
+    }
+
+    #[test]
+    fn programs_with_a_dot_in_their_name_are_found() {
+        assert!(which(Path::new("sh")).is_some());
+        // `sh.5` is not `sh`.
+        assert_eq!(which(Path::new("sh.5")), None);
     }
 
     #[test]

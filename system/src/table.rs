@@ -44,7 +44,7 @@ pub enum TableError {
     /// close.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// A row that is no text, or has more or fewer cells than the header.
+    /// A row that is not text, or has more or fewer cells than the header.
     #[error(transparent)]
     Cell(#[from] CellError),
 }
@@ -116,7 +116,7 @@ impl Table {
         let mut found = Vec::new();
         for (i, name) in self.header.iter().enumerate() {
             let Some(place) = wanted.iter().position(|w| *w == name) else {
-                let problem = format!("column {} is `{name}`, which is not read", i + 1);
+                let problem = format!("column {} is `{name}`, which is not expected", i + 1);
                 return Err(wrong(problem));
             };
             if found.contains(&place) {
@@ -174,7 +174,7 @@ impl Table {
         let place = place(cells.position());
         let (has, wanted) = (cells.len(), self.header.len());
         if has != wanted {
-            let problem = format!("it has {has} cells, the header {wanted}");
+            let problem = format!("it has {has} cells, the header has {wanted}");
             return Err(self.wrong(&place, None, problem).into());
         }
         Ok(Some(place))
@@ -349,9 +349,7 @@ impl At {
             ),
             _ => refusal(
                 self.row,
-                &format!(
-                    "the row that begins there has more than the {most} that are read at most"
-                ),
+                &format!("the row that begins there is larger than the limit of {most}"),
             ),
         }
     }
@@ -392,7 +390,7 @@ mod tests {
             ),
             (
                 b"a,b\r\n1,2\r\n\r\n1\r\n",
-                "row 2 (line 4): it has 1 cells, the header 2",
+                "row 2 (line 4): it has 1 cells, the header has 2",
             ),
             (b"\na,b\n\n1", "row 1 (line 4): it has 1 cells"),
         ] {

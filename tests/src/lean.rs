@@ -60,7 +60,7 @@ fn by_hand(name: &str) -> Cost {
             "-o",
         ])
         .arg(&module)
-        .arg(root().join("tests/listing").join(format!("{name}.hlsl")))
+        .arg(root().join("numerics/listing").join(format!("{name}.hlsl")))
         .output()
         .expect("glslangValidator must be installed: `apt-get install glslang-tools`");
     assert!(

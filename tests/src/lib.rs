@@ -69,7 +69,7 @@ impl Crate {
     pub fn listing() -> Self {
         Self::new(
             hankel_listing::entries(),
-            "tests/listing",
+            "numerics/listing",
             "snapshots/listing",
         )
     }

@@ -84,7 +84,10 @@ fn maps_over_rows_are_clean() {
         "quantize_4_unit",
     ];
     for map in bounds.chain(points).chain(others.map(String::from)) {
-        assert!(names.contains(&map.as_str()), "{map} is no map: {names:?}");
+        assert!(
+            names.contains(&map.as_str()),
+            "{map} is not a map: {names:?}"
+        );
     }
 }
 

@@ -39,6 +39,11 @@ impl Cache {
         self.folder.join(pinned::name())
     }
 
+    /// Where a toolchain is while another one takes its place.
+    fn replaced(&self) -> PathBuf {
+        self.folder.join(format!(".old-{}", pinned::name()))
+    }
+
     /// Where the build from source keeps its stages.
     pub(crate) fn build(&self) -> PathBuf {
         self.folder.join(".build")
@@ -86,6 +91,11 @@ impl Locked {
 
     fn sweep(&self) -> Result<()> {
         let folder = &self.cache.folder;
+        // A replacement that was interrupted between its two steps: the toolchain that was there stays.
+        let (installed, old) = (self.cache.installed(), self.cache.replaced());
+        if old.is_dir() && !installed.exists() {
+            fs::rename(&old, &installed).during("restore", &installed)?;
+        }
         for entry in fs::read_dir(folder).during("read", folder)? {
             let entry = entry.during("read", folder)?;
             let name = entry.file_name();
@@ -128,11 +138,7 @@ impl Staging<'_> {
     /// Gives the folder its final name, in place of what had that name.
     pub(crate) fn publish(self) -> Result<PathBuf> {
         let target = self.locked.cache.installed();
-        let old = self
-            .locked
-            .cache
-            .folder
-            .join(format!(".old-{}", pinned::name()));
+        let old = self.locked.cache.replaced();
         match fs::rename(&target, &old) {
             Ok(()) => {}
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}

@@ -67,7 +67,7 @@ pub enum Error {
     /// A file's SHA-256 is not the one it must have.
     #[error(
         "wrong checksum of {}\n  expected {expected}\n  actual   {actual}\n\
-         help: the file is damaged or another one: fetch it again; of an archive that you \
+         help: the file is damaged, or it is another file: download it again; for an archive that you \
          packed yourself, give the checksum with --sha256 ({})",
         path.display(),
         crate::options::ENV_SHA256,
@@ -104,7 +104,7 @@ pub enum Error {
     /// An archive cannot be decompressed or its entries not be read.
     #[error(
         "{} cannot be unpacked: {source}\n\
-         help: it may be truncated, or no .tar.zst archive: fetch it again, or pack it again with `hankel toolchain pack`",
+         help: it may be truncated, or not a .tar.zst archive: download it again, or pack it again with `hankel toolchain pack`",
         path.display()
     )]
     Archive {
@@ -116,7 +116,7 @@ pub enum Error {
 
     /// An archive wants to write outside the folder that it is unpacked into.
     #[error(
-        "refused to unpack {}: its entry `{entry}` leads out of the target folder",
+        "refused to unpack {}: its entry `{entry}` is outside of the target folder",
         path.display()
     )]
     UnsafeEntry {
@@ -127,7 +127,7 @@ pub enum Error {
     },
 
     /// An archive has the right checksum but holds no toolchain.
-    #[error("{} holds no rust-gpu toolchain: {why}", path.display())]
+    #[error("{} does not contain a rust-gpu toolchain: {why}", path.display())]
     NotAToolchainArchive {
         /// The archive.
         path: PathBuf,
@@ -138,7 +138,7 @@ pub enum Error {
     /// The disk is too full.
     #[error(
         "not enough space in {}: {} MB needed, {} MB available\n\
-         help: free some, or set HANKEL_CACHE to a folder on another disk",
+         help: free some space, or set HANKEL_CACHE to a folder on another disk",
         folder.display(), needed.div_ceil(1_000_000), available / 1_000_000
     )]
     NoSpace {
@@ -229,7 +229,7 @@ pub enum Error {
 
     /// Only a self-contained toolchain can be packed.
     #[error(
-        "{} cannot be packed: it is rustup's, not a self-contained folder",
+        "{} cannot be packed: it is a toolchain of rustup, not a self-contained folder",
         path.display()
     )]
     NotPackable {

@@ -32,7 +32,7 @@ pub fn ensure(options: &Options, progress: &mut dyn Progress) -> Result<Toolchai
         return Ok(found);
     }
     let cached = match find::cached(options, Check::Quick) {
-        // The archive can mend it.
+        // The archive can replace it.
         Err(error @ Error::Damaged { .. }) if options.archive.is_some() => {
             progress.line(&error.to_string());
             None
@@ -137,7 +137,7 @@ fn publish(
 
 /// Why a staged toolchain was not published.
 enum Either {
-    /// It is none that works here.
+    /// It does not work here.
     Unusable(String),
     /// Something went wrong on the way.
     Failed(Error),

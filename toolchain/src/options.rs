@@ -22,7 +22,7 @@ pub const ENV_BOOTSTRAP: &str = "HANKEL_BOOTSTRAP";
 /// Where to look for a toolchain and what to make one from.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Folder of the toolchain to use, whatever else there is.
+    /// Folder of the toolchain to use before all others.
     pub path: Option<PathBuf>,
     /// Archive (.tar.zst) to install from.
     pub archive: Option<PathBuf>,

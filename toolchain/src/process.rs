@@ -86,15 +86,6 @@ pub(crate) fn ask(command: &mut Command) -> Option<String> {
     (done.status.success() && !text.is_empty()).then(|| text.to_owned())
 }
 
-/// Where `program` is in `PATH`.
-pub(crate) fn which(program: &str) -> Option<PathBuf> {
-    let path = std::env::var_os("PATH")?;
-    let file = format!("{program}{}", std::env::consts::EXE_SUFFIX);
-    std::env::split_paths(&path)
-        .map(|folder| folder.join(&file))
-        .find(|file| file.is_file())
-}
-
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;

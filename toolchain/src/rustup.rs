@@ -6,6 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use hankel_system::process::which;
+
 use crate::error::{During, Error, Result};
 use crate::pinned::{self, COMPONENTS, NIGHTLY, RUST_GPU_VERSION};
 use crate::process;
@@ -70,7 +72,7 @@ impl Rustup {
     /// What is not there yet, for people. Reads a few files, runs nothing.
     pub(crate) fn missing(&self) -> Vec<String> {
         let mut missing = Vec::new();
-        if process::which("rustup").is_none() {
+        if which(Path::new("rustup")).is_none() {
             missing.push("rustup in PATH".to_owned());
         }
         if !self
@@ -116,7 +118,7 @@ impl Rustup {
     /// Installs what is missing. `work` is an existing folder for logs and a throw-away
     /// crate.
     pub(crate) fn install(&self, work: &Path, progress: &mut dyn Progress) -> Result<Toolchain> {
-        if process::which("rustup").is_none() {
+        if which(Path::new("rustup")).is_none() {
             return Err(fail("rustup is not in PATH".to_owned()));
         }
         progress.step("rustup toolchain", 1, 2);

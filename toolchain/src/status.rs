@@ -1,7 +1,7 @@
 //! All five ways to a compiler, looked at without using any.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -102,7 +102,7 @@ fn cache(options: &Options) -> Way {
                 MadeFrom::Source => "built from source, recipe",
             };
             let sum = manifest.sha256.get(..12).unwrap_or_default();
-            usable(found, format!("installed and whole; {made} {sum}..."))
+            usable(found, format!("installed and complete; {made} {sum}..."))
         }
         Ok(None) => way(Origin::Cache, State::Absent, "nothing is installed"),
         Err(error) => way(Origin::Cache, State::Unusable, error.to_string()),
@@ -134,7 +134,7 @@ fn archive(options: &Options) -> Way {
         Ok(_) => way(
             Origin::Archive,
             State::Unusable,
-            format!("{} is no file", path.display()),
+            format!("{} is not a file", path.display()),
         ),
         Err(error) => way(
             Origin::Archive,
@@ -156,7 +156,7 @@ fn rustup() -> Way {
         return usable(found, "rustup and cargo-gpu-install have it");
     }
     let missing = rustup.missing();
-    let state = if crate::process::which("rustup").is_some() {
+    let state = if hankel_system::process::which(Path::new("rustup")).is_some() {
         State::Installable
     } else {
         State::Unusable

@@ -1,7 +1,6 @@
 //! A compiler that was found, and what it takes to run it.
 
 use std::collections::HashMap;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
@@ -52,10 +51,6 @@ impl Origin {
 }
 
 /// A usable compiler.
-///
-/// To compile a shader crate with it through `spirv-builder`: put [`Self::path_variable`]
-/// into the environment as `PATH`, set `SpirvBuilder::rustc_codegen_spirv_location` to
-/// [`Self::backend`] and `SpirvBuilder::toolchain_overwrite` to [`Self::channel`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Toolchain {
@@ -67,7 +62,7 @@ pub struct Toolchain {
     pub backend: PathBuf,
     /// Folder that has to come first in `PATH`; `None`: rustup's proxies do it.
     pub bin: Option<PathBuf>,
-    /// rustup's name of the toolchain; `None`: it is none of rustup's.
+    /// rustup's name of the toolchain; `None`: it is not one of rustup's.
     pub channel: Option<String>,
     /// What `rustc --version` prints.
     pub rustc_version: String,
@@ -76,14 +71,6 @@ pub struct Toolchain {
 }
 
 impl Toolchain {
-    /// The value that `PATH` must have for this toolchain to be used; `None`: the one
-    /// that it has already.
-    pub fn path_variable(&self) -> Option<OsString> {
-        let bin = self.bin.clone()?;
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        std::env::join_paths(std::iter::once(bin).chain(std::env::split_paths(&path))).ok()
-    }
-
     /// A self-contained toolchain in the folder `root`: `Err` says what is wrong with it.
     pub(crate) fn at(root: &Path, origin: Origin) -> Result<Self, String> {
         if !root.is_dir() {
@@ -107,7 +94,7 @@ impl Toolchain {
             version_of(&rustc)
         };
         let Some(rustc_version) = version else {
-            return Err("its bin/rustc does not run on this machine, or says nothing".to_owned());
+            return Err("its bin/rustc does not run on this machine, or prints nothing".to_owned());
         };
         let rust_gpu_version = rust_gpu_in(&rustc_version).unwrap_or("unknown").to_owned();
         if rust_gpu_version != "unknown" && rust_gpu_version != pinned::RUST_GPU_VERSION {
@@ -215,22 +202,5 @@ mod tests {
         assert_eq!(rust_gpu_in(line), Some("0.10.0"));
         assert_eq!(rust_gpu_in("rustc 1.95.0 (59807616e 2026-04-14)"), None);
         assert_eq!(rust_gpu_in("rust-gpu next"), None);
-    }
-
-    #[test]
-    fn the_own_folder_comes_first_in_path() {
-        let mut toolchain = Toolchain {
-            origin: Origin::Cache,
-            root: "/t".into(),
-            backend: "/t/lib/b".into(),
-            bin: Some("/t/bin".into()),
-            channel: None,
-            rustc_version: String::new(),
-            rust_gpu_version: String::new(),
-        };
-        let path = toolchain.path_variable().unwrap();
-        assert_eq!(std::env::split_paths(&path).next(), Some("/t/bin".into()));
-        toolchain.bin = None;
-        assert_eq!(toolchain.path_variable(), None);
     }
 }

@@ -311,6 +311,27 @@ fn being_killed_in_the_middle_leaves_what_the_next_run_removes() {
     assert_eq!(scratch.toolchains(), [pinned::name()]);
 }
 
+/// Between the two steps by which a toolchain takes another one's place.
+#[test]
+fn a_toolchain_that_was_being_replaced_stays() {
+    let scratch = Scratch::new();
+    let options = Options {
+        archive: Some(good_archive(&scratch, "a")),
+        ..scratch.options()
+    };
+    let installed = ensure(&options, &mut Silent).unwrap().root;
+    let folder = installed.parent().unwrap();
+    let old = folder.join(format!(".old-{}", pinned::name()));
+    fs::rename(&installed, &old).unwrap();
+    fs::create_dir(folder.join(format!(".new-{}", pinned::name()))).unwrap();
+    let mut record = Record::default();
+    let found = ensure(&options, &mut record).unwrap();
+    assert_eq!((found.origin, &found.root), (Origin::Cache, &installed));
+    assert_usable(&found);
+    assert!(record.steps.is_empty(), "{:?}", record.steps);
+    assert_eq!(scratch.toolchains(), [pinned::name()]);
+}
+
 #[test]
 fn only_one_of_many_unpacks() {
     let scratch = Scratch::new();

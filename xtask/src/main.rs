@@ -72,7 +72,7 @@ fn committed() -> [Committed; 5] {
         },
         Committed {
             crate_name: "hankel-listing",
-            manifest: "tests/listing/Cargo.toml",
+            manifest: "numerics/listing/Cargo.toml",
             folder: "snapshots/listing",
             kernels: kernels(hankel_listing::entries()),
         },

@@ -12,7 +12,7 @@ use crate::args::{Build, Form, Format};
 use crate::depfile;
 use crate::failure::{Failure, Outcome, Result};
 use crate::print::{self, say};
-use crate::session::Session;
+use crate::session::{Followed, Session, this_program};
 use crate::watch::Edits;
 
 pub fn run(args: &Build, quiet: bool) -> Result<Outcome> {
@@ -107,33 +107,47 @@ fn watch(args: &Build, quiet: bool) -> Result<Outcome> {
         // Before the build: what is edited meanwhile is built next.
         edits.add(&places, &sources);
         match once(args, quiet) {
-            Ok(inputs) => edits.add(&inputs, &sources),
+            Ok(followed) => edits.add(&followed.paths, &sources),
             Err(failure) => print::note(format_args!("{:?}", miette::Report::new(failure))),
         }
         edits.wait()?;
     }
 }
 
-/// Builds. Gives every file and folder that the output follows from, if that was asked for.
-fn once(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
-    let (inputs, record) = match args.form {
-        Form::Functions => (functions::build(args, quiet)?, api::FILE),
+/// Builds. Gives what the output follows from beside this program, if that was asked for.
+fn once(args: &Build, quiet: bool) -> Result<Followed> {
+    let (followed, record) = match args.form {
+        Form::Functions => {
+            let paths = functions::build(args, quiet)?;
+            let environment = Vec::new();
+            (Followed { paths, environment }, api::FILE)
+        }
         Form::Kernels => (shaders(args, quiet)?, MANIFEST_FILE),
     };
-    depend(args, record, &inputs)?;
-    Ok(inputs)
+    depend(args, record, &followed)?;
+    Ok(followed)
 }
 
-/// Writes what the file `record` of the output follows from, if that was asked for.
-pub fn depend(args: &Build, record: &str, inputs: &[PathBuf]) -> Result<()> {
+/// Writes what the file `record` of the output follows from, as far as that was asked for.
+pub fn depend(args: &Build, record: &str, followed: &Followed) -> Result<()> {
+    let record = args.out.join(record);
+    let mut paths = followed.paths.clone();
+    paths.push(this_program()?);
+    let mut read: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    read.push(&record);
     if let Some(file) = &args.depfile {
-        let record = args.out.join(record);
-        let text = depfile::rule(&record, inputs)?;
-        let mut inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-        inputs.push(&record);
-        Output::create(file, &inputs)?.finish(text.as_bytes())?;
+        let text = depfile::rule(&record, &paths)?;
+        Output::create(file, &read)?.finish(text.as_bytes())?;
         // Make compares times: a record that stays as it was must not be older than its inputs.
         touch(&record)?;
+    }
+    if let Some(file) = &args.environment {
+        let text: String = followed
+            .environment
+            .iter()
+            .map(|name| format!("{name}\n"))
+            .collect();
+        Output::create(file, &read)?.finish(text.as_bytes())?;
     }
     Ok(())
 }
@@ -171,7 +185,7 @@ pub fn keep<'a>(
 }
 
 /// Writes shaders. Gives what they follow from, if that was asked for.
-fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
+fn shaders(args: &Build, quiet: bool) -> Result<Followed> {
     check_output(&args.out)?;
     let session = Session::to_generate(
         args.generate.source.manifest_path.as_deref(),
@@ -182,14 +196,16 @@ fn shaders(args: &Build, quiet: bool) -> Result<Vec<PathBuf>> {
     // What is wrong with the request is told before anything is compiled.
     request.chosen()?;
     let generated = session.generate(&request)?;
-    let inputs = match args.watch || args.depfile.is_some() || args.force {
-        true => [session.inputs(&request)?, places(args)?].concat(),
-        false => Vec::new(),
-    };
-    keep(args, generated.files.keys(), &inputs)?;
+    let is_asked = args.watch || args.depfile.is_some() || args.environment.is_some() || args.force;
+    let mut followed = Followed::default();
+    if is_asked {
+        followed = session.inputs(&request)?;
+        followed.paths.extend(places(args)?);
+    }
+    keep(args, generated.files.keys(), &followed.paths)?;
     let report = write(&generated, &args.out, args.force)?;
     tell(args, &report, quiet);
-    Ok(inputs)
+    Ok(followed)
 }
 
 /// Most kernels without a language that are named in a line; manifest.json has them all.

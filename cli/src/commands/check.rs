@@ -15,7 +15,7 @@ const DEFAULT_BUDGET: &str = "hankel.toml";
 pub fn run(args: &Check, quiet: bool) -> Result<Outcome> {
     if !args.folder.is_dir() {
         let problem = if args.folder.exists() {
-            "it is no folder"
+            "it is not a folder"
         } else {
             "there is no such folder"
         };

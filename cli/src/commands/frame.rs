@@ -1,4 +1,4 @@
-//! A frame to take along: `build --scene` and `check --scene`.
+//! Exported frames: `build --scene` and `check --scene`.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use super::scene::{AUTO, Asked, files, with_technique};
 use crate::args::{Build, Check, Form, Format, Generate};
 use crate::failure::{Failure, Outcome, Result, blame_of_input};
 use crate::print::say;
-use crate::session::Session;
+use crate::session::{Followed, Session};
 
 /// Most bytes of `frame.json`.
 const MAX_BYTES: u64 = 64 << 20;
@@ -51,10 +51,13 @@ pub fn build(args: &Build, file: &Path, quiet: bool) -> Result<Outcome> {
     let session = Session::linked(quiet);
     let request = session.request(&args.generate)?;
     let generated = generate(&session, &request, &draft)?;
-    let inputs = inputs(args, file, &scene)?;
-    keep(args, generated.files.keys(), &inputs)?;
+    let followed = Followed {
+        paths: inputs(args, file, &scene)?,
+        environment: Vec::new(),
+    };
+    keep(args, generated.files.keys(), &followed.paths)?;
     let report = write(&generated, &args.out, args.force)?;
-    depend(args, MANIFEST_FILE, &inputs)?;
+    depend(args, MANIFEST_FILE, &followed)?;
     if !quiet {
         let bytes: usize = draft.contents.values().map(Vec::len).sum();
         say!(
@@ -69,7 +72,7 @@ pub fn build(args: &Build, file: &Path, quiet: bool) -> Result<Outcome> {
 }
 
 /// What to do with a frame that says what is not known.
-const AGAIN: &str = "Build the frame again: another hankel wrote it, or it was edited.";
+const AGAIN: &str = "Build the frame again: another version of hankel wrote it, or it was edited.";
 
 /// What a folder with the frame of `file` must hold.
 pub fn expected(args: &Check, file: &Path, quiet: bool) -> Result<Generated> {
@@ -121,8 +124,8 @@ pub fn refuse_without_scene(args: &Check) -> Result<()> {
     if args.scene.is_none() && read(&args.folder).is_ok() {
         return Err(Failure::input(
             format!("{} holds a frame", args.folder.display()),
-            "Give its scene with --scene, and --technique if it was built with another one than the \
-             scene's.",
+            "Give its scene with --scene, and --technique if it was not built with the scene's own \
+             technique.",
         ));
     }
     Ok(())
@@ -153,8 +156,8 @@ fn refuse(it: &Generate) -> Result<()> {
     match given.into_iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(Failure::input(
             format!("{option} does not go with --scene"),
-            "Leave it out: the frame says which kernels there are, all of them built in, and which \
-             values their constants have.",
+            "Leave it out: the frame determines the kernels, which are built in, and the values of their \
+             constants.",
         )),
         None => Ok(()),
     }

@@ -225,7 +225,7 @@ fn varying(location: u32, ty: &Type, flat: bool) -> String {
 }
 
 const fn in_order(unordered: bool) -> &'static str {
-    if unordered { ", in no order" } else { "" }
+    if unordered { ", unordered" } else { "" }
 }
 
 fn shape(name: &str, layout: &hankel_dsl::native::describe::Layout) -> String {

@@ -53,7 +53,7 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
         None if built_in => Known::parse(KNOWN),
         None => Ok(Known::default()),
     }
-    .map_err(|e| Failure::input(e, "Mend the list of known differences."))?;
+    .map_err(|e| Failure::input(e, "Fix the list of known differences."))?;
     let absent = match &own.absent {
         Some(file) => {
             let text = input::read_text(file, MAX_BYTES).map_err(|e| e.to_string());
@@ -65,7 +65,7 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
         None => None,
     }
     .transpose()
-    .map_err(|e| Failure::input(e, "Mend the table of absent cells."))?;
+    .map_err(|e| Failure::input(e, "Fix the table of absent cells."))?;
     // Whether reports can be written shows before the long work starts.
     let files: Vec<&Path> = [&own.write_absent, &own.json, &own.html, &own.markdown]
         .into_iter()
@@ -127,8 +127,9 @@ pub fn run(args: &Parity, quiet: bool) -> Result<Outcome> {
         write(Absent::of(&report).text())?;
     }
     if own.json.is_some() {
-        let text = serde_json::to_string_pretty(&report)
-            .map_err(|e| Failure::machine(format!("the report has no JSON form: {e}"), None))?;
+        let text = serde_json::to_string_pretty(&report).map_err(|e| {
+            Failure::machine(format!("the report cannot be written as JSON: {e}"), None)
+        })?;
         write(text)?;
     }
     if own.html.is_some() {

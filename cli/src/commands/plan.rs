@@ -100,7 +100,7 @@ pub fn choices(args: &Choose, has_medium: bool) -> Result<Choices> {
     for (option, is_missing) in of_media {
         if !is_missing && !has_medium {
             return Err(Failure::input(
-                format!("{option} is for scenes with a medium, and there is none"),
+                format!("{option} is for scenes with a medium, and the scene has no medium"),
                 format!("Leave {option} out, or add a [medium] to the scene."),
             ));
         }

@@ -111,7 +111,7 @@ pub fn run(args: &Render, quiet: bool) -> Result<Outcome> {
     let share = comparison.difference.over_1;
     if share > limit {
         print::note(format_args!(
-            "the pictures differ: {:.3} % of the pixels by more than 1/255, at most {:.3} % may",
+            "the pictures differ: {:.3} % of the pixels by more than 1/255, at most {:.3} % are allowed",
             share * 100.0,
             limit * 100.0
         ));
@@ -183,7 +183,7 @@ fn print(args: &Render, quiet: bool, told: Told<'_>) {
                 say!("scattered light against rays: {errors}");
             }
             say!(
-                "rays in {} steps; half as many change them by {:.5}",
+                "reference rays: {} steps; with half as many, the light differs by {:.5}",
                 scattered.steps,
                 scattered.change
             );

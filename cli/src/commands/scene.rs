@@ -77,11 +77,10 @@ impl Asked<'_> {
     }
 }
 
-/// A scene's shadows by another technique: what else the scene says of them, biases for example, was for
-/// its own.
+/// A scene's shadows by a technique; biases that the scene gives are for its own.
 pub fn with_technique(shadow: Shadow, name: &str) -> Result<Shadow> {
     let technique = technique(name)?;
-    Ok(shadow.by(technique, technique.maps[0]))
+    Ok(shadow.by_technique(technique))
 }
 
 /// The files that a scene is read from.
@@ -123,7 +122,10 @@ fn check_name(out: &Path) -> Result<()> {
         return Ok(());
     }
     Err(Failure::input(
-        format!("{}: there are no `.{extension}` pictures", out.display()),
+        format!(
+            "{}: `.{extension}` is not a supported picture format",
+            out.display()
+        ),
         "Name a file .png, or .exr for linear light in floats.",
     ))
 }

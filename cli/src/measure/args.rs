@@ -8,11 +8,11 @@ use crate::args::{Backend, Format, Precision};
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The exact bounds of each row of a table, by a linear programme.
+    /// Compute the exact bounds of each row of a table, by a linear programme.
     Judge(Judge),
     /// Measure how fast kernels are.
     Bench(Bench),
-    /// Measure how wrong bounds are, on every kind of input, and how much bias moments need.
+    /// Measure how large the errors of bounds are, on every kind of input, and how much bias moments need.
     Stress(Stress),
 }
 
@@ -26,8 +26,9 @@ Examples:
 The table's columns are m0 (the total weight), m1, m2 and so on (the sums of weight times each
 function) and z. Written are the least weight strictly below z, the greatest at or below z, over all
 distributions with these moments, the margin within which both are exact, and the residual: how far
-the moments of the distributions found are from the given ones, relative to m0. Where one distribution
-alone has the moments, and z is beside one of its depths, the margin is too small.
+the moments of the distributions found are from the given ones, relative to m0. Where the residual is 0,
+the margin is proved. Elsewhere it is an estimate, and may be too small: where few distributions have
+nearly these moments.
 
 Functions: z to z^16; z^(1/2), z^(1/3), z^(1/4); 1/(z+1) to 1/(z+1)^4; exp(z) to exp(4z);
 log(z+1) to log(z+4); sin(2pi*z), cos(2pi*z) and 4pi, 6pi, 8pi; cosh(z), sinh(z), asin(z),
@@ -86,7 +87,7 @@ OUT gets bounds.html, bounds.json, and a CSV file for each table. diffmoments is
 
 Environment:
   HANKEL_PYTHON  the Python that has diffmoments, unless --python says
-  HANKEL_SIMD    the instruction set of the lanes; the others are measured all the same")]
+  HANKEL_SIMD    the instruction set of the lanes; the others are measured, too")]
 pub struct BenchBounds {
     /// Only these orders; several with commas between, or repeated [default: 1 to 6].
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
@@ -114,7 +115,7 @@ pub struct BenchBounds {
     /// Folder for the report; without it, tables are only printed.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// A look in seconds: fewer rows and rounds.
+    /// A first look that takes seconds: fewer rows and rounds.
     #[arg(long)]
     pub quick: bool,
     /// How the report is printed.
@@ -136,7 +137,7 @@ with one, on every scene in every size of the picture. OUT gets frames.html, fra
 table, pictures, and measured.jsonl, to which each finished measurement is added at once: the same command in the
 same folder goes on where it was ended.
 
-Exit code 1: with --error, a plan's error is beyond it, or its time beyond 1.15 of the least.")]
+Exit code 1: with --error, a plan's error is larger than that, or its time is more than 1.15 times the least.")]
 pub struct BenchFrames {
     /// Scene file (TOML); may be repeated [default: all in the folder scenes].
     #[arg(long, value_name = "FILE")]
@@ -172,10 +173,11 @@ Examples:
   hankel bench candidates --functions 4 --regions 100 --out report
   hankel bench candidates --functions 3 --scene scenes/fence.toml --scene scenes/room.toml --out report
 
-All choices of so many of 37 functions of depth (`hankel judge --help` lists them, with z^9 to z^16 besides): 37, 666, 7770, 66045 and
-435897 for 1 to 5. The error of a choice is how far the best lower bound that its means allow is from
-percentage-closer filtering, on average, as a share of light. Four functions with 100 regions of each scene take about an hour of processor time. OUT gets candidates.html, candidates.json, a CSV file for each table, and
-candidates-all.csv with every choice.")]
+All choices of that many of 37 functions of depth (`hankel judge --help` lists them; z^9 to z^16 are not among
+them): 37, 666, 7770, 66045 and 435897 choices for 1 to 5 functions. The error of a choice is how far the best lower bound that its means allow is from
+percentage-closer filtering, on average, as a share of light. Four functions with
+100 regions of each scene take about an hour of processor time. OUT gets candidates.html, candidates.json, a CSV
+file for each table, and candidates-all.csv with every choice.")]
 pub struct BenchCandidates {
     /// How many functions a map holds the means of.
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=5))]
@@ -211,8 +213,8 @@ Examples:
   hankel stress --shadows
   hankel stress --biases
 
-Exit code 1: a kernel gave something that is no number or not from 0 to m_0, or lanes gave other
-bits than the scalar run. OUT gets stress.html, stress.json, and a CSV file for each table.
+Exit code 1: a result was NaN, infinite or outside of 0 to m_0, or the SIMD lanes gave other bits
+than the scalar run. OUT gets stress.html, stress.json, and a CSV file for each table.
 diffmoments is a Python package:
   python3 -m pip install diffmoments numpy
 

@@ -71,9 +71,10 @@ pub fn run(args: &BenchCandidates, quiet: bool) -> Result<Outcome> {
     report.fact("filter regions", regions);
     report.notes.push(format!(
         "The error is the mean distance of the best lower bound to percentage-closer filtering with the same bias, as a \
-         share of light. That of all scenes is weighted by the surfaces in the stack of each one's maps. Programmes \
-         are solved three times, as published; the column `exact` has the same error from programmes that are refined \
-         to the end, so its distance to `error` is what that leaves. {} of the programmes took too many steps.",
+         share of light. Over all scenes it is weighted by the number of surfaces behind a texel of each scene's map. \
+         Linear programmes are solved with two refinements, as published. The column `exact` has the same error from \
+         programmes that are refined to the end; its difference to `error` is due to the samples alone. {} of the \
+         programmes were stopped after too many steps.",
         Cell::from(ranking.unfinished).spelled(Form::Percent(4))
     ));
     report.tables.push(best(&ranking, &groups));
@@ -114,7 +115,7 @@ fn groups(files: &[PathBuf], args: &BenchCandidates, progress: &Progress) -> Res
         if groups[..i].iter().any(|other| other.name == group.name) {
             return Err(Failure::input(
                 format!("there are two scenes `{}`", group.name),
-                "Scenes are told apart by their files' names.",
+                "Scenes are identified by the names of their files: rename one.",
             ));
         }
     }

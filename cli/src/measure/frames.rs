@@ -91,10 +91,10 @@ pub fn run(args: &BenchFrames, quiet: bool) -> Result<Outcome> {
     report.fact("configurations of a scene, at most", most);
     report.notes.push(
         "Times are medians of interleaved rounds, each after runs of the same frame. The error is the \
-         root mean square of the light that arrives (1 minus the shadow; 0 where a surface is turned from the \
-         light) against 256 rays through each pixel, over all pixels. In a scene with a medium it is the light \
-         that comes through that, with what the medium scatters: phase function and absorption are left out, so \
-         that it is from 0 to 1."
+         root mean square difference from ray-traced light, with 256 rays through each pixel, over all pixels. Light \
+         is 1 minus the shadow, and 0 where a surface faces away from the light. In a scene with a medium it is the \
+         light that comes through the medium, plus the light that the medium scatters, without phase function and \
+         absorption, so that it is from 0 to 1."
             .into(),
     );
     let mut fine = true;
@@ -159,7 +159,7 @@ fn subjects(args: &BenchFrames) -> Result<Vec<Subject>> {
             if subjects.iter().any(|s| s.key() == subject.key()) {
                 return Err(Failure::input(
                     format!("{} is asked for twice", subject.key()),
-                    "Scenes are told apart by their files' names, and by the size of the picture.",
+                    "Scenes are identified by the names of their files and the size of the picture.",
                 ));
             }
             subjects.push(subject);
@@ -252,8 +252,8 @@ fn scattering_of(c: &Configuration) -> String {
 fn scattered(all: &[Vec<Measurement>]) -> Table {
     let mut table = Table::new(
         "scattering",
-        "What media scatter, by each way to make it, against rays: the error of that alone, and the time of the \
-         fastest frame that has it",
+        "The light that media scatter, by each technique, against rays: the error of this light alone, and the \
+         time of the fastest frame with it",
         [
             Column::text("scene"),
             Column::text("picture"),
@@ -359,8 +359,8 @@ fn passes(all: &[Vec<Measurement>]) -> Table {
 
 fn fronts(all: &[Vec<Measurement>]) -> Table {
     let columns = identity().into_iter().chain(figures());
-    let caption = "Pareto fronts: of these, nothing that was measured is both faster and nearer to the \
-                   rays";
+    let caption = "Pareto fronts: no configuration that was measured is both faster and closer to the \
+                   rays than one of these";
     let mut table = Table::new("fronts", caption, columns);
     for of_subject in all {
         for i in front(of_subject) {
@@ -398,8 +398,8 @@ fn gain_of_fit(all: &[Vec<Measurement>]) -> Table {
     let fit = Fit::Camera;
     gain(
         "fit",
-        "What fitting the map to the camera's view gives: all else alike, the geometric means over all \
-         configurations of the error with a fitted map, divided by that of a map of the whole scene, and \
+        "The effect of fitting the map to the camera's view, with everything else the same: geometric means over \
+         all configurations of the error with a fitted map, divided by that of a map of the whole scene, and \
          of the times",
         all,
         |c| (c.fit != fit).then_some(Configuration { fit, ..*c }),
@@ -414,8 +414,8 @@ fn gain_of_one_sample(all: &[Vec<Measurement>]) -> Table {
     };
     gain(
         "one-sample",
-        "What one sample of depth in a texel gives: all else alike, the geometric means over all configurations \
-         of the error with one sample, divided by that with four, and of the times",
+        "The effect of one sample of depth in a texel, with everything else the same: geometric means over all \
+         configurations of the error with one sample, divided by that with four, and of the times",
         all,
         |c| (c.multisampling != multisampling).then(|| with(c)),
     )
@@ -461,8 +461,8 @@ fn gain(
 fn doubling(all: &[Vec<Measurement>]) -> Table {
     let mut table = Table::new(
         "doubling",
-        "By how much a map of twice the size divides the error: the mean, and the most. A plan takes \
-         the most to be below the constant `plan::DOUBLING`",
+        "The factor by which a map of twice the size reduces the error: the mean and the maximum. A plan \
+         assumes that the maximum is below the constant `plan::DOUBLING`",
         [
             Column::text("scene"),
             Column::text("picture"),
@@ -497,8 +497,8 @@ fn doubling(all: &[Vec<Measurement>]) -> Table {
 fn growths(all: &[Vec<Measurement>]) -> Table {
     let mut table = Table::new(
         "growth",
-        "How the time of each pass grows: the power that fits best, and the first and the last time. All \
-         else is kept; times are geometric means over all that is kept",
+        "How the time of each pass grows: the exponent that fits best, and the first and the last time. \
+         Everything else is fixed; times are geometric means over the fixed choices",
         [
             Column::text("method"),
             Column::text("pass"),
@@ -625,7 +625,7 @@ impl Bench<'_> {
             )?;
             add(
                 &light.off(&truth)?,
-                format!("{name}: what is wrong"),
+                format!("{name}: its error"),
                 format!("frames-{stem}-{i}-off.png"),
             )?;
         }
@@ -643,9 +643,9 @@ impl Bench<'_> {
         let mut table = Table::new(
             "plans",
             format!(
-                "Plans beside the fastest of all configurations, found exhaustively, timed in turns with \
-                 it; at most {MARGIN} times its time is wanted. `none`: no configuration has so small an \
-                 error"
+                "Plans, and the fastest of all configurations, found by measuring all. Both are timed in turns; a \
+                 plan may take at most {MARGIN} times the time of the fastest. `none`: no configuration has so \
+                 small an error"
             ),
             [
                 Column::text("scene"),

@@ -32,7 +32,7 @@ fn range(text: &str) -> Result<Range> {
     match ends.as_deref() {
         Some(&[low, high]) => Ok(Range::Interval { low, high }),
         _ => Err(Failure::input(
-            format!("--range {text} is no range of depths"),
+            format!("--range {text} is not a range of depths"),
             "write two numbers with a comma between, as in --range 0,1; or --range line",
         )),
     }

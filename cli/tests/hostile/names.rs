@@ -154,7 +154,7 @@ fn a_path_that_is_no_text_has_a_form_in_json() {
     let done = run(desk
         .command("toolchain status --format json")
         .env("HANKEL_CACHE", name));
-    done.fails(3, &["no JSON form", "UTF-8", "--format json"]);
+    done.fails(3, &["cannot be written as JSON", "UTF-8", "--format json"]);
     assert_eq!(done.out(), "");
 }
 

@@ -723,7 +723,7 @@ mod tests {
             "kernels/moments",
             "kernels/shadows",
             "tests/conformance",
-            "tests/listing",
+            "numerics/listing",
             "examples/ports",
         ] {
             let found = check(&root.join(folder));

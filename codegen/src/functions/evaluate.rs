@@ -144,7 +144,7 @@ impl<'a> Evaluator<'a> {
                 return Err(self.refuse(
                     frame,
                     input.span(),
-                    "`self` is no parameter of a function",
+                    "`self` is not a parameter of a function",
                 ));
             };
             let syn::Pat::Ident(pat) = typed.pat.as_ref() else {
@@ -1439,7 +1439,7 @@ impl<'a> Evaluator<'a> {
                     Binary::Equal => Value::bool(a == b),
                     Binary::NotEqual => Value::bool(a != b),
                     Binary::And | Binary::Or => {
-                        return Err(self.refuse(frame, span, "a number is no truth value"));
+                        return Err(self.refuse(frame, span, "a number is not a truth value"));
                     }
                 }
             }
@@ -1564,7 +1564,7 @@ impl<'a> Evaluator<'a> {
             Some(e) => match self.value(frame, e)? {
                 Value::Struct(_, fields) => fields,
                 other => {
-                    let reason = format!("{} is no structure", other.what());
+                    let reason = format!("{} is not a structure", other.what());
                     return Err(self.refuse(frame, e.span(), reason));
                 }
             },
@@ -1643,7 +1643,7 @@ impl<'a> Evaluator<'a> {
             };
         }
         let Value::Scalar(condition) = condition else {
-            return Err(self.refuse(frame, i.cond.span(), "this is no condition"));
+            return Err(self.refuse(frame, i.cond.span(), "this is not a condition"));
         };
         let mut names = BTreeSet::new();
         assigned(quote::quote!(#i), &mut names);

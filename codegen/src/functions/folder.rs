@@ -205,7 +205,7 @@ impl Folder {
             match folder.read(name)? {
                 Found::File(there) if there == *bytes => {}
                 Found::Nothing => tell(name, "is missing", None),
-                Found::Other(..) => tell(name, "is no regular file", None),
+                Found::Other(..) => tell(name, "is not a regular file", None),
                 Found::File(there) => {
                     tell(name, "differs", Some(unified_diff(name, &there, bytes)))
                 }
@@ -291,7 +291,7 @@ fn record(folder: &folder::Folder) -> Result<Option<(Record, String)>> {
         Found::Other(_, kind) => Err(fail(format!("it is {kind}"))),
         Found::File(bytes) => {
             let record: Record = serde_json::from_slice(&bytes)
-                .map_err(|error| fail(format!("it is no record of libraries: {error}")))?;
+                .map_err(|error| fail(format!("it is not a record of libraries: {error}")))?;
             if !is_prefix(&record.prefix) {
                 return Err(fail(format!(
                     "hankel writes no prefix `{}`",

@@ -145,12 +145,17 @@ impl<'a> Editor<'a> {
 
     /// The set of GLSL's functions, if the module has it.
     pub fn functions_set(&self) -> Option<Word> {
-        self.module
-            .ext_inst_imports
-            .iter()
-            .find(|it| it.operands.first() == Some(&Operand::LiteralString("GLSL.std.450".into())))
-            .and_then(|it| it.result_id)
+        functions_set(self.module)
     }
+}
+
+/// The import of GLSL's functions, if the module has it.
+pub fn functions_set(module: &Module) -> Option<Word> {
+    module
+        .ext_inst_imports
+        .iter()
+        .find(|it| it.operands.first() == Some(&Operand::LiteralString("GLSL.std.450".into())))
+        .and_then(|it| it.result_id)
 }
 
 /// Instructions that take the place of one; the last of them has its id.

@@ -9,15 +9,16 @@
 //! That also keeps it from what *is* exact. [`fold`] does it instead: arithmetic on constants
 //! (correctly rounded here as on the native side) and operations that return an operand.
 //!
-//! Functions are not held: spirv-opt evaluates them where all arguments are constants and leaves
-//! them alone elsewhere. Held, they make its constant propagation abort
+//! Functions are not held: spirv-opt evaluates some where all arguments are constants and leaves
+//! them alone elsewhere; [`fold`] evaluates those that it does not know and that round at most once. Held, they make its constant propagation abort
 //! (`tests/upstream/spirv-opt-pinned-function`).
 
 use std::collections::HashMap;
 
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{Decoration, Op, Word};
+use rspirv::spirv::{Decoration, GlslStd450Op as GLOp, Op, Word};
 
+use super::edit::{called, functions_set};
 use super::{id, op};
 
 /// Arithmetic, to which alone `NoContraction` means something.
@@ -133,6 +134,26 @@ impl Float {
         }
     }
 
+    /// A function of one argument whose result is exact or correctly rounded, on every device and natively.
+    fn unary(function: GLOp, x: Self) -> Option<Self> {
+        macro_rules! evaluated {
+            ($x:expr) => {
+                match function {
+                    GLOp::FAbs => $x.abs(),
+                    GLOp::Floor => $x.floor(),
+                    GLOp::Ceil => $x.ceil(),
+                    GLOp::Trunc => $x.trunc(),
+                    GLOp::RoundEven => $x.round_ties_even(),
+                    _ => return None,
+                }
+            };
+        }
+        Some(match x {
+            Self::Single(x) => Self::Single(evaluated!(x)),
+            Self::Double(x) => Self::Double(evaluated!(x)),
+        })
+    }
+
     fn binary(op: Op, a: Self, b: Self) -> Option<Self> {
         match (a, b) {
             (Self::Single(a), Self::Single(b)) => computed(op, a, b).map(Self::Single),
@@ -164,7 +185,7 @@ enum Type {
     Other,
 }
 
-/// Evaluates scalar arithmetic on constants, removes `x * 1`, `x / 1`, `x + 0`, `x - 0`, `x * 0` and
+/// Evaluates scalar arithmetic, absolute values and whole parts of constants, removes `x * 1`, `x / 1`, `x + 0`, `x - 0`, `x * 0` and
 /// `--x`, and takes the sign of a negated operand into a sum, a difference or a factor that is
 /// constant. Tells whether it has removed anything.
 ///
@@ -208,6 +229,8 @@ struct Folder {
     values: HashMap<Word, Float>,
     /// (type, bits) to the constant's id.
     known: HashMap<(Word, u64), Word>,
+    /// The set of GLSL's functions.
+    functions: Option<Word>,
     replaced: HashMap<Word, Word>,
     /// Negated numbers, and of what.
     negated: HashMap<Word, Word>,
@@ -221,6 +244,7 @@ impl Folder {
             types: HashMap::new(),
             values: HashMap::new(),
             known: HashMap::new(),
+            functions: functions_set(module),
             replaced: HashMap::new(),
             negated: HashMap::new(),
             made: Vec::new(),
@@ -335,6 +359,10 @@ impl Folder {
                 Some(value) => value.negated(),
                 None => return self.negated.get(&a?).copied(),
             },
+            Op::ExtInst => {
+                let function = called(instruction, self.functions?)?;
+                Float::unary(function, constant(id(instruction, 2))?)?
+            }
             which @ (Op::FAdd | Op::FSub | Op::FMul | Op::FDiv) => {
                 match (which, constant(a), constant(b)) {
                     (_, Some(x), Some(y)) => Float::binary(which, x, y)?,
@@ -420,6 +448,45 @@ mod tests {
 
     fn number(b: &mut Builder, float: Word, value: f32) -> Word {
         b.constant_bit32(float, value.to_bits())
+    }
+
+    #[test]
+    fn functions_of_constants_are_evaluated() {
+        let found = left(|b, float, x| {
+            let set = b.ext_inst_import("GLSL.std.450");
+            let mut result = x;
+            for (function, argument) in [
+                (GLOp::FAbs, -1.5),
+                (GLOp::Floor, -1.5),
+                (GLOp::Ceil, 1.25),
+                (GLOp::Trunc, -2.75),
+                (GLOp::RoundEven, 2.5),
+            ] {
+                let argument = number(b, float, argument);
+                let call = |b: &mut Builder, argument| {
+                    let operands = [Operand::IdRef(argument)];
+                    b.ext_inst(float, None, set, function as u32, operands)
+                        .unwrap()
+                };
+                let constant = call(b, argument);
+                result = b.f_mul(float, None, result, constant).unwrap();
+            }
+            let argument = [Operand::IdRef(result)];
+            b.ext_inst(float, None, set, GLOp::FAbs as u32, argument)
+                .unwrap()
+        });
+        assert_eq!(
+            found,
+            [
+                "FMul x 1.5",
+                "FMul r -2.0",
+                "FMul r 2.0",
+                "FMul r -2.0",
+                "FMul r 2.0",
+                "ExtInst r r",
+                "ReturnValue r"
+            ]
+        );
     }
 
     #[test]

@@ -2,11 +2,11 @@
 //! decorations, in a module that is not linked yet. Ids do not count, nor does what else the module has, nor the
 //! lines of the source.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{Function, Instruction, Module, Operand};
-use rspirv::spirv::{Op, Word};
+use rspirv::spirv::{Decoration, Op, Word};
 use sha2::{Digest, Sha256};
 
 use super::{id, op};
@@ -49,12 +49,23 @@ pub fn entry_points(module: &Module) -> BTreeMap<String, Fingerprint> {
         .collect()
 }
 
-/// The hash of a module that others are linked with: of all of its functions, in the order of the file.
+/// The hash of a module that others are linked with: of all of its functions, and of what else it exports, in the order
+/// of the file.
 pub fn library(module: &Module) -> Hash {
     let mut all = Fingerprints::of(module);
     let mut hasher = Sha256::new();
     for function in &module.functions {
         hasher.update(all.of_id(function.def_id().unwrap_or_default()).hash);
+    }
+    let exported = module.annotations.iter().filter(|it| {
+        it.operands.get(1) == Some(&Operand::Decoration(Decoration::LinkageAttributes))
+    });
+    let exported: HashSet<Word> = exported.filter_map(|it| id(it, 0)).collect();
+    let globals = module.types_global_values.iter();
+    for global in globals.filter_map(|it| it.result_id) {
+        if exported.contains(&global) {
+            hasher.update(all.of_id(global).hash);
+        }
     }
     hasher.finalize().into()
 }
@@ -311,5 +322,35 @@ mod tests {
         let of = |text: &str| library(&of_wgsl(text));
         assert_eq!(of(SCALED), of(SCALED));
         assert_ne!(of(SCALED), of(&SCALED.replace("3.0", "4.0")));
+        // What is exported and none of its functions uses.
+        let with = |value: u32, is_exported: bool| {
+            let mut module = of_wgsl(SCALED);
+            let next = module.header.as_ref().map_or(0, |header| header.bound);
+            let float = module
+                .types_global_values
+                .iter()
+                .find(|it| op(it) == Op::TypeFloat)
+                .and_then(|it| it.result_id);
+            module.types_global_values.push(Instruction::new(
+                Op::Constant,
+                float,
+                Some(next),
+                vec![Operand::LiteralBit32(value)],
+            ));
+            if is_exported {
+                let name = Operand::LiteralString("TABLE".into());
+                let operands = vec![
+                    Operand::IdRef(next),
+                    Operand::Decoration(Decoration::LinkageAttributes),
+                    name,
+                    Operand::LinkageType(rspirv::spirv::LinkageType::Export),
+                ];
+                let note = Instruction::new(Op::Decorate, None, None, operands);
+                module.annotations.push(note);
+            }
+            library(&module)
+        };
+        assert_ne!(with(1, true), with(2, true));
+        assert_eq!(with(1, false), with(2, false));
     }
 }

@@ -350,7 +350,7 @@ impl Names<'_> {
             return Err(failure(
                 self.kernel,
                 format!("`{name}`"),
-                "it is no buffer".into(),
+                "it is not a buffer".into(),
             ));
         };
         if self.taken.insert(block, layout.name.clone()).is_none() {

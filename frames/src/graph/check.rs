@@ -334,7 +334,7 @@ impl Graph {
 
     /// Where a buffer that a pass writes says how far a compute kernel runs: it, where its numbers begin in bytes,
     /// and how many they are.
-    pub(crate) fn said_in(&self, call: &Call) -> Option<(Handle, u32, u32)> {
+    pub(crate) fn workgroups_from(&self, call: &Call) -> Option<(Handle, u32, u32)> {
         let Some(Extent::InBuffer {
             slot,
             offset,
@@ -447,7 +447,7 @@ impl Graph {
                     }
                 }
                 _ => {
-                    let problem = format!("`{}` is no buffer of {}", value.label, wanted.name);
+                    let problem = format!("`{}` is not a buffer of {}", value.label, wanted.name);
                     return Err(refuse(what, problem));
                 }
             }

@@ -102,7 +102,7 @@ impl Graph {
             || kernel.outputs.len() != compute.outputs.len()
         {
             return Err(place(fragment).kernel(format!(
-                "it is no fragment form of `{}`: both have the same parameters, and as many outputs",
+                "it is not a fragment form of `{}`: both have the same parameters, and as many outputs",
                 compute.name
             )));
         }

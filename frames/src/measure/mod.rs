@@ -117,8 +117,8 @@ impl Configuration {
         }
     }
 
-    /// A scene with these shadows. What else the scene says of them, biases for example, was for
-    /// another technique: it is as the technique has it.
+    /// A scene with these shadows. What else the scene says of them stays, but for biases of another technique:
+    /// see [`Shadow::by`].
     #[must_use]
     pub fn on(&self, scene: &Scene) -> Scene {
         let with = |medium: Medium| match self.scattering {

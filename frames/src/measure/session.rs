@@ -40,14 +40,23 @@ impl Subject {
             view.push_str(&format!(" {medium:?}"));
         }
         let mesh: &Mesh = &self.mesh;
-        let parts: [&[u8]; 3] = [
+        let parts: [&[u8]; 6] = [
             view.as_bytes(),
             bytemuck::cast_slice(&mesh.positions),
+            bytemuck::cast_slice(&mesh.normals),
+            bytemuck::cast_slice(&mesh.colours),
+            bytemuck::cast_slice(&mesh.opacities),
             bytemuck::cast_slice(mesh.indices()),
         ];
-        let bytes = parts.into_iter().flatten();
+        // Where one ends and the next begins counts, too.
+        let bytes = parts.into_iter().flat_map(|part| {
+            part.len()
+                .to_le_bytes()
+                .into_iter()
+                .chain(part.iter().copied())
+        });
         bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-            (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         })
     }
 }
@@ -417,5 +426,36 @@ impl Session {
             })
         });
         Ok(known.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn whatever_changes_a_picture_makes_another_subject() {
+        let text = "[geometry]\nprocedural = \"box\"\n[camera]\neye = [3.0, 3.0, 4.0]\ntarget = [0.0, 0.5, 0.0]\n\
+                    [light]\ndirection = [-1.0, -2.0, -0.5]\n[shadow]\ntechnique = \"hamburger\"\n";
+        let scene = Scene::parse(text, Path::new("s.toml")).unwrap();
+        let mesh = scene.mesh().unwrap();
+        let of = |change: &dyn Fn(&mut Mesh)| {
+            let mut mesh = mesh.clone();
+            change(&mut mesh);
+            let (name, scene) = ("s".into(), scene.clone());
+            Subject { name, scene, mesh }.fingerprint()
+        };
+        let changes: [&dyn Fn(&mut Mesh); 6] = [
+            &|_| {},
+            &|mesh| mesh.opacities = vec![0.5; mesh.positions.len()],
+            &|mesh| mesh.opacities = vec![0.25; mesh.positions.len()],
+            &|mesh| mesh.normals[0].x += 0.5,
+            &|mesh| mesh.colours[0].x += 0.5,
+            &|mesh| mesh.triangles.swap(0, 1),
+        ];
+        let all: std::collections::BTreeSet<u64> = changes.into_iter().map(of).collect();
+        assert_eq!(all.len(), changes.len());
     }
 }

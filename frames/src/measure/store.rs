@@ -26,7 +26,7 @@ pub enum StoreError {
     },
     /// It is not what a session has written.
     #[error(
-        "{}:{line}: {problem}: this is no file of measurements, or a damaged one; remove it, or \
+        "{}:{line}: {problem}: this is not a file of measurements, or a damaged one; remove it, or \
          choose another folder", file.display()
     )]
     Damaged {

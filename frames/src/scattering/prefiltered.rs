@@ -12,9 +12,7 @@ use hankel_shadows::scattering::MapRows;
 
 use super::Scattering;
 use crate::graph::{Graph, GraphError, Handle, Result};
-use crate::passes::{
-    Given, POWER_MOMENTS, Rectification, Volume, blur, light_depth, moments, scatter,
-};
+use crate::passes::{Given, POWER_MOMENTS, Rectification, Volume, blur, moment_map, scatter};
 use crate::scene::Shadow;
 use crate::visibility::SAMPLES;
 
@@ -39,7 +37,11 @@ pub const SIX: Scattering = Scattering {
     add: add_six,
 };
 
-/// A map of four moments of its own, with the scene's filter; it is that of the surfaces if theirs is stored alike.
+/// A map of four moments of opaque and translucent casters, with the scene's filter. Where a technique of shadows has
+/// the same one, these are its passes, and nothing is made twice.
+///
+/// Moments into which translucent casters are blended are those of a distribution of depths, like any others, and
+/// [`rectify`](hankel_shadows::scattering::rectify) takes nothing else for granted.
 fn filtered(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let given = Given {
         shadow: Shadow {
@@ -48,8 +50,7 @@ fn filtered(graph: &mut Graph, given: &Given) -> Result<Handle> {
         },
         ..*given
     };
-    let depth = light_depth(graph, &given)?;
-    let map = moments(graph, &given, depth)?;
+    let map = moment_map(graph, &given)?;
     blur(graph, &given, map)
 }
 

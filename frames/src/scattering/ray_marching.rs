@@ -3,7 +3,7 @@
 
 use super::Scattering;
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, Volume, by_samples, light_depth, scatter};
+use crate::passes::{Given, TRANSLUCENT_IN_MEDIUM, Volume, by_samples, opaque_depth, scatter};
 
 pub const TECHNIQUE: Scattering = Scattering {
     name: "ray-marching",
@@ -14,7 +14,14 @@ pub const TECHNIQUE: Scattering = Scattering {
 };
 
 fn add(graph: &mut Graph, given: &Given, volume: &Volume, picture: Handle) -> Result<Handle> {
-    let depth = light_depth(graph, given)?;
+    if given.translucent.is_some() {
+        graph.omit(
+            TRANSLUCENT_IN_MEDIUM,
+            "ray marching looks up the nearest depth, and a share of it cannot be told: use prefiltered scattering \
+             where all lights are directional",
+        );
+    }
+    let depth = opaque_depth(graph, given)?;
     let kernel = by_samples(
         given,
         if given.is_spot {

@@ -5,8 +5,8 @@
 //! ```toml
 //! [geometry]
 //! model = "../models/brain.glb"   # beside the scene file; or: procedural = "yard"
-//! ground = 4.0                    # a square under the model, in model widths; 0: none
-//! opacity = 0.4                   # of the model, not of its ground: the share of light that does not pass
+//! ground = 4.0                    # a square under the model, in model widths; 0: none, default
+//! opacity = 0.4                   # of the model, not of its ground: the share of light that does not pass; 1, default
 //!
 //! [camera]
 //! eye = [0.2, 0.25, 0.3]
@@ -24,34 +24,37 @@
 //! # A spot light: [light] with these; `strength` is that at a distance of 1.
 //! # position = [0.0, 3.0, 0.0]
 //! # direction = [0.0, -1.0, 0.0]
-//! # angle = 60.0                  # of its cone, from edge to edge, degrees
+//! # angle = 60.0                  # default; of its cone, from edge to edge, degrees
 //! # inner = 48.0                  # of what does not fade; 0.8 of the angle, default
-//! # radius = 0.1                  # a length: half the width of what shines, across the axis
+//! # radius = 0.1                  # a length: half the width of what shines, across the axis; 0: a point, default
 //!
 //! # Several lights: [[light]] for each.
 //!
 //! [shadow]
-//! technique = "hamburger"         # or another of `techniques::ALL`
-//! size = 1024                     # texels along an edge of the map
-//! format = "rgba16unorm"          # one of those that the technique has; its first without it
-//! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1]: likewise
-//! filter = 7                      # Gaussian, taps along an axis, odd; 1: none
-//! fit = "scene"                   # the map holds all; or "camera": what the camera sees
-//! samples = [32, 32]              # of a soft shadow: for the search of blockers, and for the filter
-//! moment_bias = 6e-5              # each map has its default
-//! depth_bias = 0.0                # each technique has its default
-//! leak_cut = 0.02
+//! technique = "hamburger"         # default; or another technique of docs/frames.md
+//! size = 1024                     # default; texels along an edge of the map
+//! multisampling = 4               # default; samples of depth in each texel; or 1
+//! format = "rgba16unorm"          # one of those that the technique has; default: its first
+//! depth_range = "symmetric"       # [-1, 1]; or "unit", [0, 1]; default: that of the technique's first map in the format
+//! filter = 7                      # default; Gaussian, taps along an axis, odd; 1: none
+//! fit = "scene"                   # default: the map holds all; or "camera": what the camera sees
+//! samples = [32, 32]              # default; of `pcss`: depths for the search of blockers, and for the filter
+//! moment_bias = 6e-5              # without unit; each map has its default
+//! depth_bias = 0.0                # a share of the map's depth, 0 to 0.1; each technique has its default
+//! leak_cut = 0.02                 # default; a shadow of 1 minus this is full, and lighter ones are darkened in proportion
+//! mips = false                    # default; whether the filtered map has mip levels
+//! # anisotropy = 1                # default; only with mip levels: the longest footprint of a pixel, in its widths
 //!
 //! [medium]                        # a homogeneous medium all around; without it: none
-//! extinction = 0.1                # share of light lost per unit of length
+//! extinction = 0.1                # share of light lost per unit of length; has to be given
 //! scattering = 0.1                # what of it is scattered, the rest is absorbed; all of it, default
-//! anisotropy = 0.0                # mean cosine of the angle of scattering, default: to all sides alike
-//! technique = "prefiltered"       # or another of `scattering::ALL`; default: the first for all of the lights
-//! steps = 64                      # along a ray, where one is marched along
+//! anisotropy = 0.0                # default; mean cosine of the angle of scattering; 0: to all sides alike
+//! technique = "prefiltered"       # or "prefiltered-6", "ray-marching"; default: the first for all of the lights
+//! steps = 64                      # default; along a ray, where one is marched along
 //!
 //! [output]
-//! width = 960
-//! height = 540
+//! width = 960                     # default
+//! height = 540                    # default
 //! ```
 //!
 //! Everything is checked when the file is read; an error names file, line, column, the field and
@@ -74,7 +77,7 @@ use serde::Deserialize;
 
 use crate::graph::ImagePasses;
 use crate::scattering::{self, Scattering};
-use crate::techniques::{self, Map, Technique};
+use crate::techniques::{self, DepthBias, Map, Technique};
 use crate::visibility::SAMPLES;
 
 pub use error::{Place, Result, SceneError};
@@ -118,7 +121,8 @@ pub enum Geometry {
         /// Edge of a square of ground under the model, in units of the model's larger horizontal
         /// extent; 0 for none.
         ground: f32,
-        /// Share of light that the model does not let pass, 0 to 1; below 1 only with ground, which is opaque.
+        /// Share of light that the model does not let pass, 0 to 1; below 1 only with ground, which is opaque. What its
+        /// materials say themselves is multiplied by this.
         opacity: f32,
     },
     /// A built-in scene.
@@ -233,9 +237,10 @@ pub struct Shadow {
     /// What is done so that rounding cannot make moments impossible, 0 to 0.1: how far they are pulled
     /// towards those of a harmless distribution, or what [`Map::moment_bias`] says of the technique.
     pub moment_bias: f32,
-    /// Subtracted from the receiver's depth, in units of the map's whole depth, 0 to 0.1.
-    pub depth_bias: f32,
-    /// Shadow below this much is light: the rest is stretched. 0 to 0.9.
+    /// Subtracted from the receiver's depth. Scene files say it as a share of the map's whole depth, 0 to 0.1.
+    pub depth_bias: DepthBias,
+    /// A shadow of 1 minus this is full, and lighter ones are darkened in proportion: 0 to 0.9, of which what is beyond
+    /// 0.5 counts as 0.5.
     pub leak_cut: f32,
     /// Whether the filtered map has mip levels, from which a pixel takes the mean over all that it sees of the map.
     /// Techniques without a map that is interpolated have none.
@@ -271,17 +276,42 @@ impl Shadow {
         }
     }
 
-    /// These shadows by another technique: what is said of biases and of soft shadows is as that one has it.
+    /// These shadows by a technique. Biases are for one technique, and that of moments for one of its maps: with others,
+    /// they are as those have them. All else stays.
     #[must_use]
-    pub const fn by(self, technique: &'static Technique, map: Map) -> Self {
+    pub fn by(self, technique: &'static Technique, map: Map) -> Self {
+        let is_own = technique == self.technique;
+        let is_own_map = is_own && map == self.map;
         Self {
-            size: self.size,
-            multisampling: self.multisampling,
-            filter: self.filter,
-            fit: self.fit,
-            mips: self.mips,
-            anisotropy: self.anisotropy,
-            ..Self::of(technique, map)
+            technique,
+            map,
+            moment_bias: match is_own_map {
+                true => self.moment_bias,
+                false => map.moment_bias,
+            },
+            depth_bias: match is_own {
+                true => self.depth_bias,
+                false => technique.depth_bias,
+            },
+            ..self
+        }
+    }
+
+    /// These shadows by a technique: as they are if it is their own, else with its first map.
+    #[must_use]
+    pub fn by_technique(self, technique: &'static Technique) -> Self {
+        match technique == self.technique {
+            true => self,
+            false => self.by(technique, technique.maps[0]),
+        }
+    }
+
+    /// Texels that the filter reaches to each side; a soft shadow's has no fixed width.
+    #[must_use]
+    pub const fn radius(&self) -> u32 {
+        match self.technique.is_soft {
+            true => 0,
+            false => self.filter / 2,
         }
     }
 }
@@ -335,7 +365,8 @@ impl Scene {
     /// Loads or makes the scene's triangles; at least one, none without area.
     ///
     /// # Errors
-    /// [`SceneError::Read`], [`SceneError::Model`], [`SceneError::Empty`].
+    /// [`SceneError::Read`], [`SceneError::Model`], also of a model without anything opaque and without ground;
+    /// [`SceneError::Empty`].
     pub fn mesh(&self) -> Result<Mesh> {
         match &self.geometry {
             Geometry::Procedural(p) => Ok(p.mesh()),
@@ -345,7 +376,18 @@ impl Scene {
                 opacity,
             } => {
                 let mut mesh = model::load(file)?;
-                mesh.fade(*opacity);
+                if *opacity < 1.0 {
+                    let all = mesh.all_opacities().into_iter();
+                    mesh.opacities = all.map(|own| own * opacity).collect();
+                }
+                if *ground == 0.0 && mesh.opaque().is_empty() {
+                    return Err(SceneError::Model {
+                        file: file.clone(),
+                        problem: "all of its materials blend (alphaMode BLEND), and nothing opaque is there to show \
+                                  a shadow: put it on a `ground`"
+                            .into(),
+                    });
+                }
                 if let Some(bounds) = mesh.bounds().filter(|_| *ground > 0.0) {
                     let size = bounds.size();
                     let half = size.x.max(size.z).max(size.y * 0.1) * ground * 0.5;

@@ -1,10 +1,11 @@
-//! glTF models: the triangles of the default scene, in world space, in their materials' base colour.
-//! Textures, skins, cameras and animations are passed over.
+//! glTF models: the triangles of the default scene, in world space, in their materials' base colour, and translucent
+//! where a material blends. Textures, skins, cameras and animations are passed over.
 
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use gltf::accessor::{DataType, Dimensions};
+use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Semantic};
 use hankel_dsl::glam::{Affine3A, Mat4, Vec3};
@@ -26,9 +27,13 @@ const MAX_BYTES: u64 = 2 << 30;
 /// Loads the default scene (else the first) of a `.gltf` or `.glb` file. Normals that are missing
 /// are computed, smooth over shared vertices.
 ///
+/// Without textures a primitive has one alpha, that of its `baseColorFactor`. With `alphaMode` `BLEND` it is the opacity
+/// of its vertices. With `MASK` it is there if its alpha is at least `alphaCutoff`, and left out otherwise. With `OPAQUE`
+/// alpha does not count (glTF 2.0, "Alpha Coverage").
+///
 /// # Errors
 /// [`SceneError::Read`] and [`SceneError::Model`]; [`SceneError::Empty`] for a model without
-/// triangles.
+/// triangles that are drawn.
 pub fn load(file: &Path) -> Result<Mesh> {
     let bytes = input::read(file, MAX_BYTES)?;
     Loader {
@@ -311,7 +316,16 @@ impl Loader<'_> {
                  numbers from 0 to 1"
             ));
         }
-        let [r, g, b, _] = colour;
+        let [r, g, b, alpha] = colour;
+        match material.alpha_mode() {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask if alpha < material.alpha_cutoff().unwrap_or(0.5) => {
+                return Ok(Mesh::default());
+            }
+            AlphaMode::Mask => {}
+            AlphaMode::Blend if alpha < 1.0 => mesh.fade(alpha),
+            AlphaMode::Blend => {}
+        }
         mesh.paint(Vec3::new(r, g, b));
         match primitive.get(&Semantic::Normals) {
             Some(accessor) => {

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::graph::ImagePasses;
 use crate::scattering::{self, Scattering};
-use crate::techniques::{self, Map, Technique};
+use crate::techniques::{self, DepthBias, Map, Technique};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -489,7 +489,7 @@ impl Reader<'_> {
             );
         }
         let most = Scene::MAX_ANISOTROPY;
-        let bias = 0.0..=0.1;
+        let bias = 0.0..=DepthBias::MOST;
         Ok(Shadow {
             samples,
             multisampling,
@@ -502,7 +502,13 @@ impl Reader<'_> {
                 d.moment_bias,
                 bias.clone(),
             )?,
-            depth_bias: self.number("shadow.depth_bias", s.depth_bias, d.depth_bias, bias)?,
+            depth_bias: match s.depth_bias {
+                Some(share) => {
+                    let share = self.number("shadow.depth_bias", Some(share), 0.0, bias)?;
+                    DepthBias::Share(share)
+                }
+                None => d.depth_bias,
+            },
             leak_cut: self.number("shadow.leak_cut", s.leak_cut, d.leak_cut, 0.0..=0.9)?,
             mips: s.mips,
             anisotropy: self.integer("shadow.anisotropy", s.anisotropy, d.anisotropy, 1..=most)?,

@@ -102,18 +102,20 @@ impl CameraView {
 
 /// The corners of what is left of a convex polygon within a view: at least three, or none.
 fn clipped(clip_from_world: &DMat4, corners: Vec<DVec3>) -> Vec<DVec3> {
-    let corners = corners.into_iter();
-    let mut polygon: Vec<(DVec3, DVec4)> = corners
-        .map(|p| (p, *clip_from_world * p.extend(1.0)))
-        .collect();
-    for plane in CLIP {
+    let world_from_clip = clip_from_world.transpose();
+    cut(&CLIP.map(|plane| world_from_clip * plane), corners)
+}
+
+/// The corners of what is left of a convex polygon where the product with no plane is negative: at least three, or
+/// none.
+fn cut(planes: &[DVec4], mut polygon: Vec<DVec3>) -> Vec<DVec3> {
+    for plane in planes {
         let mut within = Vec::with_capacity(polygon.len() + 1);
         for (i, b) in polygon.iter().enumerate() {
             let a = &polygon[(i + polygon.len() - 1) % polygon.len()];
-            let (da, db) = (plane.dot(a.1), plane.dot(b.1));
+            let (da, db) = (plane.dot(a.extend(1.0)), plane.dot(b.extend(1.0)));
             if (da < 0.0) != (db < 0.0) {
-                let t = da / (da - db);
-                within.push((a.0.lerp(b.0, t), a.1.lerp(b.1, t)));
+                within.push(a.lerp(*b, da / (da - db)));
             }
             if db >= 0.0 {
                 within.push(*b);
@@ -121,7 +123,7 @@ fn clipped(clip_from_world: &DMat4, corners: Vec<DVec3>) -> Vec<DVec3> {
         }
         polygon = within;
     }
-    polygon.into_iter().map(|(p, _)| p).collect()
+    polygon
 }
 
 /// A box along three axes, empty at first.
@@ -155,6 +157,17 @@ impl Extent {
             self.high[i] = self.high[i].max(other.high[i]);
         }
     }
+
+    /// Its middle along an axis, and half its width.
+    fn middle(&self, i: usize) -> (f64, f64) {
+        let [low, high] = [self.low[i], self.high[i]];
+        (0.5 * (high + low), 0.5 * (high - low))
+    }
+
+    /// Whether nothing is within. A plane across an axis is something.
+    fn is_empty(&self) -> bool {
+        self.low[2] > self.high[2]
+    }
 }
 
 impl LightView {
@@ -167,9 +180,9 @@ impl LightView {
         Self::of(axes, Extent::of(&axes, points), size, margin)
     }
 
-    /// The same around what a camera sees of the mesh, be it hidden or not. Towards the light the box
-    /// goes as far as what may cast shadows into it. Without anything that the camera sees, as
-    /// [`LightView::new`].
+    /// The same around what a camera sees of the mesh, be it hidden or not, and around all that lies between that and
+    /// a light of this half width, the tangent of an angle. Towards the light the box goes as far as what may cast
+    /// shadows into it. Without anything that the camera sees, as [`LightView::new`].
     #[must_use]
     pub fn fitted(
         direction: Vec3,
@@ -177,13 +190,14 @@ impl LightView {
         size: u32,
         margin: u32,
         camera: &CameraView,
+        radius: f32,
     ) -> Self {
         let axes = axes(direction);
         let mut seen = Extent::NONE;
         for t in 0..mesh.triangles.len() {
             seen.and(&Extent::of(&axes, camera.clipped(mesh.corners(t))));
         }
-        Self::around(axes, seen, mesh, size, margin)
+        Self::around(axes, seen, mesh, size, margin, radius)
     }
 
     /// The same around all that a camera sees through, from itself to its far plane, as far as the mesh could cast
@@ -195,6 +209,7 @@ impl LightView {
         size: u32,
         margin: u32,
         camera: &CameraView,
+        radius: f32,
     ) -> Self {
         let axes = axes(direction);
         let eye = camera.eye.as_dvec3();
@@ -208,14 +223,26 @@ impl LightView {
         if (0..3).any(|i| seen.low[i] > seen.high[i]) {
             seen = Extent::NONE;
         }
-        Self::around(axes, seen, mesh, size, margin)
+        Self::around(axes, seen, mesh, size, margin, radius)
     }
 
     /// Around what is seen, and towards the light around what may cast shadows there.
-    fn around(axes: [DVec3; 3], mut seen: Extent, mesh: &Mesh, size: u32, margin: u32) -> Self {
-        if seen.low[0] > seen.high[0] {
+    fn around(
+        axes: [DVec3; 3],
+        mut seen: Extent,
+        mesh: &Mesh,
+        size: u32,
+        margin: u32,
+        radius: f32,
+    ) -> Self {
+        if seen.is_empty() {
             let points = mesh.positions.iter().map(|p| p.as_dvec3());
             return Self::of(axes, Extent::of(&axes, points), size, margin);
+        }
+        if radius > 0.0 {
+            let planes = between(&axes, &seen, f64::from(radius));
+            let polygons = all(mesh).map(|corners| cut(&planes, corners));
+            seen.and(&Extent::of(&axes, polygons.flatten()));
         }
         // With the filter's margin.
         let free = f64::from(margin) / f64::from(size);
@@ -265,6 +292,30 @@ impl LightView {
     }
 }
 
+/// All triangles of a mesh.
+fn all(mesh: &Mesh) -> impl Iterator<Item = Vec<DVec3>> {
+    (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(Vec3::as_dvec3).to_vec())
+}
+
+/// Planes around the places that may hide a part of a directional light from something within `seen`. A light of this
+/// half width is seen from a receiver through a region that is as much wider than a point as it is before the
+/// receiver, times the half width; no receiver is farther than the far end of `seen`.
+fn between(axes: &[DVec3; 3], seen: &Extent, radius: f64) -> [DVec4; 5] {
+    let (along, far) = (axes[2], seen.high[2]);
+    let aside = |i: usize, side: f64| {
+        let (middle, half) = seen.middle(i);
+        let offset = half + side * middle + radius * far;
+        (axes[i] * -side - along * radius).extend(offset)
+    };
+    [
+        aside(0, 1.0),
+        aside(0, -1.0),
+        aside(1, 1.0),
+        aside(1, -1.0),
+        (-along).extend(far),
+    ]
+}
+
 /// A spot light's near plane is no nearer than this share of the scene's size: what is nearer to it casts no shadow.
 const NEAREST: f64 = 1e-3;
 /// What lies within the map keeps off depths 0 and 1 by this much, as with a directional light: moments close to the
@@ -279,6 +330,28 @@ struct Frustum {
 }
 
 impl Frustum {
+    /// Planes around the places that may hide a part of a light of half width `radius` from something within
+    /// `receivers`. Towards the light, the regions that receivers see it through end in the light, not in its middle:
+    /// at a distance z they are wider by half its width times 1 - z / far.
+    fn between(&self, receivers: &Extent, radius: f64) -> [DVec4; 6] {
+        let along = self.axes[2];
+        let (near, far) = (self.within.low[2], receivers.high[2]);
+        let plane = |normal: DVec3, offset: f64| normal.extend(offset - normal.dot(self.position));
+        let aside = |i: usize, side: f64| {
+            let (middle, half) = receivers.middle(i);
+            let slope = half + side * middle - radius / far;
+            plane(along * slope - self.axes[i] * side, radius)
+        };
+        [
+            aside(0, 1.0),
+            aside(0, -1.0),
+            aside(1, 1.0),
+            aside(1, -1.0),
+            plane(along, -near),
+            plane(-along, far),
+        ]
+    }
+
     /// Coordinates as in `within`.
     fn seen(&self, place: DVec3) -> [f64; 3] {
         let [x, y, z] = self.axes.map(|axis| axis.dot(place - self.position));
@@ -309,8 +382,13 @@ impl Frustum {
     /// What of these polygons lies within.
     fn extent(&self, polygons: impl Iterator<Item = Vec<DVec3>>) -> Extent {
         let clip = self.clip_from_world();
+        self.extent_of(polygons.flat_map(|polygon| clipped(&clip, polygon)))
+    }
+
+    /// What these places, all before the light, lie between.
+    fn extent_of(&self, places: impl Iterator<Item = DVec3>) -> Extent {
         let mut extent = Extent::NONE;
-        for place in polygons.flat_map(|polygon| clipped(&clip, polygon)) {
+        for place in places {
             for (i, x) in self.seen(place).into_iter().enumerate() {
                 extent.low[i] = extent.low[i].min(x);
                 extent.high[i] = extent.high[i].max(x);
@@ -322,9 +400,11 @@ impl Frustum {
 
 impl LightView {
     /// What a spot light sees of a mesh within its cone, with `margin` texels left free at each side for the filter;
-    /// only what `camera` sees of it, if there is one, and what may cast shadows on that. Its depths are those of
-    /// the projection, as a rasteriser has them, and reach from the first caster to the last receiver. Without
-    /// anything within the cone, depths do not matter.
+    /// only what `camera` sees of it, if there is one, and what may cast shadows on that. What lies between that and
+    /// all of the light is there as well, `radius` being half the width of the light: also outside of the cone, as seen
+    /// from the light's middle, but not farther aside than in the widest cone. Its depths are those of the projection,
+    /// as a rasteriser has them, and reach from the first caster to the last receiver. Without anything within the cone,
+    /// depths do not matter. Where the camera sees nothing of what is there, it is as without a camera.
     #[must_use]
     pub fn spot(
         spot: &Spot,
@@ -332,12 +412,14 @@ impl LightView {
         size: u32,
         margin: u32,
         camera: Option<&CameraView>,
+        radius: f32,
     ) -> Self {
         let axes = axes(spot.direction);
         let position = spot.position.as_dvec3();
         let from = mesh.positions.iter().map(|p| p.as_dvec3() - position);
         let reach = from.map(DVec3::length).fold(f64::MIN_POSITIVE, f64::max);
-        let tangent = (0.5 * f64::from(spot.angle).to_radians()).tan();
+        let half = |degrees: f32| (0.5 * f64::from(degrees).to_radians()).tan();
+        let tangent = half(spot.angle);
         let mut frustum = Frustum {
             axes,
             position,
@@ -346,24 +428,33 @@ impl LightView {
                 high: [tangent, tangent, reach * 1.01],
             },
         };
-        let all =
-            || (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(Vec3::as_dvec3).to_vec());
-        let receivers = match camera {
-            Some(camera) => {
-                let clip = camera.clip_from_world.as_dmat4();
-                frustum.extent(all().map(|corners| clipped(&clip, corners)))
-            }
-            None => frustum.extent(all()),
-        };
-        if receivers.low[2] < receivers.high[2] {
-            if camera.is_some() {
+        let seen = camera.map(|camera| {
+            let clip = camera.clip_from_world.as_dmat4();
+            frustum.extent(all(mesh).map(|corners| clipped(&clip, corners)))
+        });
+        let seen = seen.filter(|seen| !seen.is_empty());
+        let receivers = seen.unwrap_or_else(|| frustum.extent(all(mesh)));
+        if !receivers.is_empty() {
+            if seen.is_some() {
                 // A map without an extent has no texels.
                 let least = tangent * 1e-3;
                 for i in 0..2 {
-                    let middle = 0.5 * (receivers.low[i] + receivers.high[i]);
-                    let half = (0.5 * (receivers.high[i] - receivers.low[i])).max(least);
+                    let (middle, half) = receivers.middle(i);
+                    let half = half.max(least);
                     frustum.within.low[i] = middle - half;
                     frustum.within.high[i] = middle + half;
+                }
+            }
+            if radius > 0.0 {
+                let planes = frustum.between(&receivers, f64::from(radius));
+                let casters = all(mesh).flat_map(|corners| cut(&planes, corners));
+                let casters = frustum.extent_of(casters);
+                // In a map that is wider still, what is before the light has hardly a texel.
+                let widest = half(Spot::MAX_ANGLE);
+                for i in 0..2 {
+                    let Extent { low, high } = &mut frustum.within;
+                    low[i] = low[i].min(casters.low[i].max(-widest));
+                    high[i] = high[i].max(casters.high[i].min(widest));
                 }
             }
             frustum.within.high[2] = receivers.high[2] * 1.001;
@@ -376,7 +467,7 @@ impl LightView {
             frustum.within.high[i] = high + widen;
         }
         // What lies between the light and the receivers. Depth is linear in the reciprocal of the distance.
-        let casters = frustum.extent(all());
+        let casters = frustum.extent(all(mesh));
         let far = frustum.within.high[2];
         let near = casters.low[2].max(frustum.within.low[2]).min(far * 0.5);
         let spare = (1.0 / near - 1.0 / far) * SPARE / (1.0 - 2.0 * SPARE);
@@ -468,7 +559,7 @@ mod tests {
         let direction = Vec3::new(0.7, -0.6, -0.35);
         let (whole, fitted) = (
             LightView::new(direction, &mesh, 256, 4),
-            LightView::fitted(direction, &mesh, 256, 4, &view),
+            LightView::fitted(direction, &mesh, 256, 4, &view, 0.0),
         );
         assert!(fitted.texel[0] * fitted.texel[1] < 0.5 * whole.texel[0] * whole.texel[1]);
         assert!(fitted.depth <= whole.depth);
@@ -508,6 +599,161 @@ mod tests {
             ..camera
         };
         let view = CameraView::new(&away, &mesh, 1.5);
-        assert_eq!(LightView::fitted(direction, &mesh, 256, 4, &view), whole);
+        assert_eq!(
+            LightView::fitted(direction, &mesh, 256, 4, &view, 0.1),
+            whole
+        );
+    }
+
+    /// A lid above a floor that is much larger than what the camera sees of it.
+    fn lid() -> (Mesh, CameraView) {
+        let mut mesh = Mesh::default();
+        for (half, y) in [(4.0, 0.0), (1.2, 3.0)] {
+            let corners = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+            mesh.quad(corners.map(|[x, z]| Vec3::new(half * x, y, half * z)));
+            mesh.paint(Vec3::ONE);
+        }
+        let camera = Camera {
+            eye: Vec3::new(0.4, 2.0, 0.01),
+            target: Vec3::new(0.4, 0.0, 0.0),
+            up: Vec3::Y,
+            fov: 30.0,
+        };
+        let view = CameraView::new(&camera, &mesh, 1.5);
+        (mesh, view)
+    }
+
+    /// How many ways from what a camera sees to a grid of points of a light end in the mesh; the map holds where. `ways`
+    /// are those from a place.
+    fn held(
+        light: &LightView,
+        mesh: &Mesh,
+        camera: &CameraView,
+        ways: impl Fn(DVec3) -> Vec<DVec3>,
+    ) -> usize {
+        use crate::visibility::cast::{Caster, Lens, Segment};
+        let (width, height) = (24, 16);
+        let lens = Lens::new(camera.clip_from_world, width, height);
+        let caster = Caster::of(mesh);
+        let mut hidden = 0;
+        for i in 0..width * height {
+            let segment = lens.segment([i % width, i / width], [0.5, 0.5]);
+            let Some(hit) = caster.first(&segment) else {
+                continue;
+            };
+            let place = segment.at(hit.t);
+            for way in ways(place) {
+                let segment = Segment::new(place + way * 1e-6, way);
+                let Some(hit) = caster.first(&segment) else {
+                    continue;
+                };
+                let place = segment.at(hit.t).as_vec3();
+                let clip = light.clip_from_world.project_point3(place);
+                let is_held = clip.x.abs() <= 1.0 && clip.y.abs() <= 1.0;
+                assert!(is_held && clip.z > 0.0 && clip.z < 1.0, "{place} {clip}");
+                hidden += 1;
+            }
+        }
+        hidden
+    }
+
+    const GRID: [f64; 5] = [-1.0, -0.6, 0.0, 0.7, 1.0];
+
+    #[test]
+    fn a_fitted_map_holds_what_hides_any_part_of_a_directional_light() {
+        let (mesh, view) = lid();
+        let direction = Vec3::new(0.1, -1.0, 0.05);
+        let [right, up, along] = axes(direction);
+        let radius = 0.3;
+        let of = |radius: f32| LightView::fitted(direction, &mesh, 256, 4, &view, radius);
+        let (point, area) = (of(0.0), of(radius));
+        let ways = |_| {
+            let way = |x: f64, y: f64| (right * x + up * y) * f64::from(radius) - along;
+            let rows = GRID.iter().map(|y| GRID.map(|x| way(x, *y) * 100.0));
+            rows.flatten().collect()
+        };
+        let hidden = held(&area, &mesh, &view, ways);
+        assert!(hidden > 5000, "{hidden}");
+        // Not more than that, and never more than all.
+        let whole = LightView::new(direction, &mesh, 256, 4);
+        for i in 0..2 {
+            assert!(area.texel[i] > point.texel[i] && area.texel[i] < 0.5 * whole.texel[i]);
+            let wide = LightView::fitted(direction, &mesh, 256, 4, &view, 100.0);
+            assert!(wide.texel[i] <= whole.texel[i] * 1.000_01);
+        }
+    }
+
+    #[test]
+    fn a_map_holds_what_hides_any_part_of_a_spot_light() {
+        let (mesh, view) = lid();
+        let spot = Spot {
+            position: Vec3::new(0.0, 9.0, 0.0),
+            direction: Vec3::new(0.0, -1.0, 0.01).normalize(),
+            angle: 20.0,
+            inner: 10.0,
+        };
+        let [right, up, _] = axes(spot.direction);
+        let radius = 4.0;
+        let ways = |place: DVec3| {
+            let way = |x: f64, y: f64| {
+                let light = spot.position.as_dvec3() + (right * x + up * y) * f64::from(radius);
+                light - place
+            };
+            let rows = GRID.iter().map(|y| GRID.map(|x| way(x, *y)));
+            rows.flatten().collect()
+        };
+        let of = |camera: Option<&CameraView>, radius| {
+            LightView::spot(&spot, &mesh, 256, 4, camera, radius)
+        };
+        for camera in [None, Some(&view)] {
+            let light = of(camera, radius);
+            let hidden = held(&light, &mesh, &view, ways);
+            assert!(hidden > 4000, "{hidden}");
+        }
+        // A fitted map is never the coarser one.
+        for radius in [0.0, 0.5, radius, 100.0] {
+            let (whole, fitted) = (of(None, radius), of(Some(&view), radius));
+            for i in 0..2 {
+                assert!(fitted.texel[i] <= whole.texel[i] * 1.000_01, "{radius}");
+            }
+        }
+    }
+
+    /// All that a lamp shines on is equally far from it here.
+    #[test]
+    fn a_map_of_a_floor_below_a_lamp_is_fitted() {
+        let mesh = Procedural::Empty.mesh();
+        let camera = Camera {
+            eye: Vec3::new(0.3, 2.0, 0.01),
+            target: Vec3::new(0.3, 0.0, 0.0),
+            up: Vec3::Y,
+            fov: 20.0,
+        };
+        let view = CameraView::new(&camera, &mesh, 1.5);
+        let spot = Spot {
+            position: Vec3::new(0.0, 3.0, 0.0),
+            direction: Vec3::NEG_Y,
+            angle: 60.0,
+            inner: 50.0,
+        };
+        let of = |camera| LightView::spot(&spot, &mesh, 256, 4, camera, 0.0);
+        let (whole, fitted) = (of(None), of(Some(&view)));
+        for i in 0..2 {
+            assert!(
+                fitted.texel[i] < 0.5 * whole.texel[i],
+                "{fitted:?} {whole:?}"
+            );
+        }
+        // What is three off is all that there is.
+        let end = whole.near.unwrap() + whole.depth;
+        assert!(end < 3.1, "{end}");
+        // A camera that sees nothing of it.
+        let away = Camera {
+            eye: Vec3::new(0.0, 3.0, 6.0),
+            target: Vec3::new(0.0, 5.0, 12.0),
+            ..camera
+        };
+        let blind = CameraView::new(&away, &mesh, 1.5);
+        assert_eq!(of(Some(&blind)), whole);
     }
 }

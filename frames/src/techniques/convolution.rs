@@ -7,7 +7,7 @@ use hankel_dsl::glam::Vec4;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_shadows::convolution::Series;
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{DEPTHS, Given, filtered_maps, shade_filtered};
 
@@ -28,7 +28,7 @@ pub const FOUR: Technique = Technique {
     name: "convolution",
     summary: "a Fourier series of the comparison, four terms",
     // On a surface the series is half, and twice the series is all light.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: MAPS,
     is_lower_bound: false,
     is_soft: false,

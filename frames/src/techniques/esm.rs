@@ -3,7 +3,7 @@
 
 use hankel_dsl::native::describe::TexelFormat;
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{DEPTHS, Given, blur, light_depth, resolve_depth, shade_filtered};
 
@@ -14,7 +14,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "esm",
     summary: "the mean of an exponential, in one channel",
     // On a surface the exponential's mean is 1 or, on a slope, more.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: &[Map {
         format: TexelFormat::R32Float,
         ..DEPTHS[0]

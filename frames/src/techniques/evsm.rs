@@ -4,7 +4,7 @@
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_shadows::exponential::Exponents;
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, blur, light_depth, resolve_depth, shade_filtered};
 use crate::scene::DepthRange;
@@ -43,7 +43,7 @@ pub const POSITIVE: Technique = Technique {
     name: "evsm2",
     summary: "mean and variance of one exponential",
     // The least variance keeps a surface from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: MAPS,
     is_lower_bound: true,
     is_soft: false,

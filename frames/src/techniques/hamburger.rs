@@ -1,7 +1,7 @@
 //! Hamburger four moment shadow mapping: the least shadow that a texel's four moments allow, with
 //! depths anywhere on the line.
 
-use super::Technique;
+use super::{DepthBias, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, POWER_MOMENTS, blur, moment_map, shade_filtered};
 
@@ -9,7 +9,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "hamburger",
     summary: "four moments, depths anywhere on the line",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: POWER_MOMENTS,
     is_lower_bound: true,
     is_soft: false,

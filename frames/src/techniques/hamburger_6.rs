@@ -6,7 +6,7 @@ use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{Bias, MEASURED, SYMMETRIC_6_16, SYMMETRIC_6_32};
 use hankel_shadows::shade::encoding;
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, blurred, resolve_casters, shade, shade_filtered, taps_along, textures};
 use crate::scene::DepthRange;
@@ -15,7 +15,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "hamburger-6",
     summary: "six moments, depths anywhere on the line",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: &[
         map(
             TexelFormat::Rgba16Unorm,

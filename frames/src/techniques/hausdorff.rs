@@ -5,7 +5,7 @@ use hankel_moments::bias::{
     Bias, HAUSDORFF_SYMMETRIC_4_16, HAUSDORFF_SYMMETRIC_4_32, HAUSDORFF_UNIT_4_16,
 };
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, POWER_MOMENTS, biased, blur, moment_map, shade_filtered};
 
@@ -13,7 +13,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "hausdorff",
     summary: "four moments, depths within the map's range",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: MAPS,
     is_lower_bound: true,
     is_soft: false,

@@ -23,7 +23,7 @@ use hankel_dsl::native::describe::TexelFormat;
 
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::Given;
-use crate::scene::{DepthRange, Light};
+use crate::scene::{DepthRange, Light, LightView};
 
 /// A way to turn depths into shadows.
 pub struct Technique {
@@ -31,9 +31,8 @@ pub struct Technique {
     pub name: &'static str,
     /// What it is, in a few words.
     pub summary: &'static str,
-    /// What is taken off a receiver's depth unless the scene says otherwise, in units of the map's
-    /// whole depth.
-    pub depth_bias: f32,
+    /// What is taken off a receiver's depth unless the scene says otherwise.
+    pub depth_bias: DepthBias,
     /// How its map may be stored: at least one, the first unless the scene says otherwise.
     pub maps: &'static [Map],
     /// Whether its shadow is never darker than [`crate::truth::filtered`], but for rounding.
@@ -43,6 +42,40 @@ pub struct Technique {
     pub is_soft: bool,
     /// Adds its passes; gives the picture.
     pub add: fn(&mut Graph, &Given) -> Result<Handle>,
+}
+
+/// What is taken off a receiver's depth before it is compared, so that a surface does not shade itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DepthBias {
+    /// A share of the map's whole depth, 0 to 0.1.
+    Share(f32),
+    /// What a surface of this slope, depth over width, rises over the filter's radius and one texel more: as far as the
+    /// depths are that a receiver is compared with. Of a spot light's map, the texels are those at its far end.
+    Slope(f32),
+}
+
+impl DepthBias {
+    /// None.
+    pub const NONE: Self = Self::Share(0.0);
+    /// That of percentage-closer filtering, measured on the scenes of `scenes/`: see docs/frames.md.
+    pub const COMPARED: Self = Self::Slope(1.0);
+
+    /// As a share of the whole depth of a map, for a filter that reaches so many texels to each side; at most
+    /// [`DepthBias::MOST`].
+    #[must_use]
+    pub fn share(self, view: &LightView, radius: u32) -> f32 {
+        match self {
+            Self::Share(share) => share,
+            Self::Slope(slope) => {
+                let [x, y] = view.texel;
+                let reach = x.max(y) * (radius + 1) as f32;
+                (slope * reach / view.depth).min(Self::MOST)
+            }
+        }
+    }
+
+    /// The greatest share.
+    pub const MOST: f32 = 0.1;
 }
 
 /// A way to store what a technique filters.

@@ -4,7 +4,7 @@
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{Bias, SYMMETRIC_4_32, SYMMETRIC_6_32, SYMMETRIC_8_32, SYMMETRIC_10_32};
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, blurred, filtered_maps, resolve_casters, shade_filtered, textures};
 use crate::scene::DepthRange;
@@ -13,7 +13,7 @@ pub const FOUR: Technique = Technique {
     name: "moments-4",
     summary: "four moments, by the bound for any number",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: &[map(SYMMETRIC_4_32)],
     is_lower_bound: true,
     is_soft: false,

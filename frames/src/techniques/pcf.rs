@@ -6,7 +6,7 @@ use hankel_dsl::glam::UVec2;
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_host::device::Blend;
 
-use super::Technique;
+use super::{DepthBias, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{
     DEPTHS, Given, by_samples, draw_translucent, opaque_depth, samples_of_map, shade,
@@ -16,7 +16,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "pcf",
     summary: "percentage-closer filtering of the depths themselves",
     // The comparison has no slack, and a slope would be shaded by its own texels.
-    depth_bias: 2e-3,
+    depth_bias: DepthBias::COMPARED,
     maps: DEPTHS,
     is_lower_bound: false,
     is_soft: false,

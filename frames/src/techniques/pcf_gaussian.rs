@@ -3,7 +3,7 @@
 
 use hankel_dsl::glam::IVec2;
 
-use super::Technique;
+use super::{DepthBias, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{DEPTHS, Given, by_samples, light_depth, shade, taps_along};
 
@@ -11,7 +11,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "pcf-gaussian",
     summary: "percentage-closer filtering with the other techniques' weights",
     // As for `pcf`.
-    depth_bias: 2e-3,
+    depth_bias: DepthBias::COMPARED,
     maps: DEPTHS,
     is_lower_bound: true,
     is_soft: false,

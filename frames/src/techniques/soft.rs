@@ -4,7 +4,7 @@
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{SYMMETRIC_4_16_LECTURE, SYMMETRIC_6_16};
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, TABLES, TABLES_6, biased, light_depth, shade, summed_area};
 use crate::scene::DepthRange;
@@ -12,7 +12,7 @@ use crate::scene::DepthRange;
 pub const FOUR: Technique = Technique {
     name: "soft",
     summary: "moment soft shadows of an area light, four moments",
-    depth_bias: 1e-3,
+    depth_bias: DepthBias::Share(1e-3),
     maps: &[SUMMED],
     is_lower_bound: false,
     is_soft: true,

@@ -7,7 +7,7 @@ use hankel_host::device::TextureShape;
 use hankel_moments::{Moments4, quantize_symmetric_4};
 use hankel_shadows::tiles::{ACROSS, EDGE, Listed, TEXELS, Tiles, tiles_of};
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{
     BILINEAR, DEPTHS, Given, POWER_MOMENTS, by_samples, light_depth, shade, taps_along,
@@ -16,7 +16,7 @@ use crate::passes::{
 pub const HAMBURGER: Technique = Technique {
     name: "hamburger-tiles",
     summary: "`hamburger` where a tile's depths do not settle it",
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: &[SYMMETRIC],
     is_lower_bound: true,
     is_soft: false,
@@ -27,7 +27,7 @@ pub const PCF_GAUSSIAN: Technique = Technique {
     name: "pcf-gaussian-tiles",
     summary: "`pcf-gaussian` where a tile's depths do not settle it",
     // As for `pcf`.
-    depth_bias: 2e-3,
+    depth_bias: DepthBias::COMPARED,
     maps: DEPTHS,
     is_lower_bound: true,
     is_soft: false,

@@ -4,7 +4,7 @@ use hankel_dsl::native::describe::TexelFormat;
 use hankel_moments::bias::{Bias, TRIGONOMETRIC_2_16, TRIGONOMETRIC_2_32};
 use hankel_shadows::trigonometric::encoding;
 
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, blur, light_depth, resolve_depth, shade_filtered};
 use crate::scene::DepthRange;
@@ -13,7 +13,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "tmsm",
     summary: "two complex trigonometric moments",
     // The moment bias spreads a single surface a little, which keeps it from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: &[
         map(
             TexelFormat::Rgba16Unorm,

@@ -1,6 +1,6 @@
 //! Variance shadow mapping: the least shadow that mean and variance of a texel's depths allow.
 
-use super::Technique;
+use super::{DepthBias, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, POWER_MOMENTS, blur, moment_map, shade_filtered};
 
@@ -8,7 +8,7 @@ pub const TECHNIQUE: Technique = Technique {
     name: "vsm",
     summary: "two moments: mean and variance",
     // The least variance keeps a surface from shading itself.
-    depth_bias: 0.0,
+    depth_bias: DepthBias::NONE,
     maps: POWER_MOMENTS,
     is_lower_bound: true,
     is_soft: false,

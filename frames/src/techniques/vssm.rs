@@ -2,14 +2,14 @@
 //! region, and by depths where these bound nothing.
 
 use super::soft::SUMMED;
-use super::{Map, Technique};
+use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
 use crate::passes::{Given, TABLES, by_samples, light_depth, shade, summed_area};
 
 pub const TECHNIQUE: Technique = Technique {
     name: "vssm",
     summary: "variance soft shadows of an area light",
-    depth_bias: 1e-3,
+    depth_bias: DepthBias::Share(1e-3),
     // The least variance: more than rounding asks for, since two moments do not bound a slope from below.
     maps: &[Map {
         moment_bias: 2e-5,

@@ -103,7 +103,7 @@ pub(super) fn read_header<T: DeserializeOwned>(from: &mut impl Read) -> io::Resu
     }
     let length = u32::from_le_bytes(length);
     if length > MAX_HEADER {
-        return Err(io::Error::other("a header of this length is none"));
+        return Err(io::Error::other("the header is too long"));
     }
     let mut text = vec![0; length as usize];
     from.read_exact(&mut text)?;

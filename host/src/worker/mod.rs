@@ -69,7 +69,7 @@ impl Workers {
                 std::fs::copy(library, &copy)?;
                 Ok((folder, copy))
             });
-        let (folder, library) = copied.map_err(|e| format!("its plug-in cannot be copied: {e}"))?;
+        let (folder, library) = copied.map_err(|e| format!("cannot copy its plug-in: {e}"))?;
         let (process, kernels) = Process::start(worker, &library)?;
         let workers = Self {
             worker: worker.clone(),
@@ -176,7 +176,7 @@ impl Workers {
 }
 
 /// Bytes of an element of each argument; `None` for those that are not one for each invocation.
-/// `None` altogether for what is no map of one dimension.
+/// `None` altogether for what is not a map of one dimension.
 fn element_sizes(kernel: &Kernel) -> Option<Vec<Option<usize>>> {
     let Stage::Compute {
         dimensions: 1,

@@ -43,14 +43,14 @@ impl Process {
             .stderr(Stdio::piped());
         let mut program = Program::start(&mut command).map_err(|e| {
             format!(
-                "no process can be started to run it in ({}): {e}",
+                "cannot start a process to run it in ({}): {e}",
                 worker.program.display()
             )
         })?;
         let log = Log::default();
         if let Some(stderr) = program.child.stderr.take() {
             log.follow(stderr)
-                .map_err(|e| format!("its process cannot be followed: {e}"))?;
+                .map_err(|e| format!("cannot read the messages of its process: {e}"))?;
         }
         let pipes = (program.child.stdin.take(), program.child.stdout.take());
         let (Some(requests), Some(answers)) = pipes else {
@@ -67,7 +67,7 @@ impl Process {
             Ok(Some(Answer::Kernels(kernels))) => Ok((process, kernels)),
             Ok(Some(Answer::Failed(problem))) => Err(problem),
             other => Err(format!(
-                "its descriptions cannot be had: its process {}",
+                "cannot read its kernel descriptions: the process {}",
                 process.ended(other.is_err_and(|late| late), LOADING)
             )),
         }

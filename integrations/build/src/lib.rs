@@ -291,10 +291,13 @@ impl Build {
             .clone()
             .or_else(|| std::env::var_os(PROGRAM).map(Into::into));
         let program = named.clone().unwrap_or_else(|| "hankel".into());
-        let (folder, dependencies) = match self.form {
-            Form::Kernels => (out.join("shaders"), out.join("shaders.d")),
-            Form::Functions => (out.join("functions"), out.join("functions.d")),
+        let name = match self.form {
+            Form::Kernels => "shaders",
+            Form::Functions => "functions",
         };
+        let folder = out.join(name);
+        let dependencies = out.join(format!("{name}.d"));
+        let environment = out.join(format!("{name}.env"));
         let mut command = Command::new(&program);
         // What cargo sets for this build script is not meant for the cargo that hankel runs; and the
         // target folder in use is locked until this script ends.
@@ -317,6 +320,8 @@ impl Build {
             .arg(&folder)
             .arg("--depfile")
             .arg(&dependencies)
+            .arg("--environment")
+            .arg(&environment)
             .args(&self.arguments);
         if let Some(file) = &self.bindings {
             command.arg("--bindings").arg(here.join(file));
@@ -344,6 +349,12 @@ impl Build {
         if let Some(program) = found(&program) {
             lines.push(format!("rerun-if-changed={}", program.display()));
         }
+        let names = std::fs::read_to_string(&environment).map_err(|e| at(&environment, e))?;
+        lines.extend(
+            names
+                .lines()
+                .map(|name| format!("rerun-if-env-changed={name}")),
+        );
         Ok((folder, lines))
     }
 }
@@ -537,15 +548,14 @@ mod tests {
         );
     }
 
-    /// The program that a script stands for: writes its arguments to `said` and an empty rule.
+    /// The program that a script stands for: writes its arguments to `said`, an empty rule and a variable.
     #[cfg(unix)]
     #[test]
     fn built_in_kernels_need_no_crate_and_follow_the_program() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().expect("a folder");
         let program = folder.path().join("hankel");
-        let script =
-            "#!/bin/sh\ncd \"$(dirname \"$0\")\" && echo \"$@\" > said && echo 'a:' > shaders.d\n";
+        let script = "#!/bin/sh\ncd \"$(dirname \"$0\")\" && echo \"$@\" > said && echo 'a:' > shaders.d && echo SEED > shaders.env\n";
         std::fs::write(&program, script).expect("a script");
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
             .expect("it runs");
@@ -555,7 +565,7 @@ mod tests {
             .unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(shaders, folder.path().join("shaders"));
         let watched = format!("rerun-if-changed={}", program.display());
-        assert_eq!(lines, [watched]);
+        assert_eq!(lines, [watched, "rerun-if-env-changed=SEED".to_owned()]);
         let said = std::fs::read_to_string(folder.path().join("said")).expect("it ran");
         assert!(
             said.contains("build --out") && said.contains("--kernel vsm"),
@@ -570,7 +580,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().expect("a folder");
         let program = folder.path().join("hankel");
-        let script = "#!/bin/sh\ncd \"$(dirname \"$0\")\" && echo \"$@\" > said && echo 'a: /b.rs' > functions.d\n";
+        let script = "#!/bin/sh\ncd \"$(dirname \"$0\")\" && echo \"$@\" > said && echo 'a: /b.rs' > functions.d && : > functions.env\n";
         std::fs::write(&program, script).expect("a script");
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
             .expect("it runs");

@@ -149,8 +149,12 @@ fn compensated<R: Real, const SYMMETRIC: bool>(m: Moments4<R>, z: R) -> R {
     all[4] = b4;
     let three = bound_compensated::<R, 2>(all, z).lower;
 
-    // As `FourPoints` has it.
-    let least: R = lit!(1e-30);
+    // As `FourPoints` has it. Products of four depths are not lost in this.
+    let least: R = if const { R::IS_WIDE } {
+        lit!(1e-290)
+    } else {
+        lit!(1e-37)
+    };
     let less = |a: R, b: R| Twofold::of(a).minus(Twofold::of(b));
     let (n0, n1, n2) = if SYMMETRIC {
         (less(one, b2), less(b1, b3), less(b2, b4))

@@ -209,7 +209,7 @@ proptest! {
 
     #[test]
     fn any_bits_give_numbers_in_range_64((m, eta) in any_row_64(), n in 1..=6_usize) {
-        let total = if m[0].is_finite() && m[0] <= 1e37 { m[0].max(0.0) } else { 0.0 };
+        let total = if m[0].is_finite() && m[0] <= 1e290 { m[0].max(0.0) } else { 0.0 };
         for b in [bounds(n, m, eta), compensated(n, m, eta)] {
             prop_assert!(0.0 <= b.lower && b.lower <= b.upper && b.upper <= total, "{b:?}");
         }

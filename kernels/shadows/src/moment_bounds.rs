@@ -1,7 +1,8 @@
 //! Bounds for two, four, six, eight, ten and twelve power moments and a free total, and their derivatives,
 //! as maps over rows of moments: `moment_bound_n2` is for N = 2, moments `m0` to `m4`.
 //!
-//! Compensated ones are in error by about what rounding the row's numbers once does, whatever the row.
+//! Compensated ones are in error by about what rounding the numbers of a row once does, for the kinds of rows that
+//! `hankel stress` draws.
 
 use hankel_dsl::{Element, Real, kernel};
 use hankel_moments::{

@@ -972,23 +972,23 @@ of_samples! {
                 }
                 i += 1;
             }
-            let distance = distances / Real::max(blockers, 1.0);
-            let mut shadowed = 0.0;
-            let mut i = 0;
-            while i < points.filter {
-                let point = array_element(&points.places, i);
-                let (found, limit) = behind(i, Vec2::new(point.z, point.w), distance);
-                if found < limit {
-                    shadowed += 1.0;
-                }
-                i += 1;
-            }
+            let mut shadow = 0.0;
             // Without blockers all is light, as published: what the filter finds was not to be found.
             if blockers > 0.0 {
-                shadowed / points.filter as f32
-            } else {
-                0.0
+                let distance = distances / blockers;
+                let mut shadowed = 0.0;
+                let mut i = 0;
+                while i < points.filter {
+                    let point = array_element(&points.places, i);
+                    let (found, limit) = behind(i, Vec2::new(point.z, point.w), distance);
+                    if found < limit {
+                        shadowed += 1.0;
+                    }
+                    i += 1;
+                }
+                shadow = shadowed / points.filter as f32;
             }
+            shadow
         })
     }
 }

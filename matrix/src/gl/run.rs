@@ -522,6 +522,8 @@ impl<'a> Run<'a> {
         let mut targets = Vec::new();
         let mut slots = Vec::new();
         let mut depth = None;
+        // llvmpipe compiles a fragment shader twice where no depth is tested: once more for tiles that are covered wholly.
+        let attached = self.context.depth([width, height])?;
         for (i, slot) in self.job.slots.iter().enumerate() {
             if let Role::Target { location, value } = slot.role {
                 let texel = Texel::named(match value.scalar {
@@ -539,17 +541,16 @@ impl<'a> Run<'a> {
                 slots.push((i, value.size as usize * 4));
             }
             if matches!(slot.role, Role::Depth) {
-                depth = Some((i, self.context.depth([width, height])?));
+                depth = Some(i);
             }
         }
-        let attached = depth.map(|it| it.1);
         self.context
-            .draw_into(&targets, attached, [width, height])?;
+            .draw_into(&targets, Some(attached), [width, height])?;
         if count > 0 {
             self.context.draw(glow::POINTS, count, &attributes)?;
         }
-        if let Some((slot, depth)) = depth {
-            let pixels = self.depths(depth, [width, height])?;
+        if let Some(slot) = depth {
+            let pixels = self.depths(attached, [width, height])?;
             let values = pixels.chunks_exact(16).take(count as usize);
             let values = values.flat_map(|it| &it[..4]).copied().collect();
             written[slot] = Some(Written::Bytes(values));

@@ -194,7 +194,6 @@ fn make_shared(compiler: &Path, folder: &Path, timeout: Duration) -> Result<(), 
     compile(&mut runner, "clang++", folder, timeout)
 }
 
-/// Bytes of all results.
 /// The text for a processor, which has one address space: of two templates that differ only in
 /// whether a pointer is to `device` or to `threadgroup` memory, the second is taken out. Its lines
 /// stay, empty, so that the compiler's messages name those of the text.
@@ -221,6 +220,7 @@ fn in_one_space(text: &str) -> String {
     whole
 }
 
+/// Bytes of all results.
 fn result_bytes(job: &Job) -> u64 {
     let mut sum = 0;
     for case in &job.cases {

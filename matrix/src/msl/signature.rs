@@ -126,7 +126,12 @@ pub fn parse(text: &str, entry_point: &str) -> Result<Signature, String> {
     let returns = match at.returns {
         [t] if t == "void" => None,
         [name] => Some(structure(&tokens, name)?),
-        other => return Err(format!("returns `{}`, which is no structure", quote(other))),
+        other => {
+            return Err(format!(
+                "returns `{}`, which is not a structure",
+                quote(other)
+            ));
+        }
     };
     Ok(Signature {
         stage: at.stage.clone(),
@@ -203,7 +208,7 @@ fn parse_param(all: &[String], param: &[String]) -> Result<Param, String> {
             "sampler" => Given::Sampler(number(one)?),
             "stage_in" => match of {
                 [name] => Given::StageIn(structure(all, name)?),
-                _ => return Err(shape("its type is no structure")),
+                _ => return Err(shape("its type is not a structure")),
             },
             name if POSITIONS.contains(&name) && !is_memory => Given::Position(name.into()),
             _ => return Err(shape("an attribute that is not known here")),
@@ -299,14 +304,14 @@ fn attributes_of(mut tokens: &[String]) -> Result<Vec<Attribute<'_>>, String> {
     while let [open, rest @ ..] = tokens {
         let end = rest.iter().position(|t| t == "]]");
         let Some(end) = end.filter(|_| open == "[[") else {
-            return Err(format!("`{}` is no attribute", quote(tokens)));
+            return Err(format!("`{}` is not an attribute", quote(tokens)));
         };
         for one in split(&rest[..end]) {
             let strings: Vec<&str> = one.iter().map(String::as_str).collect();
             let (name, argument) = match strings[..] {
                 [name] => (name, None),
                 [name, "(", argument, ")"] => (name, Some(argument)),
-                _ => return Err(format!("`{}` is no attribute", quote(one))),
+                _ => return Err(format!("`{}` is not an attribute", quote(one))),
             };
             all.push(Attribute { name, argument });
         }

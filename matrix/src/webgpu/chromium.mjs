@@ -8,8 +8,8 @@ import { spawn } from "node:child_process";
 import { randomUUID } from "node:crypto";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { createServer } from "node:http";
-import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 
 import { ending, lastWords, serve, within } from "./runner.mjs";
 
@@ -89,7 +89,8 @@ async function start() {
         server.listen(0, "127.0.0.1", resolve);
     });
 
-    const profile = await mkdtemp(join(tmpdir(), "hankel-chromium-"));
+    // Within the folder that this file was laid into: it is removed with that, even if this process is killed.
+    const profile = await mkdtemp(join(fileURLToPath(new URL(".", import.meta.url)), "profile-"));
     const flags = [
         "--headless", "--no-sandbox", "--disable-quic", "--no-first-run",
         "--disable-background-networking", "--disable-component-update", "--disable-sync",

@@ -56,7 +56,7 @@ mod basis {
         [Basis::Unit, Basis::Symmetric, Basis::Trigonometric]
             .into_iter()
             .find(|b| super::name_of(*b) == name)
-            .ok_or_else(|| D::Error::custom(format!("`{name}` is no basis")))
+            .ok_or_else(|| D::Error::custom(format!("`{name}` is not a basis")))
     }
 }
 

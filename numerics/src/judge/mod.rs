@@ -32,6 +32,7 @@
 
 mod candidates;
 mod evaluation;
+mod feasible;
 mod functions;
 mod programme;
 mod simplex;
@@ -141,7 +142,7 @@ pub enum JudgeError {
         value: f64,
     },
     /// A total weight that no distribution has.
-    #[error("m0 = {value} is no total weight; it must be positive")]
+    #[error("m0 = {value} is not a total weight; it must be positive")]
     Mass {
         /// What it is.
         value: f64,
@@ -200,15 +201,16 @@ pub struct Judged {
     /// The greatest weight at or below `z`, from 0 to m0. Never below the exact one but by
     /// rounding.
     pub upper: f64,
-    /// The exact bounds are within this of the given ones, in the unit of m0; m0 itself where
-    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`]. Rounding of the
-    /// given moments to `f64`, and what the solver misses of them (up to about 1e-8, see
-    /// [`residual`](Self::residual)), is counted in to first order. Where that decides which
-    /// distributions have them, it is too little: where there is only one, and the query is beside
-    /// one of its depths, without being it.
+    /// The exact bounds are within this of the given ones, in the unit of m0.
+    ///
+    /// Where [`residual`](Self::residual) is 0, this is proved: there are distributions with the moments, up to their
+    /// rounding to `f64`, that have no more than the bound and this. Elsewhere it is an estimate: it counts to first order
+    /// what the solver misses of the moments, which may be too little, and is m0 where
+    /// [`sensitivity`](Self::sensitivity) reaches its limit, [`SENSITIVITY_LIMIT`].
     pub margin: f64,
     /// How far the moments of the supports are from the given ones, beyond rounding: the larger sum
-    /// of distances of the two, in an orthogonal basis, relative to the total weight.
+    /// of distances of the two, in an orthogonal basis, relative to the total weight. 0 where distributions with the
+    /// moments were found near the supports of both.
     pub residual: f64,
     /// The largest derivative of a bound to a moment, in that basis and that unit.
     pub sensitivity: f64,

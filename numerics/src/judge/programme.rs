@@ -17,6 +17,7 @@
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT};
 
+use super::feasible::{self, Weight, feasible};
 use super::system::{Instance, System};
 use super::{JudgeError, Point};
 
@@ -38,6 +39,9 @@ const PARTS: [f64; 2] = [1.0 / 16.0, 1.0 / 256.0];
 /// The least distance of samples, as a part of the range: nearer columns are the same to a solver.
 const NEAREST: f64 = 1e-9;
 
+/// How far from the query weights may be that are taken for its own, as parts of the range: each is tried.
+const BESIDE: [f64; 4] = [0.0, 1e-8, 1e-6, 1e-4];
+
 /// Places between two samples where the excess is looked for.
 const LOOKS: u32 = 8;
 
@@ -53,10 +57,10 @@ pub enum Side {
 pub struct Least {
     /// No distribution has less, up to rounding.
     pub value: f64,
-    /// How much less `value` may be than the exact optimum.
+    /// How much less `value` may be than the exact optimum: proved where `residual` is 0, else an estimate.
     pub margin: f64,
     /// How far the moments of the weights are from the given ones, beyond rounding: the sum over
-    /// the basis.
+    /// the basis. 0 where there are weights with these moments.
     pub residual: f64,
     /// The largest coefficient of P.
     pub sensitivity: f64,
@@ -133,6 +137,8 @@ pub fn least(
     programme.samples = grid.into_iter().map(|t| programme.sample(t)).collect();
 
     let mut best: Option<Least> = None;
+    // What distributions with the moments have: the optimum is not greater.
+    let mut attained = f64::INFINITY;
     let mut stalled = 0;
     for round in 1..=rounds.max(1) {
         let solution = programme.solve()?;
@@ -140,6 +146,7 @@ pub fn least(
         let worst = peaks.iter().fold(0.0_f64, |a, &(_, excess)| a.max(excess));
         let atoms = programme.atoms(&solution.weights);
         let found = programme.judged(&solution, &atoms, worst);
+        attained = attained.min(programme.attained(&atoms).unwrap_or(f64::INFINITY));
         let is_bounded = found.sensitivity > 0.5 * programme.price;
         let before = best.as_ref().map_or(f64::INFINITY, |b| b.margin);
         stalled = if found.margin < 0.5 * before {
@@ -166,6 +173,16 @@ pub fn least(
         && best.sensitivity > 0.5 * programme.price
     {
         best.margin = f64::INFINITY;
+    }
+    if let Some(best) = &mut best {
+        // Both sides are proved, whatever the prices. The moments of the weights are not the given ones to the last digit.
+        let rest = best.sensitivity * feasible::allowed(instance).sum::<f64>();
+        let proved = (attained - best.value).max(0.0) + rest;
+        // Weights that were moved may be worse ones.
+        if proved <= best.margin {
+            best.margin = proved;
+            best.residual = 0.0;
+        }
     }
     best.ok_or(JudgeError::Solver {
         status: "its solution is not finite".into(),
@@ -341,6 +358,36 @@ impl Programme<'_> {
             sensitivity,
             support: atoms.iter().map(|a| (a.t, a.weight)).collect(),
         }
+    }
+
+    /// The least that weights near these have on the side that counts, once they have the moments; `None` if there are
+    /// none.
+    fn attained(&self, atoms: &[Atom]) -> Option<f64> {
+        let (first, last) = self.system.ends();
+        // A solver leaves weights of the query point beside it, where they count.
+        let tries = BESIDE.into_iter().filter_map(|part| {
+            let is_at_query = |atom: &&Atom| (atom.t - self.query).abs() <= part * (last - first);
+            let at_query: f64 = atoms.iter().filter(is_at_query).map(|it| it.weight).sum();
+            let others = atoms.iter().filter(|it| !is_at_query(it));
+            let mut weights: Vec<Weight> = others
+                .map(|atom| Weight {
+                    t: atom.t,
+                    weight: atom.weight,
+                    is_fixed: false,
+                })
+                .collect();
+            if at_query > 0.0 {
+                weights.push(Weight {
+                    t: self.query,
+                    weight: at_query,
+                    is_fixed: true,
+                });
+            }
+            let found = feasible(self.instance, weights)?;
+            let costs = found.iter().map(|it| it.weight * self.cost(it.t, it.t));
+            Some(costs.sum())
+        });
+        tries.min_by(f64::total_cmp)
     }
 
     /// The weights, those of neighbouring samples on the same side of the query put together.

@@ -143,7 +143,9 @@ pub mod number {
             Either::Text(text) if matches!(text.as_str(), "NaN" | "inf" | "-inf") => {
                 text.parse().map_err(serde::de::Error::custom)
             }
-            Either::Text(text) => Err(serde::de::Error::custom(format!("`{text}` is no number"))),
+            Either::Text(text) => Err(serde::de::Error::custom(format!(
+                "`{text}` is not a number"
+            ))),
         }
     }
 }

@@ -170,7 +170,7 @@ impl Map {
         };
         let wrong = || StressError::Kernel {
             kernel: kernel.name.clone(),
-            problem: "it is no map from rows of moments with settings before them".into(),
+            problem: "it is not a map from rows of moments with settings before them".into(),
         };
         let [uniform, element] = kernel.params.as_slice() else {
             return Err(wrong());

@@ -178,7 +178,7 @@ impl Stress {
         let mut table = Table::new(
             "errors",
             "Errors of valid rows as shares of m_0, the larger one of the lower and the upper bound; \
-             what is no number counts as 1",
+             what is not a number counts as 1",
             [
                 Column::text("family"),
                 Column::count("n"),

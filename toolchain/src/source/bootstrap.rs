@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use hankel_system::process::which;
+
 use crate::error::{Error, Result};
 use crate::options::{ENV_BOOTSTRAP, Options};
 use crate::pinned;
@@ -85,7 +87,7 @@ impl Bootstrap {
 /// Checks platform and programs; one error names everything that is missing.
 pub(super) fn check(options: &Options) -> Result<Bootstrap> {
     check_on(pinned::host(), options, |tool| {
-        process::which(tool).is_some()
+        which(Path::new(tool)).is_some()
     })
 }
 

@@ -34,9 +34,15 @@ pub fn quarters<R: Elementary>(x: R) -> (R, R, R) {
         ]
     };
     let left = (x - n * a).guard();
-    let left = (left - n * b).guard();
+    let part = (n * b).guard();
+    // In `f64` the difference has more digits than the type.
+    let (left, rest) = if R::IS_WIDE {
+        left.two_sum(-part)
+    } else {
+        ((left - part).guard(), lit!(0.0))
+    };
     let (high, low) = left.two_sum(-(n * c).guard());
-    let low = low - n * d;
+    let low = if R::IS_WIDE { low + rest } else { low } - n * d;
     let sum = (high + low).guard();
     let mut parts = (modulo_4(n), sum, (high - sum) + low);
     let large = x.gt(limit);

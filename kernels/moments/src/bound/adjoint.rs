@@ -14,7 +14,7 @@
 use hankel_dsl::{Real, apart, array_element, array_element_mut, lit, unroll};
 
 use super::kernel::{Kernel, fine};
-use super::recurrence::{Recurrence, finite, power_of_two};
+use super::recurrence::{Recurrence, beyond, finite, power_of_two};
 use super::roots::{least_of_cubic, least_of_quadratic, least_three, least_two, whole};
 use super::twofold::{Arithmetic, Plain, Twofold};
 use super::{MAX, MAX_MOMENTS, is_long};
@@ -33,7 +33,7 @@ pub struct Gradient<R> {
 ///
 /// Takes anything that [`bound`](super::bound) takes. A derivative is limited to 1e25, in 64 bits to 1e100, times
 /// `d_bound`, which is limited to 1e12, and the derivative to the query point, which is in proportion to the total,
-/// to 1e37.
+/// to 1e37, in 64 bits to 1e290.
 #[inline(always)]
 pub fn bound_adjoint<R: Real, const N: usize>(
     m: [R; MAX_MOMENTS],
@@ -120,7 +120,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     let limit = limit::<R>();
     let present = recurrence.total.gt(zero);
     let upstream = R::select(present, finite(d_bound, lit!(1e12)), zero);
-    let query = finite(eta, lit!(1e12));
+    let query = recurrence.query;
     let (mut q, slope);
     if const { A::TWICE } {
         let of_own = e[1].scaled(lit!(2.0)).times_plain(own_share);
@@ -174,7 +174,7 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     }
     // The total is the last factor: it may be large where the others are small.
     let d_eta = own_weight.times(slope).rounded().clamp(-limit, limit) * -upstream;
-    let most: R = lit!(1e37);
+    let most = beyond::<R>();
     let d_eta = d_eta * recurrence.total.min(most / d_eta.abs().max(one));
     let mut m = [zero; MAX_MOMENTS];
     unroll!(i in 0..(2 * N + 1), max 13, {
@@ -203,17 +203,8 @@ fn moved<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
     limit: R,
 ) -> Fine<A> {
     let mut p = *p;
-    // Not by powers of the length, which may be beyond range where the products are not.
-    unroll!(j in 1..(DEGREE + 1), max 7, loop if DEGREE > 3, {
-        unroll!(i in 1..(DEGREE + 1), max 7, loop if DEGREE > 3, {
-            if i >= j {
-                let scaled = array_element(&p, i as u32).scaled(per_length);
-                *array_element_mut(&mut p, i as u32) = scaled;
-            }
-        });
-        let limited = array_element(&p, j as u32).within(-limit, limit);
-        *array_element_mut(&mut p, j as u32) = limited;
-    });
+    // In powers of `x per_length` first: there, coefficients are within range even if `at` is far.
+    let at = at * per_length;
     unroll!(j in 0..DEGREE, max 7, loop if DEGREE > 3, {
         unroll!(i in 0..DEGREE, max 7, loop if DEGREE > 3, {
             // Each time one coefficient less: from the highest but one down to j.
@@ -224,6 +215,17 @@ fn moved<R: Real, A: Arithmetic<R>, const DEGREE: usize>(
                 *array_element_mut(&mut p, higher - 1) = lower;
             }
         });
+    });
+    // Not by powers of the length, which may be beyond range where the products are not.
+    unroll!(j in 1..(DEGREE + 1), max 7, loop if DEGREE > 3, {
+        unroll!(i in 1..(DEGREE + 1), max 7, loop if DEGREE > 3, {
+            if i >= j {
+                let scaled = array_element(&p, i as u32).scaled(per_length);
+                *array_element_mut(&mut p, i as u32) = scaled;
+            }
+        });
+        let limited = array_element(&p, j as u32).within(-limit, limit);
+        *array_element_mut(&mut p, j as u32) = limited;
     });
     p
 }

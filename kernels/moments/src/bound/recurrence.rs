@@ -35,6 +35,8 @@ pub(crate) struct Recurrence<R, A> {
     pub unit: R,
     /// `m_0`, or 0 if it is not a positive number.
     pub total: R,
+    /// The query point, or where it was moved to.
+    pub query: R,
 }
 
 /// `x`, or 0 if it is not a number or so large that its products would be infinite.
@@ -70,57 +72,97 @@ pub(crate) const fn two_to(power: i32) -> f64 {
     f64::from_bits(((1023 + power) as u64) << 52)
 }
 
-/// A power of two that brings a total into the middle of `f32`'s range.
+/// What is beyond counts as 0.
 #[inline(always)]
-fn scale<R: Real>(total: R) -> R {
-    let one: R = lit!(1.0);
-    let large = R::select(total.gt(lit!(1e27)), lit!(two_to(-110)), lit!(two_to(-60)));
-    let small = if const { R::IS_WIDE } {
-        let mut small = one;
-        let mut scaled = total;
-        // From 2⁻⁵³⁴ on up, all get from 2⁻³⁰ to 2³⁰.
-        raise(
-            &mut small,
-            &mut scaled,
-            lit!(two_to(270)),
-            lit!(two_to(-240)),
-        );
-        raise(
-            &mut small,
-            &mut scaled,
-            lit!(two_to(135)),
-            lit!(two_to(-105)),
-        );
-        raise(&mut small, &mut scaled, lit!(two_to(68)), lit!(two_to(-38)));
-        raise(&mut small, &mut scaled, lit!(two_to(34)), lit!(two_to(-4)));
-        small
-    } else {
-        R::select(total.lt(lit!(1e-27)), lit!(two_to(110)), lit!(two_to(60)))
-    };
-    R::select(
-        total.lt(lit!(1e-9)),
-        small,
-        R::select(total.gt(lit!(1e9)), large, one),
-    )
-}
-
-/// What brings totals down to 2⁻¹⁰⁷⁴ to where [`scale`] reaches: 1 for nearly all of them.
-#[inline(always)]
-fn lift<R: Real>(total: R) -> R {
-    let one: R = lit!(1.0);
+pub(crate) fn beyond<R: Real>() -> R {
     if const { R::IS_WIDE } {
-        R::select(total.lt(lit!(two_to(-510))), lit!(two_to(540)), one)
+        lit!(1e290)
     } else {
-        one
+        lit!(1e37)
     }
 }
 
-/// Multiplies both by `power` if the second is below `limit`.
+/// The largest moment, relative to the total, whose products with others are finite.
 #[inline(always)]
-fn raise<R: Real>(scale: &mut R, scaled: &mut R, power: R, limit: R) {
-    let factor = R::select(scaled.lt(limit), power, lit!(1.0));
-    *scale *= factor;
-    *scaled *= factor;
+fn largest<R: Real>() -> R {
+    if const { R::IS_WIDE } {
+        lit!(1e100)
+    } else {
+        lit!(1e25)
+    }
+}
+
+/// The largest distance.
+#[inline(always)]
+fn far<R: Real, const N: usize>() -> R {
+    if const { R::IS_WIDE } {
+        lit!(1e30)
+    } else if const { N > 2 } {
+        lit!(1e12)
+    } else {
+        lit!(1e9)
+    }
+}
+
+/// A power of two of which the square times `total` is from 1/4 to 4, for normal numbers up to [`beyond`].
+#[inline(always)]
+fn per_root<R: Real>(total: R) -> R {
+    let (mut root, mut square): (R, R) = (lit!(1.0), total);
+    // To where `power_of_two` reaches.
+    if const { R::IS_WIDE } {
+        raise(
+            &mut root,
+            &mut square,
+            lit!(two_to(270)),
+            lit!(two_to(-510)),
+        );
+        raise(
+            &mut root,
+            &mut square,
+            lit!(two_to(135)),
+            lit!(two_to(-240)),
+        );
+        raise(&mut root, &mut square, lit!(two_to(68)), lit!(two_to(-105)));
+        lower(
+            &mut root,
+            &mut square,
+            lit!(two_to(-240)),
+            lit!(two_to(480)),
+        );
+        lower(
+            &mut root,
+            &mut square,
+            lit!(two_to(-120)),
+            lit!(two_to(240)),
+        );
+        lower(&mut root, &mut square, lit!(two_to(-60)), lit!(two_to(120)));
+    } else {
+        raise(&mut root, &mut square, lit!(two_to(24)), lit!(two_to(-70)));
+    }
+    lower(&mut root, &mut square, lit!(two_to(-30)), lit!(two_to(60)));
+    let root = root / power_of_two(square);
+    if const { R::IS_WIDE } {
+        root
+    } else {
+        // Of a total that is subnormal, times a power of a length.
+        root.min(lit!(two_to(70)))
+    }
+}
+
+/// Multiplies `root` by a power of two, and `square` by its square, if that is below `limit`.
+#[inline(always)]
+fn raise<R: Real>(root: &mut R, square: &mut R, by: R, limit: R) {
+    let is_small = square.lt(limit);
+    *root = R::select(is_small, *root * by, *root);
+    *square = R::select(is_small, *square * by * by, *square);
+}
+
+/// Multiplies `root` by a power of two, and `square` by its square, if that is above `limit`.
+#[inline(always)]
+fn lower<R: Real>(root: &mut R, square: &mut R, by: R, limit: R) {
+    let is_large = square.gt(limit);
+    *root = R::select(is_large, *root * by, *root);
+    *square = R::select(is_large, *square * by * by, *square);
 }
 
 /// One step of [`power_of_two`].
@@ -210,8 +252,9 @@ fn depth_unit<R: Real, const N: usize>(mean_square: R) -> R {
 impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
     /// The first N steps for moments `m_0` to `m_2N`, of any value, and query point `eta`.
     ///
-    /// What is not a number, or too large (the query point above 1e12, a moment above 1e25 times
-    /// the total or so), counts as 0.
+    /// What is not a number, or too large, counts as 0: a moment above 1e37, or in the unit of length above 1e25 times
+    /// the total (in 64 bits 1e290 and 1e100). A query point farther than 1e12, for N up to 2 in
+    /// `f32` 1e9, is moved there.
     ///
     /// Pivots are lifted to the size of their own rounding errors, `floor` times the moment on the
     /// diagonal: `ε/4` for plain arithmetic.
@@ -230,20 +273,18 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
     floor: R,
 ) -> Recurrence<R, A> {
     let zero: R = lit!(0.0);
-    let largest: R = lit!(1e25);
-    let far: R = if const { N > 2 } {
-        lit!(1e12)
-    } else {
-        lit!(1e9)
-    };
-    let total = finite(m[0], lit!(1e37)).max(zero);
-    let lift = lift(total);
-    let lifted = total * lift;
-    let scale = scale(lifted);
-    let mut eta = finite(eta, far);
+    let one: R = lit!(1.0);
+    let largest = largest::<R>();
+    let far = far::<R, N>();
+    let total = finite(m[0], beyond()).max(zero);
+    // Two factors: each moment times one of them is between what it is and what it becomes, and so within range.
+    let per_root = per_root(total);
+    // The square of a distance to it has a root that `power_of_two` finds.
+    let reach = far.min(lit!(1e12));
+    let mut eta = finite(eta, beyond()).clamp(-reach, reach);
 
     let mut current = [A::of(zero); MAX_MOMENTS];
-    let scaled_total = (lifted * scale).max(lit!(1e-12));
+    let scaled_total = (total * per_root * per_root).max(lit!(1e-12));
     // Far below what rounding leaves of a pivot, and far above what is too small to divide by.
     let least = if const { A::TWICE } {
         scaled_total * lit!(1e-26)
@@ -251,31 +292,39 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
         R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)))
     };
     current[0] = A::of(scaled_total);
-    unroll!(k in 1..(2 * N + 1), max 13, {
-        current[k] = A::of(finite(finite(m[k], lit!(1e37)) * lift * scale, largest));
-    });
     // In a length near the root of the mean square depth, even moments are 1 and more.
-    let one: R = lit!(1.0);
     let mut length = one;
+    let mut per_length = one;
     if const { A::TWICE } {
-        length = depth_unit::<R, N>(current[2].rounded() / scaled_total);
-        let per_length = one / length;
-        let mut power = one;
-        unroll!(k in 1..(2 * N + 1), max 13, {
-            power *= per_length;
-            let scaled = current[k].rounded() * power;
-            current[k] = A::of(finite(scaled, largest));
-        });
+        let mean_square = finite(m[2], beyond()) * per_root * per_root / scaled_total;
+        length = depth_unit::<R, N>(mean_square);
+        per_length = one / length;
+    }
+    let (mut odd, mut even) = (per_root, per_root);
+    unroll!(k in 1..(2 * N + 1), max 13, {
+        if const { A::TWICE } {
+            if const { k % 2 == 1 } {
+                odd *= per_length;
+            } else {
+                even *= per_length;
+            }
+        }
+        current[k] = A::of(finite(finite(m[k], beyond()) * odd * even, largest));
+    });
+    if const { A::TWICE } {
         // No distribution has larger ones of these within that range: their products are finite.
-        let (most, most_square): (R, R) = if const { N == 1 } {
+        let (most, most_square): (R, R) = if const { R::IS_WIDE } {
+            (far, largest)
+        } else if const { N == 1 } {
             (lit!(1e17), largest)
         } else {
             (lit!(1e12), lit!(1e17))
         };
         current[1] = A::of(finite(current[1].rounded(), most));
         current[2] = A::of(finite(current[2].rounded(), most_square));
-        eta = (eta * per_length).clamp(-far, far);
+        eta = (eta * per_length).clamp(-reach, reach);
     }
+    let moved = eta * length;
     let query = A::of(eta);
     let raw = current;
     let mut previous = current;
@@ -325,7 +374,8 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
                 raw[4].minus(mean_square.times(raw[2]))
             };
             let of_slope = if const { A::TWICE } {
-                slope.times_within(current[2], lit!(1e37))
+                let most: R = if const { R::IS_WIDE } { lit!(1e250) } else { lit!(1e37) };
+                slope.times_within(current[2], most)
             } else {
                 slope.times(current[2])
             };
@@ -336,7 +386,12 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
         let noise = array_element(&raw, 2 * at).rounded().abs() * floor;
         let pivot = array_element(&next, at).at_least(noise.max(least));
         *array_element_mut(&mut next, at) = pivot;
-        let most_beta = if A::TWICE && k == 1 {
+        // A square of lengths. The last one multiplies nothing of this.
+        let most_beta = if const { R::IS_WIDE } {
+            far * far
+        } else if A::TWICE && k == N {
+            largest
+        } else if A::TWICE || k == N {
             lit!(1e12)
         } else {
             far
@@ -345,7 +400,7 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
             .over(array_element(&current, at - 1))
             .within(zero, most_beta);
         *array_element_mut(&mut b, at) = if A::TWICE && k == 1 {
-            beta.over(current[0]).within(zero, far)
+            beta.over(current[0]).within(zero, most_beta)
         } else {
             beta
         };
@@ -399,5 +454,6 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
         rest,
         unit,
         total,
+        query: moved,
     }
 }

@@ -6,7 +6,7 @@ use super::unorm::{from_unorm, to_unorm};
 use crate::Moments4;
 use crate::moments::within;
 
-/// Four moments in the optimised basis: each channel is in [0, 1] for valid moments.
+/// Four moments in the optimised basis: each channel is in [0, 1] for valid moments, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]
 pub struct Quantized4<R> {
@@ -57,8 +57,8 @@ macro_rules! unit_offset {
     };
 }
 
-/// Moments of depths in [0, 1] to the optimised basis: the inverse of [`dequantize_unit_4`]
-/// (\[MSM\], Listing 1).
+/// Moments of depths in [0, 1] to the optimised basis (\[MSM\], Listing 1): the inverse of [`dequantize_unit_4`], as far as
+/// the digits of the listings go, which is 2e-9 in `f64`.
 ///
 /// Its coefficients reach 82 and magnify the rounding of the moments. In `f32` a depth's channels
 /// are off by up to 1.5e-5, a step of 16 bits; those of [`quantize_symmetric_4`], which gains nearly

@@ -6,7 +6,7 @@ use super::unorm::{from_unorm, to_unorm};
 use crate::Moments6;
 use crate::moments::within;
 
-/// Six moments in the optimised basis: each channel is in [0, 1] for valid moments. Two texels of
+/// Six moments in the optimised basis: each channel is in [0, 1] for valid moments, up to rounding. Two texels of
 /// three channels.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
 #[repr(C)]

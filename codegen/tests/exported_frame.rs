@@ -1,4 +1,4 @@
-//! Frames to take along, of kernels made by hand.
+//! Exported frames, of kernels made by hand.
 
 mod support;
 
