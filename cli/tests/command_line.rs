@@ -826,7 +826,10 @@ fn a_scene_is_planned() {
         .fails(2, &["no technique of scattering fog", "ray-marching"]);
     for option in ["--steps 8", "--scattering ray-marching"] {
         desk.hankel(&format!("plan scene.toml --error 0.1 {option}"))
-            .fails(2, &["is for scenes with a medium", "there is none"]);
+            .fails(
+                2,
+                &["is for scenes with a medium", "the scene has no medium"],
+            );
     }
     desk.hankel("plan scene.toml --error 0.1 --filter 4")
         .fails(2, &["odd number"]);

@@ -610,7 +610,12 @@ fn options_that_make_no_sense_together_are_refused() {
     desk.hankel(&format!("{build} --bindings places.toml"))
         .fails(
             2,
-            &["pass `shade`", "`camera`", "`light`", "one place in WGSL"],
+            &[
+                "pass `shade`",
+                "`camera`",
+                "`light`",
+                "the same place in WGSL",
+            ],
         );
     assert!(!desk.path("frame").exists());
     // A frame whose shaders are elsewhere is played as well.

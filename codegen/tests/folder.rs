@@ -775,8 +775,8 @@ fn a_new_crate_is_whole() {
     );
     for (name, problem) in [
         ("my-kernels", "not empty"),
-        ("Mine", "no name"),
-        ("1a", "no name"),
+        ("Mine", "not a name"),
+        ("1a", "not a name"),
     ] {
         let error = scaffold(&folder.path().join(name), &dsl)
             .unwrap_err()

@@ -52,7 +52,7 @@ fn a_damaged_record_of_libraries_is_named() {
     let record = desk.read("lib/functions.json");
     desk.write("lib/functions.json", "{");
     desk.hankel("check lib")
-        .fails(2, &["lib/functions.json", "no record of libraries"]);
+        .fails(2, &["lib/functions.json", "not a record of libraries"]);
     let prefix = "\"prefix\": \"hankel\"";
     assert!(record.contains(prefix));
     let other = record.replace(prefix, "\"prefix\": \"../../etc/passwd\"");

@@ -69,6 +69,8 @@ pub fn feasible(instance: &Instance<'_>, mut weights: Vec<Weight>) -> Option<Vec
         for (it, (of_weight, of_place)) in weights.iter_mut().zip(moves) {
             it.weight *= 1.0 + part * of_weight;
             it.t = (it.t + part * of_place * range).clamp(first, last);
+            // It would leave the range again.
+            it.is_fixed |= it.t == first || it.t == last;
         }
     }
     None
@@ -79,7 +81,7 @@ fn missing(instance: &Instance<'_>, weights: &[Weight]) -> Vec<f64> {
     let mut missing: Vec<DoubleDouble> = instance.targets.iter().map(|&it| it.into()).collect();
     for it in weights {
         for (m, v) in missing.iter_mut().zip(instance.system().column(it.t)) {
-            *m = *m - DoubleDouble::from(it.weight) * DoubleDouble::from(v);
+            *m -= DoubleDouble::from(it.weight) * DoubleDouble::from(v);
         }
     }
     missing.into_iter().map(DoubleDouble::high).collect()
@@ -110,7 +112,7 @@ fn least_step(columns: &[Vec<f64>], wanted: &[f64]) -> Option<Vec<f64>> {
     for (i, row) in a.iter_mut().enumerate() {
         for (j, cell) in row.iter_mut().enumerate().take(size) {
             for column in columns {
-                *cell = *cell + DoubleDouble::from(column[i]) * DoubleDouble::from(column[j]);
+                *cell += DoubleDouble::from(column[i]) * DoubleDouble::from(column[j]);
             }
         }
         row[size] = wanted[i].into();
@@ -118,7 +120,7 @@ fn least_step(columns: &[Vec<f64>], wanted: &[f64]) -> Option<Vec<f64>> {
     let trace: f64 = (0..size).map(|i| a[i][i].high()).sum();
     for (i, row) in a.iter_mut().enumerate() {
         // With fewer unknowns than moments, or nearly so, the nearest.
-        row[i] = row[i] + DoubleDouble::from(trace * 1e-28);
+        row[i] += DoubleDouble::from(trace * 1e-28);
     }
     for k in 0..size {
         let best =
@@ -131,7 +133,7 @@ fn least_step(columns: &[Vec<f64>], wanted: &[f64]) -> Option<Vec<f64>> {
         for row in a.iter_mut().skip(k + 1) {
             let factor = row[k] / pivot[k];
             for (cell, of_pivot) in row.iter_mut().zip(&pivot).skip(k) {
-                *cell = *cell - factor * *of_pivot;
+                *cell -= factor * *of_pivot;
             }
         }
     }

@@ -39,6 +39,9 @@ const PARTS: [f64; 2] = [1.0 / 16.0, 1.0 / 256.0];
 /// The least distance of samples, as a part of the range: nearer columns are the same to a solver.
 const NEAREST: f64 = 1e-9;
 
+/// A margin that is as good as none: where both the estimate and what is proved are below, what is proved is told.
+const LITTLE: f64 = 1e-10;
+
 /// How far from the query weights may be that are taken for its own, as parts of the range: each is tried.
 const BESIDE: [f64; 4] = [0.0, 1e-8, 1e-6, 1e-4];
 
@@ -179,7 +182,7 @@ pub fn least(
         let rest = best.sensitivity * feasible::allowed(instance).sum::<f64>();
         let proved = (attained - best.value).max(0.0) + rest;
         // Weights that were moved may be worse ones.
-        if proved <= best.margin {
+        if proved <= (2.0 * best.margin).max(LITTLE) && proved.is_finite() {
             best.margin = proved;
             best.residual = 0.0;
         }
@@ -369,11 +372,17 @@ impl Programme<'_> {
             let is_at_query = |atom: &&Atom| (atom.t - self.query).abs() <= part * (last - first);
             let at_query: f64 = atoms.iter().filter(is_at_query).map(|it| it.weight).sum();
             let others = atoms.iter().filter(|it| !is_at_query(it));
+            // Nor do those at an end move away from it.
+            let end = |t: f64| {
+                [first, last]
+                    .into_iter()
+                    .find(|end| (t - end).abs() <= part * (last - first))
+            };
             let mut weights: Vec<Weight> = others
                 .map(|atom| Weight {
-                    t: atom.t,
+                    t: end(atom.t).unwrap_or(atom.t),
                     weight: atom.weight,
-                    is_fixed: false,
+                    is_fixed: end(atom.t).is_some(),
                 })
                 .collect();
             if at_query > 0.0 {
