@@ -246,9 +246,8 @@ pub fn compile(
     let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
     let spec = target_spec(&version, &target_dir)?;
     let flags_of_all = flags_of_all(compiler);
-    let separately_or_not =
-        || Separately::of(links_at_once.clone(), &version, wanted.names().len());
-    let mut separately = separately_or_not();
+    let how_to_link = || Separately::of(links_at_once.clone(), &version, wanted.names().len());
+    let mut separately = how_to_link();
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {
         let start = SystemTime::now() - CLOCK_STEP;
@@ -260,7 +259,7 @@ pub fn compile(
             Err(error) if joins_arms(&error) && !flags.contains(&UNTHREADED.into()) => {
                 flags.push(UNTHREADED.into());
                 // That linking failed before says nothing of the compiler.
-                separately = separately_or_not();
+                separately = how_to_link();
                 continue;
             }
             other => other?,

@@ -227,12 +227,35 @@ const fn resolve_moments(given: &Given) -> &'static str {
 /// See [`light_depth`].
 pub fn moment_map(graph: &mut Graph, given: &Given) -> Result<Handle> {
     let kernel = resolve_moments(given);
-    resolve_casters(graph, given, kernel, "translucent_moments")?.image([given.shadow.size; 2])
+    let blended = Blended::halves("translucent_moments");
+    resolve_casters(graph, given, kernel, &blended)?.image([given.shadow.size; 2])
+}
+
+/// How the moments of translucent casters are blended.
+pub struct Blended {
+    /// The fragment kernel. Its constant `part` is the number of a draw, if there are several.
+    pub fragment: &'static str,
+    /// Of each draw, its label and the name of its result in `resolve_translucent_…`.
+    pub draws: &'static [(&'static str, &'static str)],
+}
+
+impl Blended {
+    /// In two halves, which are more than four channels together with the opacity.
+    #[must_use]
+    pub const fn halves(fragment: &'static str) -> Self {
+        Self {
+            fragment,
+            draws: &[
+                ("blend first half", "first"),
+                ("blend second half", "second"),
+            ],
+        }
+    }
 }
 
 /// Begins the pass that makes a map of power moments of opaque and translucent casters, by the kernel `resolve_…`; where
-/// there are translucent ones, by `resolve_translucent_…`. Their moments are drawn by the fragment kernel `blended` in
-/// two halves, which are blended: in 32-bit floats if the map has those, else in 16 bits.
+/// there are translucent ones, by `resolve_translucent_…`, from what is blended: in 32-bit floats if the map has those,
+/// else in 16 bits.
 ///
 /// # Errors
 /// See [`light_depth`].
@@ -240,7 +263,7 @@ pub fn resolve_casters<'g>(
     graph: &'g mut Graph,
     given: &Given,
     kernel: &str,
-    blended: &'static str,
+    blended: &Blended,
 ) -> Result<AddCompute<'g>> {
     let depth = opaque_depth(graph, given)?;
     let Some(translucent) = given.translucent else {
@@ -248,24 +271,29 @@ pub fn resolve_casters<'g>(
     };
     let map = given.shadow.map;
     let (format, encoding) = match (map.format, map.depth_range) {
-        (TexelFormat::Rgba32Float, _) => (TexelFormat::Rgba32Float, encoding::PLAIN),
+        (TexelFormat::Rgba32Float | TexelFormat::Rg32Float, _) => {
+            (TexelFormat::Rgba32Float, encoding::PLAIN)
+        }
         (_, DepthRange::Unit) => (TexelFormat::Rgba16Unorm, encoding::UNIT),
         (_, DepthRange::Symmetric) => (TexelFormat::Rgba16Unorm, encoding::SYMMETRIC),
     };
-    let mut half = |part, label| {
-        let pass = draw_translucent(graph, given, &translucent, label, given.light_view)
-            .fragment(blended)
+    let mut results = Vec::new();
+    for (part, (label, name)) in blended.draws.iter().enumerate() {
+        let mut pass = draw_translucent(graph, given, &translucent, label, given.light_view)
+            .fragment(blended.fragment)
             .constant("encoding", encoding)
-            .constant("part", part)
             .blend(Blend::Alpha)
             .before(depth);
-        samples_of_map(pass, given, format, [0.0; 4])
-    };
-    let (first, second) = (half(0, "blend first half")?, half(1, "blend second half")?);
+        if blended.draws.len() > 1 {
+            pass = pass.constant("part", part as u32);
+        }
+        results.push((*name, samples_of_map(pass, given, format, [0.0; 4])?));
+    }
     let kernel = kernel.replacen("resolve_", "resolve_translucent_", 1);
-    Ok(resolve_depth(graph, given, &kernel, depth)
-        .arg("first", first)
-        .arg("second", second))
+    let pass = resolve_depth(graph, given, &kernel, depth);
+    Ok(results
+        .into_iter()
+        .fold(pass, |pass, (name, result)| pass.arg(name, result)))
 }
 
 /// Adds a draw into all samples of the light's map, as many as its depth has.

@@ -28,6 +28,7 @@ use crate::lights::{Lit, facing, light_view, reaching, uniform};
 use crate::passes::gaussian;
 use crate::picture::Picture;
 use crate::scene::{Light, LightView, Mesh, Scene, Source};
+use crate::techniques::DepthBias;
 use crate::visibility::SAMPLES;
 use crate::visibility::cast::{Caster, Hit, Lens, Segment, in_bands, places};
 use crate::visibility::fragments::{Fragments, Varying};
@@ -209,7 +210,8 @@ fn shown(
 pub struct Measured {
     /// Against [`by_rays`]: what an observer would say.
     pub rays: Errors,
-    /// Against [`filtered`]: what the reconstruction adds. Only for lights that are points.
+    /// Against [`filtered`], with the depth bias that compared depths need: what the reconstruction adds. Only for lights
+    /// that are points.
     pub filtered: Option<Errors>,
     /// Of what the medium scatters, against rays. Only of a scene with a medium.
     pub scattered: Option<scattering::Compared>,
@@ -225,7 +227,10 @@ pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Resul
     let picture = by_technique(scene, mesh)?;
     let is_point = scene.lights.iter().all(|light| light.area.radius == 0.0);
     progress.begin("light by all samples", 2, steps);
-    let soft = is_point.then(|| filtered(scene, mesh, &mut |share| progress.advance(share)));
+    let soft = is_point.then(|| {
+        let compared = as_compared(scene);
+        filtered(&compared, mesh, &mut |share| progress.advance(share))
+    });
     progress.begin("light by rays", 3, steps);
     let sharp = by_rays(scene, mesh, &mut |share| progress.advance(share));
     let mut scattered = None;
@@ -241,6 +246,16 @@ pub fn measure(scene: &Scene, mesh: &Mesh, progress: &mut dyn Progress) -> Resul
         rays: picture.errors(&sharp)?,
         filtered: soft.map(|soft| picture.errors(&soft)).transpose()?,
     })
+}
+
+/// The scene with a depth bias for [`filtered`]: techniques that compare no single depths need none, but without one the
+/// reference has surfaces that shade themselves.
+fn as_compared(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    if scene.shadow.depth_bias == DepthBias::NONE {
+        scene.shadow.depth_bias = DepthBias::COMPARED;
+    }
+    scene
 }
 
 /// Rays through a pixel, along x and along y.

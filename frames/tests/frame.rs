@@ -85,13 +85,13 @@ fn a_plan_holds_what_is_needed_and_says_what_is_not() {
     );
     assert!(!text.contains("no depth bias"), "{text}");
 
-    let (_, text) = plan("technique = 'vsm'\nformat = 'rgba32float'");
+    let (_, text) = plan("technique = 'vsm'\nformat = 'rg32float'");
     assert!(
-        text.contains("no quantisation") && text.contains("blur_rgba32float"),
+        text.contains("no quantisation") && text.contains("blur_rg32float"),
         "{text}"
     );
     assert!(
-        text.contains("resolve_plain") && text.contains("shade_variance"),
+        text.contains("resolve_variance") && text.contains("shade_variance"),
         "{text}"
     );
 }

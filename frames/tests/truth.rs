@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use hankel_frames::Quiet;
 use hankel_frames::scene::{Mesh, Scene, Shadow};
 use hankel_frames::techniques::{self, DepthBias, Map, Technique};
-use hankel_frames::truth::{Arriving, by_rays, by_technique, filtered};
+use hankel_frames::truth::{Arriving, by_rays, by_technique, filtered, measure};
 
 /// A scene whose surfaces are all shaded as if they faced the light, so that no pixel is left out of a comparison.
 fn scene(geometry: &str, size: u32, shadow: &str) -> (Scene, Mesh) {
@@ -297,4 +298,18 @@ fn nothing_arrives_where_a_surface_is_turned_away() {
             assert!(count > 50, "{light}: {count} of {}", turned.values.len());
         }
     }
+}
+
+/// Surfaces that shade themselves in the reference would count as light that the technique lets through.
+#[test]
+fn the_filtered_reference_of_errors_has_a_depth_bias() {
+    let (scene, mesh) = scene("yard", 512, "technique = 'hamburger'");
+    assert_eq!(scene.shadow.depth_bias, DepthBias::NONE);
+    let measured = measure(&scene, &mesh, &mut Quiet).unwrap_or_else(|e| panic!("{e}"));
+    let reported = measured.filtered.expect("the light is a point");
+    let without = technique_of(&scene, &mesh)
+        .errors(&filtered(&scene, &mesh, &mut |_| ()))
+        .unwrap_or_else(|e| panic!("{e}"));
+    println!("reported {reported}, without a bias {without}");
+    assert!(reported.wrongly_lit < 0.5 * without.wrongly_lit);
 }

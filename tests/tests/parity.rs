@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use hankel_codegen::Language;
-use hankel_dsl::native::describe::{Rounding, Tolerance};
+use hankel_dsl::native::describe::{Output, Rounding, TexelFormat, Tolerance};
+use hankel_dsl::native::texel::FORMATS;
 use hankel_dsl::native::{Call, Mode};
 use hankel_host::crates::KernelEntry;
 use hankel_host::device::{Floats, NativeDevice, Shader, VulkanDevice};
@@ -230,4 +231,20 @@ fn infinities_of_finite_inputs_fail_unless_they_are_declared() {
         text.contains("INFINITE") && text.contains("position.x = "),
         "{text}"
     );
+}
+
+#[test]
+fn every_texel_format_is_written_by_a_kernel() {
+    let conformance = Crate::conformance();
+    let has = |format: &TexelFormat| {
+        conformance.entries.iter().any(|entry| {
+            let outputs = &entry.kernel.outputs;
+            outputs.iter().any(|output| match output {
+                Output::Texture { format: of, .. } => of == format,
+                _ => false,
+            })
+        })
+    };
+    let missing: Vec<_> = FORMATS.iter().filter(|format| !has(format)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
 }

@@ -32,7 +32,7 @@ pub(crate) use cleanup::{each_statement, each_within};
 pub(crate) use wgsl::ENABLE_SUBGROUPS;
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::str::FromStr;
 
@@ -1068,21 +1068,21 @@ impl Job<'_> {
         }
         names.sort_unstable();
         names.dedup();
-        for name in names {
-            let given = format!("{name}_");
-            let ends_in_digit = name.ends_with(|letter: char| letter.is_ascii_digit());
-            if !ends_in_digit || looks_like_a_type(name) || text::has_name(&text.source, name) {
-                continue;
-            }
-            text.source = text::rename(&text.source, &given, name);
-            if text.entry_point == given {
-                text.entry_point = name.into();
-            }
-            for place in text.places.values_mut() {
-                for slot in [&mut place.name, &mut place.block] {
-                    if slot.as_deref() == Some(given.as_str()) {
-                        *slot = Some(name.into());
-                    }
+        let present = text::all_names(&text.source);
+        let renamed: HashMap<String, &str> = names
+            .into_iter()
+            .filter(|name| name.ends_with(|letter: char| letter.is_ascii_digit()))
+            .filter(|name| !looks_like_a_type(name) && !present.contains(name))
+            .map(|name| (format!("{name}_"), name))
+            .collect();
+        text.source = text::rename_all(&text.source, &renamed);
+        if let Some(name) = renamed.get(&text.entry_point) {
+            text.entry_point = (*name).to_owned();
+        }
+        for place in text.places.values_mut() {
+            for slot in [&mut place.name, &mut place.block].into_iter().flatten() {
+                if let Some(name) = renamed.get(slot) {
+                    *slot = (*name).to_owned();
                 }
             }
         }

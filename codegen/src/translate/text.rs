@@ -1,28 +1,46 @@
 //! The little that is changed in generated text, and what is read from it.
 
+use std::collections::{HashMap, HashSet};
+use std::iter;
+
 /// Whether a letter can be part of a name.
 fn is_name(letter: char) -> bool {
     letter.is_ascii_alphanumeric() || letter == '_'
 }
 
+/// The names, and the words and numbers, of a text, each with what follows it up to the next one. The first one is empty
+/// where the text begins with something else.
+fn names(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    let mut rest = text;
+    iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let (name, after) = rest.split_at(rest.find(|it| !is_name(it)).unwrap_or(rest.len()));
+        let (gap, after) = after.split_at(after.find(is_name).unwrap_or(after.len()));
+        rest = after;
+        Some((name, gap))
+    })
+}
+
+/// Replaces names, all in one pass: a text of a shader has thousands of them.
+pub fn rename_all(text: &str, renamed: &HashMap<String, &str>) -> String {
+    let mut all = String::with_capacity(text.len());
+    for (name, gap) in names(text) {
+        all.push_str(renamed.get(name).copied().unwrap_or(name));
+        all.push_str(gap);
+    }
+    all
+}
+
 /// Replaces a name wherever it stands by itself.
 pub fn rename(text: &str, from: &str, to: &str) -> String {
-    let mut renamed = String::with_capacity(text.len());
-    let mut rest = text;
-    let mut before = ' ';
-    while let Some(place) = rest.find(from) {
-        let last = rest[..place].chars().next_back().unwrap_or(before);
-        let after = rest[place + from.len()..].chars().next().unwrap_or(' ');
-        renamed.push_str(&rest[..place]);
-        renamed.push_str(if is_name(last) || is_name(after) {
-            from
-        } else {
-            to
-        });
-        rest = &rest[place + from.len()..];
-        before = from.chars().next_back().unwrap_or(' ');
-    }
-    renamed + rest
+    rename_all(text, &HashMap::from([(from.to_owned(), to)]))
+}
+
+/// All names that stand anywhere in the text.
+pub fn all_names(text: &str) -> HashSet<&str> {
+    names(text).map(|(name, _)| name).collect()
 }
 
 /// Puts `f` after decimal fractions that have no suffix, and makes the `L` of whole numbers `LL`: with
@@ -88,7 +106,7 @@ fn number(text: &str) -> usize {
 
 /// Whether a name stands anywhere in the text.
 pub fn has_name(text: &str, name: &str) -> bool {
-    rename(text, name, "") != text
+    names(text).any(|(it, _)| it == name)
 }
 
 /// Puts `precise` before what functions declare of the types `scalars` and of the vectors and
@@ -148,6 +166,14 @@ mod tests {
     #[test]
     fn only_whole_names_are_renamed() {
         assert_eq!(rename("a ab a_ (a)a", "a", "x"), "x ab a_ (x)x");
+        assert_eq!(rename(".é1_ 1_", "1_", "x"), ".éx x");
+        assert_eq!(
+            rename_all(
+                "(a1_, b1_) a1",
+                &HashMap::from([("a1_".into(), "b1"), ("b1_".into(), "a1")])
+            ),
+            "(b1, a1) a1"
+        );
         assert!(has_name("f(b)", "b"));
         assert!(!has_name("f(bc)", "b"));
     }

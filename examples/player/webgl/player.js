@@ -15,7 +15,10 @@ const FORMATS = {
     r32float: [GL.R32F, "EXT_color_buffer_float", "OES_texture_float_linear"],
     r32uint: [GL.R32UI],
     rg32uint: [GL.RG32UI],
-    // RGBA16_EXT
+    rg16float: [GL.RG16F, "EXT_color_buffer_float"],
+    rg32float: [GL.RG32F, "EXT_color_buffer_float", "OES_texture_float_linear"],
+    // RG16_EXT and RGBA16_EXT
+    rg16unorm: [0x822c, "EXT_texture_norm16"],
     rgba16unorm: [0x805b, "EXT_texture_norm16"],
     depth32float: [GL.DEPTH_COMPONENT32F],
 };

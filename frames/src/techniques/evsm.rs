@@ -21,13 +21,16 @@ const EXPONENTS: [Exponents; 2] = [
     },
 ];
 
-const MAPS: &[Map] = &[
-    // The usual least deviation, 1e-4 of a depth in [-1, 1], as the warp with exponent 40 shows it. It is
-    // four times what rounding leaves of a variance: 20 roundings by 2^-24 of either moment.
-    map(TexelFormat::Rgba32Float, 0, 1.6e-5),
-    // What rounding leaves: three times, each moment is rounded by 2^-11.
-    map(TexelFormat::Rgba16Float, 1, 4e-3),
-];
+/// Maps of 32-bit and of 16-bit floats.
+const fn maps(wide: TexelFormat, narrow: TexelFormat) -> [Map; 2] {
+    [
+        // The usual least deviation, 1e-4 of a depth in [-1, 1], as the warp with exponent 40 shows it. It is
+        // four times what rounding leaves of a variance: 20 roundings by 2^-24 of either moment.
+        map(wide, 0, 1.6e-5),
+        // What rounding leaves: three times, each moment is rounded by 2^-11.
+        map(narrow, 1, 4e-3),
+    ]
+}
 
 const fn map(format: TexelFormat, encoding: u32, least_variance: f32) -> Map {
     Map {
@@ -44,24 +47,25 @@ pub const POSITIVE: Technique = Technique {
     summary: "mean and variance of one exponential",
     // The least variance keeps a surface from shading itself.
     depth_bias: DepthBias::NONE,
-    maps: MAPS,
+    maps: &maps(TexelFormat::Rg32Float, TexelFormat::Rg16Float),
     is_lower_bound: true,
     is_soft: false,
-    add: |graph, given| add(graph, given, 1),
+    add: |graph, given| add(graph, given, "resolve_positive_evsm", 1),
 };
 
 pub const BOTH: Technique = Technique {
     name: "evsm4",
     summary: "mean and variance of two exponentials",
-    add: |graph, given| add(graph, given, 2),
+    maps: &maps(TexelFormat::Rgba32Float, TexelFormat::Rgba16Float),
+    add: |graph, given| add(graph, given, "resolve_evsm", 2),
     ..POSITIVE
 };
 
-fn add(graph: &mut Graph, given: &Given, warps: u32) -> Result<Handle> {
+fn add(graph: &mut Graph, given: &Given, kernel: &str, warps: u32) -> Result<Handle> {
     let map = given.shadow.map;
     let exponents = graph.constant("exponents", &EXPONENTS[map.encoding as usize]);
     let depth = light_depth(graph, given)?;
-    let kernel = format!("resolve_evsm_{}", map.format.name());
+    let kernel = format!("{kernel}_{}", map.format.name());
     let map = resolve_depth(graph, given, &kernel, depth)
         .arg("exponents", exponents)
         .image([given.shadow.size; 2])?;

@@ -8,7 +8,9 @@ use hankel_shadows::shade::encoding;
 
 use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, blurred, resolve_casters, shade, shade_filtered, taps_along, textures};
+use crate::passes::{
+    Blended, Given, blurred, resolve_casters, shade, shade_filtered, taps_along, textures,
+};
 use crate::scene::DepthRange;
 
 pub const TECHNIQUE: Technique = Technique {
@@ -93,7 +95,12 @@ fn add(graph: &mut Graph, given: &Given) -> Result<Handle> {
         None if encoding == encoding::PLAIN => ("resolve_plain_6", 2, SYMMETRIC_6_32),
         None => ("resolve_symmetric_6", 2, SYMMETRIC_6_16),
     };
-    let pass = resolve_casters(graph, given, kernel, "translucent_moments_6")?;
+    let pass = resolve_casters(
+        graph,
+        given,
+        kernel,
+        &Blended::halves("translucent_moments_6"),
+    )?;
     let maps = textures(pass, given, count)?;
     let target = graph.constant("bias target", &bias.six());
     if let Some(words) = words {

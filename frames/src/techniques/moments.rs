@@ -6,7 +6,9 @@ use hankel_moments::bias::{Bias, SYMMETRIC_4_32, SYMMETRIC_6_32, SYMMETRIC_8_32,
 
 use super::{DepthBias, Map, Technique};
 use crate::graph::{Graph, Handle, Result};
-use crate::passes::{Given, blurred, filtered_maps, resolve_casters, shade_filtered, textures};
+use crate::passes::{
+    Blended, Given, blurred, filtered_maps, resolve_casters, shade_filtered, textures,
+};
 use crate::scene::DepthRange;
 
 pub const FOUR: Technique = Technique {
@@ -117,7 +119,7 @@ fn add_blended(
     blended: &'static str,
     names: &[&'static str],
 ) -> Result<Handle> {
-    let pass = resolve_casters(graph, given, make, blended)?;
+    let pass = resolve_casters(graph, given, make, &Blended::halves(blended))?;
     let maps = textures(pass, given, names.len())?;
     let maps = blurred(graph, given, &maps, names)?;
     shade_filtered(graph, given, shade, &maps, |pass| pass)

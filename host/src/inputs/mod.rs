@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use fastrand::Rng;
+use hankel_dsl::native::channel::Stored;
 use hankel_dsl::native::describe::{
     Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Scalar, Stage,
     TexelFormat, TextureKind,
@@ -130,14 +131,11 @@ pub fn flushes(kernel: &Kernel) -> bool {
 /// - a kernel with a sampler gets none that filtering could overflow with.
 fn magnitudes(kernel: &Kernel) -> (f64, f64) {
     let least = if flushes(kernel) { 1e-5 } else { 0.0 };
-    let normalised = kernel.outputs.iter().any(|o| {
-        matches!(
-            o,
-            Output::Texture {
-                format: TexelFormat::Rgba16Unorm | TexelFormat::Rgba8Unorm,
-                ..
-            }
-        )
+    let normalised = kernel.outputs.iter().any(|o| match o {
+        Output::Texture { format, .. } => {
+            matches!(format.stored(), Stored::Unorm { .. } | Stored::Snorm { .. })
+        }
+        _ => false,
     });
     let samples = kernel
         .params

@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use hankel_dsl::native::describe::{Scalar, TexelFormat};
+use hankel_dsl::native::channel::Stored;
+use hankel_dsl::native::describe::{Channels, Scalar, TexelFormat};
 use serde::{Deserialize, Serialize};
 
 use crate::flat::Number;
@@ -67,10 +68,8 @@ pub enum Kind {
     Scalar(Scalar),
     /// Half a float: a channel of a 16-bit float texture.
     Half,
-    /// A step of a 16-bit normalised channel.
-    Unorm16,
-    /// A step of an 8-bit normalised channel.
-    Unorm8,
+    /// A step of a normalised channel of this format.
+    Normalised(TexelFormat),
     /// A channel of 8 or 16 bits of this format.
     Integer(TexelFormat),
 }
@@ -82,7 +81,7 @@ impl Kind {
         let is_integer = match self {
             Self::Scalar(it) => !matches!(it, Scalar::F32 | Scalar::F64),
             Self::Integer(_) => true,
-            Self::Half | Self::Unorm16 | Self::Unorm8 => false,
+            Self::Half | Self::Normalised(_) => false,
         };
         match is_integer {
             true => format!("{x:.0}"),
@@ -93,21 +92,13 @@ impl Kind {
     /// The type of a texture's channels.
     #[must_use]
     pub const fn of(format: TexelFormat) -> Self {
-        match format {
-            TexelFormat::R32Float | TexelFormat::Rgba32Float => Self::Scalar(Scalar::F32),
-            TexelFormat::R32Uint | TexelFormat::Rg32Uint | TexelFormat::Rgba32Uint => {
-                Self::Scalar(Scalar::U32)
-            }
-            TexelFormat::R32Sint | TexelFormat::Rg32Sint | TexelFormat::Rgba32Sint => {
-                Self::Scalar(Scalar::I32)
-            }
-            TexelFormat::Rgba16Uint
-            | TexelFormat::Rgba16Sint
-            | TexelFormat::Rgba8Uint
-            | TexelFormat::Rgba8Sint => Self::Integer(format),
-            TexelFormat::Rgba16Float => Self::Half,
-            TexelFormat::Rgba16Unorm => Self::Unorm16,
-            TexelFormat::Rgba8Unorm => Self::Unorm8,
+        match (format.stored(), format.numbers()) {
+            (Stored::Float32, _) => Self::Scalar(Scalar::F32),
+            (Stored::Float16, _) => Self::Half,
+            (Stored::Unorm { .. } | Stored::Snorm { .. }, _) => Self::Normalised(format),
+            (Stored::Integer { bits: 32 }, Channels::Sint) => Self::Scalar(Scalar::I32),
+            (Stored::Integer { bits: 32 }, _) => Self::Scalar(Scalar::U32),
+            (Stored::Integer { .. }, _) => Self::Integer(format),
         }
     }
 
@@ -116,9 +107,8 @@ impl Kind {
     pub const fn bytes(self) -> usize {
         match self {
             Self::Scalar(s) => crate::device::slots::scalar_bytes(s),
-            Self::Half | Self::Unorm16 => 2,
-            Self::Unorm8 => 1,
-            Self::Integer(format) => format.channel_bytes(),
+            Self::Half => 2,
+            Self::Normalised(format) | Self::Integer(format) => format.channel_bytes(),
         }
     }
 
@@ -138,7 +128,7 @@ impl Kind {
                     _ => Ordering::Equal,
                 }
             }
-            Self::Half | Self::Unorm16 | Self::Unorm8 | Self::Integer(_) => {
+            Self::Half | Self::Normalised(_) | Self::Integer(_) => {
                 a[..self.bytes()].cmp(&b[..self.bytes()])
             }
         }
@@ -184,14 +174,9 @@ impl Kind {
                 };
                 Distance::new(ulp, x, y)
             }
-            Self::Unorm16 => {
-                let read = |v: &[u8]| v.first_chunk().map_or(0, |c| u16::from_le_bytes(*c));
-                let (a, b) = (read(a), read(b));
-                Distance::new(
-                    a.abs_diff(b).into(),
-                    f64::from(a) / 65535.0,
-                    f64::from(b) / 65535.0,
-                )
+            Self::Normalised(format) => {
+                let ((a, value_a), (b, value_b)) = (step(format, a), step(format, b));
+                Distance::new(a.abs_diff(b), value_a, value_b)
             }
             Self::Integer(format) => {
                 let read = |bytes: &[u8]| {
@@ -203,17 +188,29 @@ impl Kind {
                 let (a, b) = (read(a), read(b));
                 Distance::new(a.abs_diff(b).into(), a.into(), b.into())
             }
-            Self::Unorm8 => {
-                let read = |v: &[u8]| v.first().copied().unwrap_or(0);
-                let (a, b) = (read(a), read(b));
-                Distance::new(
-                    a.abs_diff(b).into(),
-                    f64::from(a) / 255.0,
-                    f64::from(b) / 255.0,
-                )
-            }
         }
     }
+}
+
+/// The number of the step that a normalised channel is at, and its value.
+fn step(format: TexelFormat, bytes: &[u8]) -> (i64, f64) {
+    let mut all = [0; 8];
+    all[..format.channel_bytes()].copy_from_slice(&bytes[..format.channel_bytes()]);
+    let unsigned = i64::from_le_bytes(all);
+    let (number, most) = match format.stored() {
+        Stored::Snorm { bits } => {
+            let most = (1 << (bits - 1)) - 1;
+            let number = if unsigned > most {
+                unsigned - (1 << bits)
+            } else {
+                unsigned
+            };
+            // The least number stands for -1 as well.
+            (number.max(-most), most)
+        }
+        _ => (unsigned, (1 << (8 * format.channel_bytes())) - 1),
+    };
+    (number, number as f64 / most as f64)
 }
 
 /// A 16-bit float's value.
@@ -318,10 +315,16 @@ mod tests {
         let d =
             Kind::Scalar(Scalar::U64).compare(&u64::MAX.to_le_bytes(), &wide.to_le_bytes(), false);
         assert_eq!(d.ulp, 1);
-        let d = Kind::Unorm16.compare(&65535u16.to_le_bytes(), &65533u16.to_le_bytes(), false);
+        let d = Kind::Normalised(TexelFormat::Rg16Unorm).compare(
+            &65535u16.to_le_bytes(),
+            &65533u16.to_le_bytes(),
+            false,
+        );
         assert_eq!((d.ulp, d.a), (2, 1.0));
-        let d = Kind::Unorm8.compare(&[0], &[255], false);
+        let d = Kind::Normalised(TexelFormat::R8Unorm).compare(&[0], &[255], false);
         assert_eq!((d.ulp, d.absolute), (255, 1.0));
+        let d = Kind::Normalised(TexelFormat::Rgba8Snorm).compare(&[0x80], &[127], false);
+        assert_eq!((d.ulp, d.a, d.b), (254, -1.0, 1.0));
         let d = Kind::Integer(TexelFormat::Rgba8Sint).compare(&[0xff], &[2], false);
         assert_eq!((d.ulp, d.a), (3, -1.0));
         let d = Kind::Integer(TexelFormat::Rgba16Uint).compare(&[0xff, 0xff], &[0, 0xff], false);

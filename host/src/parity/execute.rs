@@ -365,6 +365,7 @@ fn fragment(
         let (scalar, size, _) = interface(kernel, ty)?;
         let format = match (scalar, size) {
             (Scalar::F32, 1) => TexelFormat::R32Float,
+            (Scalar::F32, 2) => TexelFormat::Rg32Float,
             (Scalar::F32, 4) => TexelFormat::Rgba32Float,
             (Scalar::U32, 1) => TexelFormat::R32Uint,
             (Scalar::U32, 2) => TexelFormat::Rg32Uint,
@@ -375,7 +376,7 @@ fn fragment(
             _ => {
                 return Err(bad(
                     kernel,
-                    "no target format holds its output; return f32, u32, i32, UVec2, IVec2, Vec4, UVec4 or IVec4",
+                    "no target format holds its output; return f32, u32, i32, Vec2, UVec2, IVec2, Vec4, UVec4 or IVec4",
                 ));
             }
         };

@@ -117,6 +117,9 @@ extern crate std;
 // So that the macros' `::hankel_dsl` paths also work in this crate's own tests.
 extern crate self as hankel_dsl;
 
+#[macro_use]
+mod formats;
+
 mod atomics;
 mod data;
 mod half;

@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec4};
+use glam::{UVec2, UVec3};
 
 use crate::Texel;
 #[cfg(not(target_arch = "spirv"))]
@@ -15,22 +15,26 @@ use crate::texture::image;
 
 /// Formats of storage textures, as types.
 pub mod format {
-    use super::{Format, IVec2, IVec4, UVec2, UVec4, Vec4};
+    use glam::{IVec2, IVec4, UVec2, UVec4, Vec2, Vec4};
+    #[cfg(target_arch = "spirv")]
+    use spirv_std::Image;
+
+    use super::Format;
 
     macro_rules! formats {
-        ($($(#[doc = $doc:literal])* $name:ident, $texel:ty, $flat:ident, $layers:ident, $volume:ident;)*) => { $(
+        ($($(#[doc = $doc:literal])* $name:ident $word:literal $spirv:ident $value:ident $channels:literal $channel:ident;)*) => { $(
             $(#[doc = $doc])*
             #[derive(Clone, Copy, Debug)]
             pub enum $name {}
 
             impl Format for $name {
-                type Value = $texel;
+                type Value = $value;
                 #[cfg(target_arch = "spirv")]
-                type Flat = super::image::$flat;
+                type Flat = Image!(2D, format = $spirv, sampled = false);
                 #[cfg(target_arch = "spirv")]
-                type Layers = super::image::$layers;
+                type Layers = Image!(2D, format = $spirv, sampled = false, arrayed);
                 #[cfg(target_arch = "spirv")]
-                type Volume = super::image::$volume;
+                type Volume = Image!(3D, format = $spirv, sampled = false);
                 #[cfg(target_arch = "spirv")]
                 #[inline(always)]
                 fn flat_size(image: &Self::Flat) -> glam::UVec2 {
@@ -53,38 +57,7 @@ pub mod format {
         )* };
     }
 
-    formats! {
-        /// One 32-bit float.
-        R32Float, f32, Storage2dR32Float, Storage2dArrayR32Float, Storage3dR32Float;
-        /// Four 32-bit floats.
-        Rgba32Float, Vec4, Storage2dRgba32Float, Storage2dArrayRgba32Float, Storage3dRgba32Float;
-        /// Four 16-bit floats.
-        Rgba16Float, Vec4, Storage2dRgba16Float, Storage2dArrayRgba16Float, Storage3dRgba16Float;
-        /// Four 16-bit numbers from 0 to 1.
-        Rgba16Unorm, Vec4, Storage2dRgba16Unorm, Storage2dArrayRgba16Unorm, Storage3dRgba16Unorm;
-        /// Four 8-bit numbers from 0 to 1.
-        Rgba8Unorm, Vec4, Storage2dRgba8Unorm, Storage2dArrayRgba8Unorm, Storage3dRgba8Unorm;
-        /// One 32-bit unsigned integer.
-        R32Uint, u32, Storage2dR32Uint, Storage2dArrayR32Uint, Storage3dR32Uint;
-        /// Four 32-bit unsigned integers.
-        Rgba32Uint, UVec4, Storage2dRgba32Uint, Storage2dArrayRgba32Uint, Storage3dRgba32Uint;
-        /// One 32-bit signed integer.
-        R32Sint, i32, Storage2dR32Sint, Storage2dArrayR32Sint, Storage3dR32Sint;
-        /// Four 32-bit signed integers.
-        Rgba32Sint, IVec4, Storage2dRgba32Sint, Storage2dArrayRgba32Sint, Storage3dRgba32Sint;
-        /// Two 32-bit unsigned integers.
-        Rg32Uint, UVec2, Storage2dRg32Uint, Storage2dArrayRg32Uint, Storage3dRg32Uint;
-        /// Two 32-bit signed integers.
-        Rg32Sint, IVec2, Storage2dRg32Sint, Storage2dArrayRg32Sint, Storage3dRg32Sint;
-        /// Four 16-bit unsigned integers. What does not fit must not be written.
-        Rgba16Uint, UVec4, Storage2dRgba16Uint, Storage2dArrayRgba16Uint, Storage3dRgba16Uint;
-        /// Four 16-bit signed integers. What does not fit must not be written.
-        Rgba16Sint, IVec4, Storage2dRgba16Sint, Storage2dArrayRgba16Sint, Storage3dRgba16Sint;
-        /// Four 8-bit unsigned integers. What does not fit must not be written.
-        Rgba8Uint, UVec4, Storage2dRgba8Uint, Storage2dArrayRgba8Uint, Storage3dRgba8Uint;
-        /// Four 8-bit signed integers. What does not fit must not be written.
-        Rgba8Sint, IVec4, Storage2dRgba8Sint, Storage2dArrayRgba8Sint, Storage3dRgba8Sint;
-    }
+    texel_formats!(formats);
 }
 
 /// What a kernel does with a storage texture, as types.

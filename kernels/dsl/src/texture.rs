@@ -81,53 +81,6 @@ pub mod image {
     pub type SintTexture2dArray = Image!(2D, type=i32, sampled, arrayed);
     pub type SintTexture3d = Image!(3D, type=i32, sampled);
 
-    // One for each texel format that a kernel can write.
-    pub type Storage2dR32Float = Image!(2D, format = r32f, sampled = false);
-    pub type Storage2dRgba32Float = Image!(2D, format = rgba32f, sampled = false);
-    pub type Storage2dRgba16Float = Image!(2D, format = rgba16f, sampled = false);
-    pub type Storage2dRgba16Unorm = Image!(2D, format = rgba16, sampled = false);
-    pub type Storage2dRgba8Unorm = Image!(2D, format = rgba8, sampled = false);
-    pub type Storage2dR32Uint = Image!(2D, format = r32ui, sampled = false);
-    pub type Storage2dRgba32Uint = Image!(2D, format = rgba32ui, sampled = false);
-    pub type Storage2dR32Sint = Image!(2D, format = r32i, sampled = false);
-    pub type Storage2dRgba32Sint = Image!(2D, format = rgba32i, sampled = false);
-    pub type Storage2dRg32Uint = Image!(2D, format = rg32ui, sampled = false);
-    pub type Storage2dRg32Sint = Image!(2D, format = rg32i, sampled = false);
-    pub type Storage2dRgba16Uint = Image!(2D, format = rgba16ui, sampled = false);
-    pub type Storage2dRgba16Sint = Image!(2D, format = rgba16i, sampled = false);
-    pub type Storage2dRgba8Uint = Image!(2D, format = rgba8ui, sampled = false);
-    pub type Storage2dRgba8Sint = Image!(2D, format = rgba8i, sampled = false);
-    pub type Storage3dR32Float = Image!(3D, format = r32f, sampled = false);
-    pub type Storage3dRgba32Float = Image!(3D, format = rgba32f, sampled = false);
-    pub type Storage3dRgba16Float = Image!(3D, format = rgba16f, sampled = false);
-    pub type Storage3dRgba16Unorm = Image!(3D, format = rgba16, sampled = false);
-    pub type Storage3dRgba8Unorm = Image!(3D, format = rgba8, sampled = false);
-    pub type Storage3dR32Uint = Image!(3D, format = r32ui, sampled = false);
-    pub type Storage3dRgba32Uint = Image!(3D, format = rgba32ui, sampled = false);
-    pub type Storage3dR32Sint = Image!(3D, format = r32i, sampled = false);
-    pub type Storage3dRgba32Sint = Image!(3D, format = rgba32i, sampled = false);
-    pub type Storage3dRg32Uint = Image!(3D, format = rg32ui, sampled = false);
-    pub type Storage3dRg32Sint = Image!(3D, format = rg32i, sampled = false);
-    pub type Storage3dRgba16Uint = Image!(3D, format = rgba16ui, sampled = false);
-    pub type Storage3dRgba16Sint = Image!(3D, format = rgba16i, sampled = false);
-    pub type Storage3dRgba8Uint = Image!(3D, format = rgba8ui, sampled = false);
-    pub type Storage3dRgba8Sint = Image!(3D, format = rgba8i, sampled = false);
-    pub type Storage2dArrayR32Float = Image!(2D, format = r32f, sampled = false, arrayed);
-    pub type Storage2dArrayRgba32Float = Image!(2D, format = rgba32f, sampled = false, arrayed);
-    pub type Storage2dArrayRgba16Float = Image!(2D, format = rgba16f, sampled = false, arrayed);
-    pub type Storage2dArrayRgba16Unorm = Image!(2D, format = rgba16, sampled = false, arrayed);
-    pub type Storage2dArrayRgba8Unorm = Image!(2D, format = rgba8, sampled = false, arrayed);
-    pub type Storage2dArrayR32Uint = Image!(2D, format = r32ui, sampled = false, arrayed);
-    pub type Storage2dArrayRgba32Uint = Image!(2D, format = rgba32ui, sampled = false, arrayed);
-    pub type Storage2dArrayR32Sint = Image!(2D, format = r32i, sampled = false, arrayed);
-    pub type Storage2dArrayRgba32Sint = Image!(2D, format = rgba32i, sampled = false, arrayed);
-    pub type Storage2dArrayRg32Uint = Image!(2D, format = rg32ui, sampled = false, arrayed);
-    pub type Storage2dArrayRg32Sint = Image!(2D, format = rg32i, sampled = false, arrayed);
-    pub type Storage2dArrayRgba16Uint = Image!(2D, format = rgba16ui, sampled = false, arrayed);
-    pub type Storage2dArrayRgba16Sint = Image!(2D, format = rgba16i, sampled = false, arrayed);
-    pub type Storage2dArrayRgba8Uint = Image!(2D, format = rgba8ui, sampled = false, arrayed);
-    pub type Storage2dArrayRgba8Sint = Image!(2D, format = rgba8i, sampled = false, arrayed);
-
     /// Reads all four channels, whatever the format keeps of them.
     ///
     /// # Safety
@@ -866,6 +819,7 @@ macro_rules! texels {
 
 texels! {
     f32, Vec4: |x| Vec4::new(x, 0.0, 0.0, 1.0), |v| v.x;
+    Vec2, Vec4: |v| Vec4::new(v.x, v.y, 0.0, 1.0), |v| Vec2::new(v.x, v.y);
     Vec4, Vec4: |v| v, |v| v;
     u32, UVec4: |x| UVec4::new(x, 0, 0, 1), |v| v.x;
     UVec2, UVec4: |v| UVec4::new(v.x, v.y, 0, 1), |v| UVec2::new(v.x, v.y);

@@ -94,7 +94,7 @@ impl Kernel {
             let (ident, text) = (self.output_ident(i), self.output_text(i));
             match self.output_format(i, variant) {
                 Some(format) => {
-                    let format = format_ident!("{}", format.variant);
+                    let format = format.variant();
                     quote!(let #ident = args.texels(
                         #text,
                         describe::TexelFormat::#format,

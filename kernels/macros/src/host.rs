@@ -361,7 +361,7 @@ impl Kernel {
                 let binding = binding + i as u32;
                 match self.output_format(i, variant) {
                     Some(format) => {
-                        let format = format_ident!("{}", format.variant);
+                        let format = format.variant();
                         let dimensions = self.dimensions() as u32;
                         quote!(describe::Output::Texture {
                             binding: #binding,

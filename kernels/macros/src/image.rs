@@ -87,7 +87,7 @@ impl Kernel {
     pub fn run_form(&self, variant: &Variant) -> TokenStream {
         let formats = (0..self.outputs.len()).map(|i| match self.output_format(i, variant) {
             Some(format) if !variant.fragment => {
-                let format = format_ident!("{}", format.variant);
+                let format = format.variant();
                 quote!(Some(describe::TexelFormat::#format))
             }
             _ => quote!(None),

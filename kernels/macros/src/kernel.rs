@@ -107,30 +107,42 @@ pub enum FragmentForm {
     Of(Ident),
 }
 
-/// A texel format: its name here, in `Image!`, and as a variant of `TexelFormat`.
+/// A texel format by its name, which is that in WebGPU.
 #[derive(Clone, Copy)]
 pub struct Format {
     pub name: &'static str,
-    pub variant: &'static str,
 }
 
-/// The variants of `TexelFormat`; a format's name is the same in lower case.
-const FORMATS: [(&str, &str); 15] = [
-    ("r32float", "R32Float"),
-    ("rgba32float", "Rgba32Float"),
-    ("rgba16float", "Rgba16Float"),
-    ("rgba16unorm", "Rgba16Unorm"),
-    ("rgba8unorm", "Rgba8Unorm"),
-    ("r32uint", "R32Uint"),
-    ("rgba32uint", "Rgba32Uint"),
-    ("r32sint", "R32Sint"),
-    ("rgba32sint", "Rgba32Sint"),
-    ("rg32uint", "Rg32Uint"),
-    ("rg32sint", "Rg32Sint"),
-    ("rgba16uint", "Rgba16Uint"),
-    ("rgba16sint", "Rgba16Sint"),
-    ("rgba8uint", "Rgba8Uint"),
-    ("rgba8sint", "Rgba8Sint"),
+impl Format {
+    /// The variant of `TexelFormat`: `Rgba16Unorm` for `rgba16unorm`.
+    pub fn variant(self) -> Ident {
+        let mut after_digit = true;
+        let letter = |letter: char| {
+            let starts = after_digit && letter.is_ascii_lowercase();
+            after_digit = letter.is_ascii_digit();
+            if starts {
+                letter.to_ascii_uppercase()
+            } else {
+                letter
+            }
+        };
+        let variant: String = self.name.chars().map(letter).collect();
+        Ident::new(&variant, Span::call_site())
+    }
+}
+
+/// All of them: the table is `texel_formats` of hankel-dsl, which has a test of this.
+#[rustfmt::skip]
+const FORMATS: [&str; 36] = [
+    "r32float", "r32uint", "r32sint",
+    "rg32uint", "rg32sint", "rg32float",
+    "rgba32float", "rgba32uint", "rgba32sint",
+    "r16float", "r16unorm", "r16snorm", "r16uint", "r16sint",
+    "rg16float", "rg16unorm", "rg16snorm", "rg16uint", "rg16sint",
+    "rgba16float", "rgba16unorm", "rgba16uint", "rgba16sint", "rgba16snorm",
+    "r8unorm", "r8snorm", "r8uint", "r8sint",
+    "rg8unorm", "rg8snorm", "rg8uint", "rg8sint",
+    "rgba8unorm", "rgba8uint", "rgba8sint", "rgba8snorm",
 ];
 
 #[derive(Clone)]
@@ -1199,16 +1211,13 @@ fn fragment_form(input: ParseStream<'_>) -> syn::Result<FragmentForm> {
 }
 
 fn format(name: &Ident) -> syn::Result<Format> {
-    let known = FORMATS.into_iter().find(|known| name == known.0);
-    known
-        .map(|(name, variant)| Format { name, variant })
-        .ok_or_else(|| {
-            let names: Vec<_> = FORMATS.iter().map(|f| f.0).collect();
-            syn::Error::new(
-                name.span(),
-                format!("a format is one of {}", names.join(", ")),
-            )
-        })
+    let known = FORMATS.into_iter().find(|known| name == known);
+    known.map(|name| Format { name }).ok_or_else(|| {
+        syn::Error::new(
+            name.span(),
+            format!("a format is one of {}", FORMATS.join(", ")),
+        )
+    })
 }
 
 /// A path as the kernel's own module, one below, sees it.

@@ -199,10 +199,14 @@ impl Kernel {
                 self.outputs.iter().enumerate().map(|(i, ty)| {
                     let (binding, output) = (binding + i as u32, self.output_ident(i));
                     if let Some(format) = self.output_format(i, variant) {
-                        let dimensions = self.dimensions();
-                        let image = format_ident!("Storage{}d{}", dimensions, format.variant);
+                        let format = format.variant();
+                        let image = match self.dimensions() {
+                            3 => quote!(Volume),
+                            _ => quote!(Flat),
+                        };
                         return quote! {
-                            #[spirv(descriptor_set = 0, binding = #binding)] #output: &::hankel_dsl::image::#image,
+                            #[spirv(descriptor_set = 0, binding = #binding)]
+                            #output: &<::hankel_dsl::format::#format as ::hankel_dsl::Format>::#image,
                         };
                     }
                     let ty = self.concrete(ty, variant);

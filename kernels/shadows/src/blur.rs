@@ -2,7 +2,7 @@
 
 use core::ops::{Add, AddAssign, Mul};
 
-use hankel_dsl::glam::{IVec2, UVec2, Vec4};
+use hankel_dsl::glam::{IVec2, UVec2, Vec2, Vec4};
 use hankel_dsl::{Element, Texture2d, array_element, kernel};
 
 use crate::grid::within;
@@ -140,6 +140,66 @@ pub fn blur_rgba16float(
     #[texture] source: Texture2d<'_>,
 ) -> Vec4 {
     filtered(at, taps, source, |texel| texel)
+}
+
+/// The same of two channels of 16 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg16unorm),
+    forms(fragment = blur),
+    inputs = crate::inputs::maps::blurred,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        non_finite,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn blur_rg16unorm(
+    #[index] at: UVec2,
+    #[uniform] taps: &Taps,
+    #[texture] source: Texture2d<'_>,
+) -> Vec2 {
+    filtered(at, taps, source, |texel| Vec2::new(texel.x, texel.y))
+}
+
+/// The same of two 16-bit floats.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg16float),
+    forms(fragment = blur),
+    inputs = crate::inputs::maps::blurred_warps,
+    parity(
+        ulp = 1,
+        non_finite,
+        why = "sums and products only, then rounding to 16 bits, up or down: one step; absurd numbers overflow"
+    )
+)]
+pub fn blur_rg16float(
+    #[index] at: UVec2,
+    #[uniform] taps: &Taps,
+    #[texture] source: Texture2d<'_>,
+) -> Vec2 {
+    filtered(at, taps, source, |texel| Vec2::new(texel.x, texel.y))
+}
+
+/// The same of two 32-bit floats.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg32float),
+    forms(fragment = blur),
+    inputs = crate::inputs::maps::blurred,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+)]
+pub fn blur_rg32float(
+    #[index] at: UVec2,
+    #[uniform] taps: &Taps,
+    #[texture] source: Texture2d<'_>,
+) -> Vec2 {
+    filtered(at, taps, source, |texel| Vec2::new(texel.x, texel.y))
 }
 
 /// The same of one 32-bit float.

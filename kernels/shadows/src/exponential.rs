@@ -3,7 +3,7 @@
 //! The warps are computed by [`math`]: the same bits on every device, so that a map and what is compared
 //! with it agree. They are taken of each sample's depth, and then filtered.
 
-use hankel_dsl::glam::{UVec2, Vec3, Vec4};
+use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel, math};
 use hankel_moments::{markov_1, warped_2};
 
@@ -57,6 +57,15 @@ fn mean_warps(depth: impl Samples, at: UVec2, samples: u32, exponents: &Exponent
     })
 }
 
+/// The same of the warp that grows with depth alone.
+#[inline(always)]
+fn mean_positive(depth: impl Samples, at: UVec2, samples: u32, exponents: &Exponents) -> Vec2 {
+    depth.mean_of_depths(at, samples, |z| {
+        let (positive, _) = exponents.warp(z);
+        Vec2::new(positive, positive * positive)
+    })
+}
+
 of_samples! {
     /// Mean of a texel's `exp(exponent * z)`, depths z in [0, 1]: an exponential shadow map.
     #[kernel(
@@ -101,6 +110,31 @@ of_samples! {
         #[uniform] exponents: &Exponents,
     ) -> Vec4,
     |depth; samples| { mean_warps(depth, at, samples, exponents) }
+}
+
+of_samples! {
+    /// The same of the warp that grows with depth alone, in two channels.
+    #[kernel(
+        compute,
+        threads(8, 8),
+        texture(rg16float, rg32float),
+        forms(fragment),
+        pinned,
+        inputs = crate::inputs::maps::warped_depths,
+        parity(
+            ulp = 1,
+            exact(rg32float),
+            non_finite,
+            why = "rounding to 16 bits, up or down: one step; with exponents above 5.54 they overflow"
+        )
+    )]
+    resolve_positive_evsm,
+    resolve_single_positive_evsm,
+    (
+        #[index] at: UVec2,
+        #[uniform] exponents: &Exponents,
+    ) -> Vec2,
+    |depth; samples| { mean_positive(depth, at, samples, exponents) }
 }
 
 shading! {

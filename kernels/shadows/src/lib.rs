@@ -11,19 +11,21 @@
 //! | to trigonometric ones | [`resolve_trigonometric_unorm`](trigonometric::resolve_trigonometric_unorm), [`resolve_trigonometric_plain`](trigonometric::resolve_trigonometric_plain) |
 //! | to eight and ten | [`resolve_plain_8`](moment_maps::resolve_plain_8), [`resolve_plain_10`](moment_maps::resolve_plain_10) |
 //! | to terms of Fourier series | [`resolve_convolution_rgba8unorm`](convolution::resolve_convolution_rgba8unorm), [`resolve_convolution_rgba16unorm`](convolution::resolve_convolution_rgba16unorm), [`resolve_convolution_8_rgba8unorm`](convolution::resolve_convolution_8_rgba8unorm), [`resolve_convolution_8_rgba16unorm`](convolution::resolve_convolution_8_rgba16unorm) |
-//! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm) |
+//! | to mean and mean square | [`resolve_variance`](variance::resolve_variance) |
+//! | to exponentials | [`resolve_esm`](exponential::resolve_esm), [`resolve_evsm`](exponential::resolve_evsm), [`resolve_positive_evsm`](exponential::resolve_positive_evsm) |
 //! | translucent casters, blended | [`translucent`](translucent::translucent), [`translucent_moments`](translucent::translucent_moments) twice, [`resolve_translucent_unit`](translucent::resolve_translucent_unit), [`resolve_translucent_symmetric`](translucent::resolve_translucent_symmetric), [`resolve_translucent_plain`](translucent::resolve_translucent_plain) |
 //! | and six moments of them | [`translucent_moments_6`](translucent::translucent_moments_6) twice, [`resolve_translucent_symmetric_6`](translucent::resolve_translucent_symmetric_6), [`resolve_translucent_plain_6`](translucent::resolve_translucent_plain_6), [`resolve_translucent_packed_10`](translucent::resolve_translucent_packed_10), [`resolve_translucent_packed_16`](translucent::resolve_translucent_packed_16) |
+//! | and two | [`translucent_variance`](variance::translucent_variance), [`resolve_translucent_variance`](variance::resolve_translucent_variance) |
 //! | or hashed | [`stochastic_depths`](translucent::stochastic_depths) |
 //! | and what is seen through them | [`tint`](translucent::tint), [`tinted`](translucent::tinted) |
-//! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba8unorm`](blur::blur_rgba8unorm), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_r32float`](blur::blur_r32float), [`blur_packed_10`](packed::blur_packed_10), [`blur_packed_16`](packed::blur_packed_16) |
-//! | mip levels | [`halve`](mips::halve), [`halve_rgba8unorm`](mips::halve_rgba8unorm), [`halve_rgba16float`](mips::halve_rgba16float), [`halve_r32float`](mips::halve_r32float) |
+//! | separable filter, twice | [`blur`](blur::blur), [`blur_rgba8unorm`](blur::blur_rgba8unorm), [`blur_rgba16float`](blur::blur_rgba16float), [`blur_rg16unorm`](blur::blur_rg16unorm), [`blur_rg16float`](blur::blur_rg16float), [`blur_rg32float`](blur::blur_rg32float), [`blur_r32float`](blur::blur_r32float), [`blur_packed_10`](packed::blur_packed_10), [`blur_packed_16`](packed::blur_packed_16) |
+//! | mip levels | [`halve`](mips::halve), [`halve_rgba8unorm`](mips::halve_rgba8unorm), [`halve_rgba16float`](mips::halve_rgba16float), [`halve_rg16unorm`](mips::halve_rg16unorm), [`halve_rg16float`](mips::halve_rg16float), [`halve_rg32float`](mips::halve_rg32float), [`halve_r32float`](mips::halve_r32float) |
 //! | summed-area tables of moments | [`resolve_summed`](soft::resolve_summed), [`halve_summed`](soft::halve_summed) for each level after the first, [`prefix_sums`](soft::prefix_sums) twice |
 //! | of six | [`resolve_summed_6`](soft::resolve_summed_6), [`halve_summed_6`](soft::halve_summed_6), [`prefix_sums_6`](soft::prefix_sums_6) |
 //! | tiles that casters come near | [`tile_depths`](tiles::tile_depths), [`tile_list`](tiles::tile_list); over them [`resolve_symmetric_tiles`](tiles::resolve_symmetric_tiles), [`blur_tiles`](tiles::blur_tiles) |
 //! | geometry from the camera | [`surface`](shade::surface), [`surface_with_plane`](mips::surface_with_plane) |
-//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](shade::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_4_compensated`](moment_maps::shade_moments_4_compensated), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_6_compensated`](moment_maps::shade_moments_6_compensated), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_8_compensated`](moment_maps::shade_moments_8_compensated), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_moments_10_compensated`](moment_maps::shade_moments_10_compensated), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
-//! | with mip levels | [`shade_hamburger_mips`](shade::shade_hamburger_mips), [`shade_hausdorff_mips`](shade::shade_hausdorff_mips), [`shade_variance_mips`](shade::shade_variance_mips), [`shade_hamburger_6_mips`](six::shade_hamburger_6_mips), [`shade_trigonometric_mips`](trigonometric::shade_trigonometric_mips), [`shade_esm_mips`](exponential::shade_esm_mips), [`shade_evsm_mips`](exponential::shade_evsm_mips), [`shade_convolution_mips`](convolution::shade_convolution_mips), [`shade_convolution_8_mips`](convolution::shade_convolution_8_mips), [`shade_moments_4_mips`](moment_maps::shade_moments_4_mips), [`shade_moments_4_compensated_mips`](moment_maps::shade_moments_4_compensated_mips), [`shade_moments_6_mips`](moment_maps::shade_moments_6_mips), [`shade_moments_6_compensated_mips`](moment_maps::shade_moments_6_compensated_mips), [`shade_moments_8_mips`](moment_maps::shade_moments_8_mips), [`shade_moments_8_compensated_mips`](moment_maps::shade_moments_8_compensated_mips), [`shade_moments_10_mips`](moment_maps::shade_moments_10_mips), [`shade_moments_10_compensated_mips`](moment_maps::shade_moments_10_compensated_mips) |
+//! | shading | [`shade_hamburger`](shade::shade_hamburger), [`shade_hausdorff`](shade::shade_hausdorff), [`shade_variance`](variance::shade_variance), [`shade_pcf`](shade::shade_pcf), [`shade_pcf_gaussian`](shade::shade_pcf_gaussian), [`shade_hamburger_6`](six::shade_hamburger_6), [`shade_trigonometric`](trigonometric::shade_trigonometric), [`shade_esm`](exponential::shade_esm), [`shade_evsm`](exponential::shade_evsm), [`shade_convolution`](convolution::shade_convolution), [`shade_convolution_8`](convolution::shade_convolution_8), [`shade_moments_4`](moment_maps::shade_moments_4), [`shade_moments_4_compensated`](moment_maps::shade_moments_4_compensated), [`shade_moments_6`](moment_maps::shade_moments_6), [`shade_moments_6_compensated`](moment_maps::shade_moments_6_compensated), [`shade_moments_8`](moment_maps::shade_moments_8), [`shade_moments_8_compensated`](moment_maps::shade_moments_8_compensated), [`shade_moments_10`](moment_maps::shade_moments_10), [`shade_moments_10_compensated`](moment_maps::shade_moments_10_compensated), [`shade_packed_10`](packed::shade_packed_10), [`shade_packed_16`](packed::shade_packed_16), [`shade_soft`](soft::shade_soft), [`shade_soft_6`](soft::shade_soft_6), [`shade_vssm`](soft::shade_vssm), [`shade_pcss`](soft::shade_pcss), [`shade_hamburger_tiles`](tiles::shade_hamburger_tiles), [`shade_pcf_gaussian_tiles`](tiles::shade_pcf_gaussian_tiles), [`shade_stochastic`](translucent::shade_stochastic) |
+//! | with mip levels | [`shade_hamburger_mips`](shade::shade_hamburger_mips), [`shade_hausdorff_mips`](shade::shade_hausdorff_mips), [`shade_variance_mips`](variance::shade_variance_mips), [`shade_hamburger_6_mips`](six::shade_hamburger_6_mips), [`shade_trigonometric_mips`](trigonometric::shade_trigonometric_mips), [`shade_esm_mips`](exponential::shade_esm_mips), [`shade_evsm_mips`](exponential::shade_evsm_mips), [`shade_convolution_mips`](convolution::shade_convolution_mips), [`shade_convolution_8_mips`](convolution::shade_convolution_8_mips), [`shade_moments_4_mips`](moment_maps::shade_moments_4_mips), [`shade_moments_4_compensated_mips`](moment_maps::shade_moments_4_compensated_mips), [`shade_moments_6_mips`](moment_maps::shade_moments_6_mips), [`shade_moments_6_compensated_mips`](moment_maps::shade_moments_6_compensated_mips), [`shade_moments_8_mips`](moment_maps::shade_moments_8_mips), [`shade_moments_8_compensated_mips`](moment_maps::shade_moments_8_compensated_mips), [`shade_moments_10_mips`](moment_maps::shade_moments_10_mips), [`shade_moments_10_compensated_mips`](moment_maps::shade_moments_10_compensated_mips) |
 //! | pictures of several lights | [`sum_lights`](shade::sum_lights) |
 //! | single scattering, marched | [`scatter_march`](scattering::scatter_march), [`scatter_march_spot`](scattering::scatter_march_spot) |
 //! | prefiltered | [`rectify`](scattering::rectify), [`prefix_means`](scattering::prefix_means), [`scatter_prefiltered`](scattering::scatter_prefiltered), [`scatter_prefiltered_6`](scattering::scatter_prefiltered_6) |
@@ -67,6 +69,7 @@ pub mod soft;
 pub mod tiles;
 pub mod translucent;
 pub mod trigonometric;
+pub mod variance;
 
 hankel_dsl::kernels![
     depth::light_depth,
@@ -101,9 +104,16 @@ hankel_dsl::kernels![
     exponential::resolve_single_esm,
     exponential::resolve_evsm,
     exponential::resolve_single_evsm,
+    exponential::resolve_positive_evsm,
+    exponential::resolve_single_positive_evsm,
+    variance::resolve_variance,
+    variance::resolve_single_variance,
     blur::blur,
     blur::blur_rgba8unorm,
     blur::blur_rgba16float,
+    blur::blur_rg16unorm,
+    blur::blur_rg16float,
+    blur::blur_rg32float,
     blur::blur_r32float,
     packed::resolve_packed_10,
     packed::resolve_single_packed_10,
@@ -114,12 +124,15 @@ hankel_dsl::kernels![
     mips::halve,
     mips::halve_rgba8unorm,
     mips::halve_rgba16float,
+    mips::halve_rg16unorm,
+    mips::halve_rg16float,
+    mips::halve_rg32float,
     mips::halve_r32float,
     shade::surface,
     mips::surface_with_plane,
     shade::shade_hamburger,
     shade::shade_hausdorff,
-    shade::shade_variance,
+    variance::shade_variance,
     shade::shade_pcf,
     shade::shade_single_pcf,
     shade::shade_pcf_gaussian,
@@ -143,7 +156,7 @@ hankel_dsl::kernels![
     packed::shade_packed_16,
     shade::shade_hamburger_mips,
     shade::shade_hausdorff_mips,
-    shade::shade_variance_mips,
+    variance::shade_variance_mips,
     six::shade_hamburger_6_mips,
     trigonometric::shade_trigonometric_mips,
     exponential::shade_esm_mips,
@@ -189,6 +202,9 @@ hankel_dsl::kernels![
     translucent::resolve_single_translucent_symmetric,
     translucent::resolve_translucent_plain,
     translucent::resolve_single_translucent_plain,
+    variance::translucent_variance,
+    variance::resolve_translucent_variance,
+    variance::resolve_single_translucent_variance,
     translucent::translucent_moments_6,
     translucent::resolve_translucent_symmetric_6,
     translucent::resolve_single_translucent_symmetric_6,

@@ -113,6 +113,57 @@ pub fn halve_rgba16float(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -
     halved(at, source)
 }
 
+/// The same of two channels of 16 bits.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg16unorm),
+    forms(fragment = halve),
+    inputs = crate::inputs::mips::halved,
+    parity(
+        ulp = 0,
+        absolute = 1.6e-5,
+        non_finite,
+        why = "sums and products only, then rounding to 1/65535: drivers may round a tie either way, which is one step"
+    )
+)]
+pub fn halve_rg16unorm(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec2 {
+    let texel = halved(at, source);
+    Vec2::new(texel.x, texel.y)
+}
+
+/// The same of two 16-bit floats.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg16float),
+    forms(fragment = halve),
+    inputs = crate::inputs::mips::halved,
+    parity(
+        ulp = 1,
+        non_finite,
+        why = "sums and products only, then rounding to 16 bits, up or down: one step; absurd numbers overflow"
+    )
+)]
+pub fn halve_rg16float(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec2 {
+    let texel = halved(at, source);
+    Vec2::new(texel.x, texel.y)
+}
+
+/// The same of two 32-bit floats.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg32float),
+    forms(fragment = halve),
+    inputs = crate::inputs::mips::halved,
+    parity(non_finite, why = "sums of products: those of absurd numbers overflow")
+)]
+pub fn halve_rg32float(#[index] at: UVec2, #[texture] source: Texture2d<'_>) -> Vec2 {
+    let texel = halved(at, source);
+    Vec2::new(texel.x, texel.y)
+}
+
 /// The same of one 32-bit float.
 #[kernel(
     compute,

@@ -5,7 +5,7 @@ use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{Element, Real, Sampler, Texture2d, kernel};
 use hankel_moments::{
     Moments4, Quantized4, cut_leak, dequantize_symmetric_4, dequantize_unit_4, hamburger_4,
-    hausdorff_4, hausdorff_4_symmetric, variance_2,
+    hausdorff_4, hausdorff_4_symmetric,
 };
 
 use crate::blur::Taps;
@@ -17,9 +17,9 @@ use crate::samples::{Samples, mean_of};
 pub mod encoding {
     /// As they are, depths in [-1, 1].
     pub const PLAIN: u32 = 0;
-    /// Optimised basis, depths in [0, 1].
+    /// Depths in [0, 1]; four and more moments in the optimised basis.
     pub const UNIT: u32 = 1;
-    /// Optimised basis, depths in [-1, 1].
+    /// Depths in [-1, 1]; four and more moments in the optimised basis, and all of them moved to [0, 1].
     pub const SYMMETRIC: u32 = 2;
 }
 
@@ -255,13 +255,6 @@ pub(crate) fn hausdorff_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> 
     }
 }
 
-/// The same by mean and variance.
-#[inline(always)]
-pub(crate) fn variance_shadow(light: &Light, texel: Vec4, z: f32, how: u32) -> f32 {
-    let m = decode(texel, how);
-    variance_2(m.b1, m.b2, in_range(z, how), light.moment_bias)
-}
-
 shading! {
     /// Shading with Hamburger four moment shadow mapping.
     shade_hamburger,
@@ -285,24 +278,6 @@ shading! {
     /// Shading with Hausdorff four moment shadow mapping, with mip levels.
     shade_hausdorff_mips,
     hausdorff_shadow(map), inputs(shaded_in_range), uniforms(), constants(
-        #[constant(id = 0, default = 2)]
-        #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
-        encoding: u32
-    ),
-    parity(
-        ulp = 0,
-        absolute = 5e-4,
-        why = "the depth in the light's view is rounded, by up to 3e-7, and the bound's steepest slope with the least bias, 5e-7, is 1400"
-    )
-}
-
-shading! {
-    /// Shading with variance shadow mapping, from the first two of four moments. The moments are as they
-    /// are: against rounding, `moment_bias` is the least variance.
-    shade_variance,
-    /// Shading with variance shadow mapping, with mip levels.
-    shade_variance_mips,
-    variance_shadow(map), inputs(shaded), uniforms(), constants(
         #[constant(id = 0, default = 2)]
         #[values(encoding::PLAIN, encoding::UNIT, encoding::SYMMETRIC)]
         encoding: u32

@@ -50,6 +50,12 @@ fn divided(place: Vec4) -> Vec3 {
     Vec3::new(place.x / w, place.y / w, place.z / w)
 }
 
+/// Depth from 0 to 1 and opacity of a translucent fragment.
+#[inline(always)]
+pub(crate) fn depth_and_opacity(surface: Vec4, place: Vec4) -> (f32, f32) {
+    (Real::saturate(divided(place).z), Real::saturate(surface.w))
+}
+
 /// A depth's four moments as a map has them.
 #[inline(always)]
 fn four(z: f32, how: u32) -> Vec4 {
@@ -96,13 +102,14 @@ pub fn translucent_moments(
     #[values(0, 1)]
     part: u32,
 ) -> Vec4 {
-    let m = four(Real::saturate(divided(place).z), encoding);
+    let (depth, opacity) = depth_and_opacity(surface, place);
+    let m = four(depth, encoding);
     let half = if part == 0 {
         Vec2::new(m.x, m.y)
     } else {
         Vec2::new(m.z, m.w)
     };
-    Vec4::new(half.x, half.y, 0.0, Real::saturate(surface.w))
+    Vec4::new(half.x, half.y, 0.0, opacity)
 }
 
 /// Half of a translucent fragment's six moments as `encoding` says, depths moved to [-1, 1], for alpha blending into
@@ -128,9 +135,10 @@ pub fn translucent_moments_6(
     #[values(0, 1)]
     part: u32,
 ) -> Vec4 {
-    let [odd, even] = six(Real::saturate(divided(place).z), encoding);
+    let (depth, opacity) = depth_and_opacity(surface, place);
+    let [odd, even] = six(depth, encoding);
     let half = if part == 0 { odd } else { even };
-    Vec4::new(half.x, half.y, half.z, Real::saturate(surface.w))
+    Vec4::new(half.x, half.y, half.z, opacity)
 }
 
 /// The mean of a texel's four moments as `how` says: in each sample, what is blended in two halves, before the moments

@@ -1,6 +1,8 @@
 //! Texture formats of OpenGL ES, by WebGPU's names.
 
-/// `RGBA16_EXT` of `EXT_texture_norm16`.
+/// Formats of `EXT_texture_norm16`.
+const R16_EXT: u32 = 0x822A;
+const RG16_EXT: u32 = 0x822C;
 const RGBA16_EXT: u32 = 0x805B;
 
 /// A format: what OpenGL calls it, and how texels go to it and come back.
@@ -12,12 +14,16 @@ pub(super) struct Texel {
     pub(super) format: u32,
     /// Type of their components.
     pub(super) component: u32,
+    /// Channels of a texel.
+    pub(super) channels: usize,
     /// Bytes of a texel.
     pub(super) bytes: usize,
     /// Format that pixels are read in: of the two that a driver must offer, always four channels.
     pub(super) read_format: u32,
     /// Type that pixels are read in.
     pub(super) read_component: u32,
+    /// Bytes of a channel as it is read.
+    pub(super) read_channel_bytes: usize,
     /// Bytes of a pixel as it is read.
     pub(super) read_bytes: usize,
 }
@@ -47,72 +53,96 @@ impl Texel {
         internal: glow::DEPTH_COMPONENT32F,
         format: glow::DEPTH_COMPONENT,
         component: glow::FLOAT,
+        channels: 1,
         bytes: 4,
         read_format: glow::DEPTH_COMPONENT,
         read_component: glow::FLOAT,
+        read_channel_bytes: 4,
         read_bytes: 4,
     };
 
     /// The format of that name. Depth is one float: kernels that do not compare read it as a colour.
     pub(super) fn named(name: &str) -> Result<Self, String> {
-        let (internal, format, component, bytes) = match name {
-            "r32float" | "depth32float" => (glow::R32F, glow::RED, glow::FLOAT, 4),
-            "rgba32float" => (glow::RGBA32F, glow::RGBA, glow::FLOAT, 16),
-            "rgba16float" => (glow::RGBA16F, glow::RGBA, glow::HALF_FLOAT, 8),
-            "rgba16unorm" => (RGBA16_EXT, glow::RGBA, glow::UNSIGNED_SHORT, 8),
-            "rgba8unorm" => (glow::RGBA8, glow::RGBA, glow::UNSIGNED_BYTE, 4),
-            "r32uint" => (glow::R32UI, glow::RED_INTEGER, glow::UNSIGNED_INT, 4),
-            "rg32uint" => (glow::RG32UI, glow::RG_INTEGER, glow::UNSIGNED_INT, 8),
-            "rgba32uint" => (glow::RGBA32UI, glow::RGBA_INTEGER, glow::UNSIGNED_INT, 16),
-            "rgba32sint" => (glow::RGBA32I, glow::RGBA_INTEGER, glow::INT, 16),
-            "r32sint" => (glow::R32I, glow::RED_INTEGER, glow::INT, 4),
-            "rgba16uint" => (glow::RGBA16UI, glow::RGBA_INTEGER, glow::UNSIGNED_SHORT, 8),
-            "rgba16sint" => (glow::RGBA16I, glow::RGBA_INTEGER, glow::SHORT, 8),
-            "rgba8uint" => (glow::RGBA8UI, glow::RGBA_INTEGER, glow::UNSIGNED_BYTE, 4),
-            "rgba8sint" => (glow::RGBA8I, glow::RGBA_INTEGER, glow::BYTE, 4),
+        let (internal, component) = match name {
+            "r32float" | "depth32float" => (glow::R32F, glow::FLOAT),
+            "rg32float" => (glow::RG32F, glow::FLOAT),
+            "rgba32float" => (glow::RGBA32F, glow::FLOAT),
+            "r16float" => (glow::R16F, glow::HALF_FLOAT),
+            "rg16float" => (glow::RG16F, glow::HALF_FLOAT),
+            "rgba16float" => (glow::RGBA16F, glow::HALF_FLOAT),
+            "r16unorm" => (R16_EXT, glow::UNSIGNED_SHORT),
+            "rg16unorm" => (RG16_EXT, glow::UNSIGNED_SHORT),
+            "rgba16unorm" => (RGBA16_EXT, glow::UNSIGNED_SHORT),
+            "r8unorm" => (glow::R8, glow::UNSIGNED_BYTE),
+            "rg8unorm" => (glow::RG8, glow::UNSIGNED_BYTE),
+            "rgba8unorm" => (glow::RGBA8, glow::UNSIGNED_BYTE),
+            "r32uint" => (glow::R32UI, glow::UNSIGNED_INT),
+            "r32sint" => (glow::R32I, glow::INT),
+            "rg32uint" => (glow::RG32UI, glow::UNSIGNED_INT),
+            "rg32sint" => (glow::RG32I, glow::INT),
+            "rgba32uint" => (glow::RGBA32UI, glow::UNSIGNED_INT),
+            "rgba32sint" => (glow::RGBA32I, glow::INT),
+            "r16uint" => (glow::R16UI, glow::UNSIGNED_SHORT),
+            "r16sint" => (glow::R16I, glow::SHORT),
+            "rg16uint" => (glow::RG16UI, glow::UNSIGNED_SHORT),
+            "rg16sint" => (glow::RG16I, glow::SHORT),
+            "rgba16uint" => (glow::RGBA16UI, glow::UNSIGNED_SHORT),
+            "rgba16sint" => (glow::RGBA16I, glow::SHORT),
+            "r8uint" => (glow::R8UI, glow::UNSIGNED_BYTE),
+            "r8sint" => (glow::R8I, glow::BYTE),
+            "rg8uint" => (glow::RG8UI, glow::UNSIGNED_BYTE),
+            "rg8sint" => (glow::RG8I, glow::BYTE),
+            "rgba8uint" => (glow::RGBA8UI, glow::UNSIGNED_BYTE),
+            "rgba8sint" => (glow::RGBA8I, glow::BYTE),
             _ => return Err(format!("textures of format {name} are not known here")),
         };
-        let (read_format, read_component, read_bytes) = match component {
+        let is_integer = name.ends_with("int");
+        let (channels, format, integers) = match name {
+            _ if name.starts_with("rgba") => (4, glow::RGBA, glow::RGBA_INTEGER),
+            _ if name.starts_with("rg") => (2, glow::RG, glow::RG_INTEGER),
+            _ => (1, glow::RED, glow::RED_INTEGER),
+        };
+        let format = if is_integer { integers } else { format };
+        let channel_bytes = match component {
+            glow::FLOAT | glow::UNSIGNED_INT | glow::INT => 4,
+            glow::HALF_FLOAT | glow::UNSIGNED_SHORT | glow::SHORT => 2,
+            _ => 1,
+        };
+        let bytes = channels * channel_bytes;
+        let (read_format, read_component, read_channel_bytes) = match component {
             // Integers are read as integers of 32 bits, of either sign.
-            glow::SHORT | glow::BYTE => (glow::RGBA_INTEGER, glow::INT, 16),
-            _ if format == glow::RGBA_INTEGER => {
-                let wide = if component == glow::INT {
-                    glow::INT
-                } else {
-                    glow::UNSIGNED_INT
-                };
-                (glow::RGBA_INTEGER, wide, 16)
-            }
-            glow::FLOAT | glow::HALF_FLOAT => (glow::RGBA, glow::FLOAT, 16),
-            glow::UNSIGNED_INT | glow::INT => (glow::RGBA_INTEGER, component, 16),
-            _ => (glow::RGBA, component, bytes),
+            glow::INT | glow::SHORT | glow::BYTE => (glow::RGBA_INTEGER, glow::INT, 4),
+            _ if is_integer => (glow::RGBA_INTEGER, glow::UNSIGNED_INT, 4),
+            glow::FLOAT | glow::HALF_FLOAT => (glow::RGBA, glow::FLOAT, 4),
+            _ => (glow::RGBA, component, channel_bytes),
         };
         Ok(Self {
             internal,
             format,
             component,
+            channels,
             bytes,
             read_format,
             read_component,
-            read_bytes,
+            read_channel_bytes,
+            read_bytes: 4 * read_channel_bytes,
         })
     }
 
-    /// Appends a pixel as it was read, as the format has it in memory.
+    /// Appends a pixel as it was read, of which all channels are there, as the format has it in memory.
     pub(super) fn pack(&self, pixel: &[u8], to: &mut Vec<u8>) {
-        if self.component == glow::HALF_FLOAT {
-            for float in pixel.chunks_exact(4) {
-                let float = f32::from_le_bytes([float[0], float[1], float[2], float[3]]);
+        let own = self.bytes / self.channels;
+        for channel in pixel
+            .chunks_exact(self.read_channel_bytes)
+            .take(self.channels)
+        {
+            if self.component == glow::HALF_FLOAT {
+                let float = f32::from_le_bytes([channel[0], channel[1], channel[2], channel[3]]);
                 to.extend(half(float).to_le_bytes());
+            } else {
+                // The lower bytes of an integer.
+                to.extend(&channel[..own]);
             }
-        } else if self.format == glow::RGBA_INTEGER && self.bytes < pixel.len() {
-            // The lower bytes of each channel.
-            for channel in pixel.chunks_exact(4) {
-                to.extend(&channel[..self.bytes / 4]);
-            }
-        } else {
-            // One channel is the first of the four.
-            to.extend(&pixel[..self.bytes]);
         }
     }
 }

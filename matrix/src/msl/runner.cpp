@@ -148,29 +148,32 @@ extern "C" void msl_fail(const char *why) {
 
 // ---- textures ----
 
-enum Format {
-    r32float, rgba32float, rgba16float, rgba16unorm, rgba8unorm,
-    // Integers.
-    r32uint, rgba32uint, r32sint, rgba32sint, rg32uint, rg32sint, rgba16uint, rgba16sint,
-    rgba8uint, rgba8sint
-};
+enum Kind { floats, unorms, snorms, uints, sints };
 
 namespace {
-struct FormatOf {
-    const char *name;
-    Format format;
+struct Format {
+    Kind kind;
+    unsigned channels;
+    // Of a channel.
     unsigned bytes;
 };
-constexpr FormatOf formats[] = {
-    {"r32float", r32float, 4},       {"rgba32float", rgba32float, 16},
-    {"rgba16float", rgba16float, 8}, {"rgba16unorm", rgba16unorm, 8},
-    {"rgba8unorm", rgba8unorm, 4},   {"r32uint", r32uint, 4},
-    {"rgba32uint", rgba32uint, 16},  {"r32sint", r32sint, 4},
-    {"rgba32sint", rgba32sint, 16},  {"rg32uint", rg32uint, 8},
-    {"rg32sint", rg32sint, 8},       {"rgba16uint", rgba16uint, 8},
-    {"rgba16sint", rgba16sint, 8},   {"rgba8uint", rgba8uint, 4},
-    {"rgba8sint", rgba8sint, 4},
-};
+
+// By its name in WebGPU: `rg16float`.
+Format format_named(const char *name) {
+    constexpr struct {
+        const char *word;
+        Kind kind;
+    } kinds[] = {{"float", floats}, {"unorm", unorms}, {"snorm", snorms}, {"uint", uints}, {"sint", sints}};
+    char letters[5], word[6];
+    unsigned bits = 0;
+    int read = 0;
+    if (sscanf(name, "%4[rgba]%u%5[a-z]%n", letters, &bits, word, &read) == 3 && name[read] == 0)
+        for (auto &k : kinds)
+            if (strcmp(k.word, word) == 0)
+                return {k.kind, unsigned(strlen(letters)), bits / 8};
+    msl_fail("a texture of an unknown format");
+    return {};
+}
 } // namespace
 
 struct msl_texture {
@@ -183,14 +186,7 @@ struct msl_texture {
     unsigned samples;
     unsigned char *texels;
 
-    bool is_integer() const { return format >= r32uint; }
-    bool is_signed() const {
-        return format == r32sint || format == rgba32sint || format == rg32sint ||
-               format == rgba16sint || format == rgba8sint;
-    }
-    unsigned channels() const {
-        return format == r32uint || format == r32sint ? 1 : format == rg32uint || format == rg32sint ? 2 : 4;
-    }
+    bool is_integer() const { return format.kind >= uints; }
     unsigned of_level(unsigned lod, int d) const {
         return lod < 32 && size[d] >> lod > 0 ? size[d] >> lod : 1;
     }
@@ -214,8 +210,54 @@ struct msl_texture {
 
 namespace {
 // To the nearest step, ties to even; NaN is 0.
-unsigned unorm(float x, float steps) {
-    return x > 0 ? unsigned(rintf((x < 1 ? x : 1) * steps)) : 0;
+int step(float x, float least, float steps) {
+    if (!(x == x))
+        return 0;
+    return int(rintf((x < least ? least : x < 1 ? x : 1) * steps));
+}
+
+// An integer of that many bytes.
+unsigned whole_at(const unsigned char *bytes, unsigned size, bool is_signed) {
+    unsigned n = 0;
+    memcpy(&n, bytes, size);
+    unsigned shift = 32 - 8 * size;
+    return is_signed ? unsigned(int(n << shift) >> shift) : n;
+}
+
+float channel_at(const unsigned char *bytes, const Format &f) {
+    switch (f.kind) {
+    case floats:
+        if (f.bytes == 2) {
+            _Float16 h;
+            memcpy(&h, bytes, 2);
+            return float(h);
+        }
+        float x;
+        memcpy(&x, bytes, 4);
+        return x;
+    case unorms:
+        return float(whole_at(bytes, f.bytes, false)) / (f.bytes == 1 ? 255.0f : 65535.0f);
+    case snorms:
+        x = float(int(whole_at(bytes, f.bytes, true))) / (f.bytes == 1 ? 127.0f : 32767.0f);
+        // The least number stands for -1 as well.
+        return x < -1 ? -1 : x;
+    default:
+        msl_fail("a texture of integers is read as one of floats");
+        return 0;
+    }
+}
+
+void put_channel(unsigned char *bytes, const Format &f, float x) {
+    if (f.kind == floats && f.bytes == 2) {
+        auto h = static_cast<_Float16>(x);
+        memcpy(bytes, &h, 2);
+    } else if (f.kind == floats) {
+        memcpy(bytes, &x, 4);
+    } else {
+        int n = f.kind == unorms ? step(x, 0, f.bytes == 1 ? 255.0f : 65535.0f)
+                                 : step(x, -1, f.bytes == 1 ? 127.0f : 32767.0f);
+        memcpy(bytes, &n, f.bytes);
+    }
 }
 
 void load(const msl_texture &t, const unsigned *at, unsigned layer, unsigned sample, unsigned lod,
@@ -223,34 +265,8 @@ void load(const msl_texture &t, const unsigned *at, unsigned layer, unsigned sam
     const unsigned char *texel = t.texel(at, layer, sample, lod);
     out[0] = out[1] = out[2] = 0;
     out[3] = 1;
-    switch (t.format) {
-    case r32float:
-        memcpy(out, texel, 4);
-        break;
-    case rgba32float:
-        memcpy(out, texel, 16);
-        break;
-    case rgba16float:
-        for (int i = 0; i < 4; i++) {
-            _Float16 h;
-            memcpy(&h, texel + 2 * i, 2);
-            out[i] = float(h);
-        }
-        break;
-    case rgba16unorm:
-        for (int i = 0; i < 4; i++) {
-            uint16_t n;
-            memcpy(&n, texel + 2 * i, 2);
-            out[i] = float(n) / 65535.0f;
-        }
-        break;
-    case rgba8unorm:
-        for (int i = 0; i < 4; i++)
-            out[i] = float(texel[i]) / 255.0f;
-        break;
-    default:
-        msl_fail("a texture of integers is read as one of floats");
-    }
+    for (unsigned i = 0; i < t.format.channels; i++)
+        out[i] = channel_at(texel + i * t.format.bytes, t.format);
 }
 } // namespace
 
@@ -277,15 +293,8 @@ void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned layer, uns
         return;
     out[3] = 1;
     const unsigned char *texel = t->texel(at, layer, sample, lod);
-    unsigned size = t->texel_bytes / t->channels();
-    for (unsigned i = 0; i < t->channels(); i++) {
-        out[i] = 0;
-        memcpy(&out[i], texel + i * size, size);
-        // The sign of a shorter number.
-        unsigned shift = 32 - 8 * size;
-        if (t->is_signed())
-            out[i] = unsigned(int(out[i] << shift) >> shift);
-    }
+    for (unsigned i = 0; i < t->format.channels; i++)
+        out[i] = whole_at(texel + i * t->format.bytes, t->format.bytes, t->format.kind == sints);
 }
 
 void msl_store_float(msl_texture *t, const unsigned *at, unsigned layer, unsigned lod,
@@ -295,26 +304,8 @@ void msl_store_float(msl_texture *t, const unsigned *at, unsigned layer, unsigne
     if (!t->has(at, layer, 0, lod))
         return;
     unsigned char *texel = t->texel(at, layer, 0, lod);
-    for (unsigned i = 0; i < 4; i++) {
-        switch (t->format) {
-        case rgba16float: {
-            auto h = static_cast<_Float16>(value[i]);
-            memcpy(texel + 2 * i, &h, 2);
-            break;
-        }
-        case rgba16unorm: {
-            auto n = static_cast<uint16_t>(unorm(value[i], 65535));
-            memcpy(texel + 2 * i, &n, 2);
-            break;
-        }
-        case rgba8unorm:
-            texel[i] = static_cast<unsigned char>(unorm(value[i], 255));
-            break;
-        default:
-            if (4 * i < t->texel_bytes)
-                memcpy(texel + 4 * i, value + i, 4);
-        }
-    }
+    for (unsigned i = 0; i < t->format.channels; i++)
+        put_channel(texel + i * t->format.bytes, t->format, value[i]);
 }
 
 void msl_store_uint(msl_texture *t, const unsigned *at, unsigned layer, unsigned lod,
@@ -324,9 +315,8 @@ void msl_store_uint(msl_texture *t, const unsigned *at, unsigned layer, unsigned
     if (!t->has(at, layer, 0, lod))
         return;
     unsigned char *texel = t->texel(at, layer, 0, lod);
-    unsigned size = t->texel_bytes / t->channels();
-    for (unsigned i = 0; i < t->channels(); i++)
-        memcpy(texel + i * size, &value[i], size);
+    for (unsigned i = 0; i < t->format.channels; i++)
+        memcpy(texel + i * t->format.bytes, &value[i], t->format.bytes);
 }
 }
 
@@ -853,14 +843,8 @@ void prepare(Slot &s, unsigned index, unsigned invocations) {
     if (strcmp(s.kind, "texture") == 0) {
         char name[64];
         word(name);
-        const FormatOf *format = nullptr;
-        for (const FormatOf &f : formats)
-            if (strcmp(f.name, name) == 0)
-                format = &f;
-        if (format == nullptr)
-            msl_fail("a texture of an unknown format");
-        s.texture.format = format->format;
-        s.texture.texel_bytes = format->bytes;
+        s.texture.format = format_named(name);
+        s.texture.texel_bytes = s.texture.format.channels * s.texture.format.bytes;
         size_t texels = 1;
         for (unsigned &size : s.texture.size) {
             size = unsigned(number());
@@ -876,7 +860,7 @@ void prepare(Slot &s, unsigned index, unsigned invocations) {
             texels += s.texture.texels_of(level) * s.texture.layers;
         uint64_t offset = number();
         s.bytes = number();
-        if (s.bytes != texels * s.texture.samples * format->bytes)
+        if (s.bytes != texels * s.texture.samples * s.texture.texel_bytes)
             msl_fail("a texture's bytes are not as many as its texels need");
         Region *r = reserve(s.name, s.bytes, 1);
         memcpy(r->data, input(offset, s.bytes), s.bytes);

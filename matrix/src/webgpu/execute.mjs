@@ -2,18 +2,18 @@
 
 import { WIDTH, captured, filling, points, taken, typeName } from "./wgsl.mjs";
 
-/** Bytes of a texel. */
-const TEXEL_BYTES = {
-    r32float: 4, rgba32float: 16, rgba16float: 8, rgba16unorm: 8, rgba8unorm: 4, r32uint: 4,
-    rgba32uint: 16, depth32float: 4, rgba16uint: 8, rgba16sint: 8, rgba8uint: 4, rgba8sint: 4,
-};
+/** Bytes of a texel of a format, of which the name says channels and their bits: `rg16float`. */
+function texelBytes(format) {
+    const [, channels, bits] = /^(rgba|rg|r|depth)(\d+)/.exec(format);
+    return { r: 1, rg: 2, rgba: 4, depth: 1 }[channels] * bits / 8;
+}
 
 /** The levels of a texture's argument: texels along each axis, and where its bytes lie. */
 function levelsOf({ format, size, levels, layers, samples }) {
     let offset = 0;
     return Array.from({ length: levels }, (_, level) => {
         const own = size.map((n) => Math.max(n >> level, 1));
-        const length = own[0] * own[1] * own[2] * layers * samples * TEXEL_BYTES[format];
+        const length = own[0] * own[1] * own[2] * layers * samples * texelBytes(format);
         offset += length;
         return { size: own, offset: offset - length, length };
     });
@@ -158,7 +158,7 @@ const readBuffer = (buffer, length) => ({
 
 /** Reads `length` bytes of a texture, of each texel the first `take`. */
 function readTexture(texture, length, take) {
-    const texel = TEXEL_BYTES[texture.format];
+    const texel = texelBytes(texture.format);
     const size = [texture.width, texture.height, texture.depthOrArrayLayers];
     const rowBytes = size[0] * texel;
     const pitch = up(rowBytes, ALIGNMENT);
@@ -178,18 +178,12 @@ function targetFormat(value) {
     return `${channels}32${{ f32: "float", u32: "uint", i32: "sint" }[value.scalar]}`;
 }
 
-for (const kind of ["float", "uint", "sint"]) {
-    TEXEL_BYTES[`r32${kind}`] = 4;
-    TEXEL_BYTES[`rg32${kind}`] = 8;
-    TEXEL_BYTES[`rgba32${kind}`] = 16;
-}
-
 /** Numbers of targets, in groups that one pass may write. */
 function groupsOf(formats, limits) {
     const groups = [];
     let bytes = Infinity;
     formats.forEach((format, i) => {
-        const more = TEXEL_BYTES[format];
+        const more = texelBytes(format);
         const last = groups.at(-1);
         if (!last || last.length >= limits.maxColorAttachments ||
             bytes + more > limits.maxColorAttachmentBytesPerSample) {
@@ -353,7 +347,7 @@ class Maker {
     async filler(arg) {
         const { format, samples } = arg;
         const isDepth = format === "depth32float";
-        const texel = TEXEL_BYTES[format];
+        const texel = texelBytes(format);
         if (!texel) throw new Error(`format \`${format}\` is not known`);
         if (isDepth && new Float32Array(this.bytes(arg).slice().buffer).some((d) => !(d >= 0 && d <= 1))) {
             throw new Error("a depth texture cannot be given depths beyond 0 and 1");
@@ -422,7 +416,7 @@ class Maker {
             const bytes = this.bytes(arg);
             if (role.kind === "texture" || role.kind === "storage_texture") {
                 const { format, dimensions, size, samples, levels, layers } = arg;
-                const texel = TEXEL_BYTES[format];
+                const texel = texelBytes(format);
                 if (!texel) throw new Error(`format \`${format}\` is not known`);
                 const isStored = role.kind === "storage_texture";
                 const isWritten = isStored && role.access !== "read-only";

@@ -96,6 +96,37 @@ pub fn row<T: Format>(kind: Kind, n: usize, s: &mut Source) -> Row<T> {
             let mass = 10.0_f64.powi(exponent);
             rounded(n, &points, eta, Mass::Is(mass), None)
         }
+        Kind::Units => {
+            let (mut points, eta) = generic(Depths::Symmetric, n, s);
+            let mass = Mass::Is(s.magnitude(-6.0, 6.0));
+            // The last moment has 2n times its power: it stays within the range of `f32`.
+            let most = (14.0 / n as f64).min(8.0);
+            let length = s.magnitude(-most, most);
+            for point in &mut points {
+                point.depth *= length;
+            }
+            rounded(n, &points, eta * length, mass, None)
+        }
+        Kind::HeavyTail => {
+            let count = s.count(n + 1, 4 * n);
+            let mut points: Vec<Point> = (0..count)
+                .map(|_| Point {
+                    weight: s.unit(),
+                    depth: s.normal(),
+                })
+                .collect();
+            for _ in 0..s.count(1, 3) {
+                points.push(Point {
+                    weight: s.magnitude(-6.0, -2.0),
+                    depth: s.sign() * s.magnitude(0.5, 2.0),
+                });
+            }
+            let eta = match s.count(0, 3) {
+                0 => s.pick(&points).depth * s.between(0.9, 1.1),
+                _ => s.normal(),
+            };
+            rounded(n, &points, eta, Mass::Is(1.0), None)
+        }
         Kind::Impossible => impossible(n, s),
         Kind::NotFinite => not_finite(n, s),
     }

@@ -108,6 +108,10 @@ enum Kind {
     Denormal,
     /// A total weight of 10 to this power.
     Mass { exponent: i32 },
+    /// Other units of weight and of length.
+    Units,
+    /// A few points far from all others, and light.
+    HeavyTail,
     /// No distribution's moments.
     Impossible,
     /// NaN or infinity somewhere.
@@ -259,6 +263,16 @@ pub const FAMILIES: &[Family] = &[
         "mass-1e30",
         "generic depths with m_0 = 1e30",
         Kind::Mass { exponent: 30 },
+    ),
+    family(
+        "units",
+        "generic depths in other units: of weight 1e-6 to 1e6, of length 1e-8 to 1e8, less for more moments",
+        Kind::Units,
+    ),
+    family(
+        "heavy-tail",
+        "normal points, and 1 to 3 more that are 3 to 100 times as far and have 1e-6 to 1e-2 of the weight",
+        Kind::HeavyTail,
     ),
     family(
         "impossible",

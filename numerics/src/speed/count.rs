@@ -5,6 +5,7 @@
 use std::array;
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
@@ -94,6 +95,22 @@ enum Kind {
     Not,
 }
 
+impl Kind {
+    fn is_truth(self) -> bool {
+        matches!(
+            self,
+            Self::Less | Self::AtMost | Self::Equal | Self::And | Self::Or | Self::Not
+        )
+    }
+
+    fn commutes(self) -> bool {
+        matches!(
+            self,
+            Self::Sum | Self::Product | Self::Equal | Self::And | Self::Or
+        )
+    }
+}
+
 /// An operation and what it is done to, by number; unused operands are `NONE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Node {
@@ -103,10 +120,12 @@ struct Node {
 
 const NONE: u32 = u32::MAX;
 
-/// Everything that was computed, without repetitions.
+/// Everything that was computed, without repetitions, and the values in all lanes. Those of `f32` are the same in `f64`, and
+/// truth values are 0 and 1.
 #[derive(Default)]
 struct Graph {
     nodes: Vec<Node>,
+    values: Vec<[f64; TOGETHER]>,
     numbers: HashMap<Node, u32>,
     outputs: Vec<u32>,
 }
@@ -116,11 +135,21 @@ thread_local! {
 }
 
 impl Graph {
-    fn add(&mut self, node: Node) -> u32 {
-        *self.numbers.entry(node).or_insert_with(|| {
-            self.nodes.push(node);
-            (self.nodes.len() - 1) as u32
-        })
+    fn add(&mut self, node: Node, values: impl FnOnce(&Self) -> [f64; TOGETHER]) -> u32 {
+        if let Some(number) = self.numbers.get(&node) {
+            return *number;
+        }
+        let values = values(self);
+        let number = self.nodes.len() as u32;
+        self.numbers.insert(node, number);
+        self.nodes.push(node);
+        self.values.push(values);
+        number
+    }
+
+    /// The values of operands in one lane.
+    fn lane(&self, operands: [u32; 3], lane: usize) -> [f64; 3] {
+        operands.map(|o| self.values.get(o as usize).map_or(0.0, |it| it[lane]))
     }
 
     fn constant(&self, number: u32) -> Option<f64> {
@@ -172,39 +201,47 @@ impl Graph {
     }
 }
 
-/// The number of an operation's result; `constant` is that result where all operands are constant.
-fn node(kind: Kind, operands: &[u32], constant: impl FnOnce() -> Kind) -> u32 {
+/// The number of an operation's result. `value` computes it in one lane; where all operands are constants, all lanes are
+/// alike.
+fn node(kind: Kind, operands: [u32; 3], value: impl Fn([f64; 3]) -> f64) -> u32 {
     GRAPH.with_borrow_mut(|graph| {
-        if !operands.is_empty() && operands.iter().all(|o| graph.is_constant(*o)) {
-            return graph.add(Node {
-                kind: constant(),
+        let is_fixed = |o: &u32| *o == NONE || graph.is_constant(*o);
+        if operands.iter().all(is_fixed) {
+            let value = value(graph.lane(operands, 0));
+            let kind = if kind.is_truth() {
+                Kind::Truth(value != 0.0)
+            } else {
+                Kind::Constant(value.to_bits())
+            };
+            let node = Node {
+                kind,
                 operands: [NONE; 3],
-            });
+            };
+            return graph.add(node, |_| [value; TOGETHER]);
         }
-        let mut all = [NONE; 3];
-        all[..operands.len()].copy_from_slice(operands);
-        let commutes = matches!(
-            kind,
-            Kind::Sum | Kind::Product | Kind::Equal | Kind::And | Kind::Or
-        );
-        if commutes && all[0] > all[1] {
-            all.swap(0, 1);
+        let mut ordered = operands;
+        if kind.commutes() && ordered[0] > ordered[1] {
+            ordered.swap(0, 1);
         }
-        graph.add(Node {
+        let node = Node {
             kind,
-            operands: all,
+            operands: ordered,
+        };
+        graph.add(node, |graph| {
+            array::from_fn(|lane| value(graph.lane(operands, lane)))
         })
     })
 }
 
-fn input() -> u32 {
+fn input(values: [f64; TOGETHER]) -> u32 {
     GRAPH.with_borrow_mut(|graph| {
         // Told apart from all others by its own number.
         let number = graph.nodes.len() as u32;
-        graph.add(Node {
+        let node = Node {
             kind: Kind::Input,
             operands: [NONE, NONE, number],
-        })
+        };
+        graph.add(node, |_| values)
     })
 }
 
@@ -232,19 +269,17 @@ fn traced(f: impl FnOnce()) -> Operations {
 /// them is done, and its operations are done for all.
 pub const TOGETHER: usize = 32;
 
-/// Lanes that remember what they come from, on the thread where they were made. Their operations are calls: kernels are
-/// inlined wholly, and with operations of this size in them were half of this crate's code.
+/// Lanes that remember what they come from, on the thread where they were made. A number is only its place there, and its
+/// operations are calls: kernels are inlined wholly, and with values in them they were half of this crate's code.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<P> {
-    /// The values.
-    pub values: [P; TOGETHER],
     number: u32,
+    of: PhantomData<P>,
 }
 
 /// The result of comparing such numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct CountedMask {
-    values: [bool; TOGETHER],
     number: u32,
 }
 
@@ -258,42 +293,42 @@ impl<P: Format> Counted<P> {
     /// A number from outside for each lane.
     #[must_use]
     pub fn inputs(values: [P; TOGETHER]) -> Self {
+        Self::numbered(input(values.map(P::widen)))
+    }
+
+    /// The values in all lanes.
+    #[must_use]
+    pub fn values(self) -> [P; TOGETHER] {
+        GRAPH.with_borrow(|graph| graph.values[self.number as usize].map(P::round))
+    }
+
+    fn numbered(number: u32) -> Self {
         Self {
-            values,
-            number: input(),
+            number,
+            of: PhantomData,
         }
     }
 
     #[inline(never)]
-    fn fixed(value: P) -> Self {
-        let kind = Kind::Constant(value.widen().to_bits());
-        Self {
-            values: [value; TOGETHER],
-            number: node(kind, &[], || kind),
-        }
+    fn fixed(value: f64) -> Self {
+        Self::numbered(node(Kind::Constant(value.to_bits()), [NONE; 3], |_| value))
     }
 
-    fn each(self, f: impl Fn(P) -> P) -> [P; TOGETHER] {
-        self.values.map(f)
+    /// An operation on one number.
+    fn each(self, kind: Kind, f: impl Fn(P) -> P) -> Self {
+        let operands = [self.number, NONE, NONE];
+        Self::numbered(node(kind, operands, |[a, ..]| f(P::round(a)).widen()))
     }
 
-    fn with<T>(self, o: Self, f: impl Fn(P, P) -> T) -> [T; TOGETHER] {
-        array::from_fn(|i| f(self.values[i], o.values[i]))
+    /// An operation on two numbers.
+    fn with(self, o: Self, kind: Kind, f: impl Fn(P, P) -> P) -> Self {
+        let operands = [self.number, o.number, NONE];
+        let value = |[a, b, _]: [f64; 3]| f(P::round(a), P::round(b)).widen();
+        Self::numbered(node(kind, operands, value))
     }
 
-    #[inline(never)]
-    fn of(values: [P; TOGETHER], kind: Kind, operands: &[u32]) -> Self {
-        // Where all operands are constants, all lanes are alike.
-        let constant = || Kind::Constant(values[0].widen().to_bits());
-        let number = node(kind, operands, constant);
-        Self { values, number }
-    }
-
-    fn compared(values: [bool; TOGETHER], kind: Kind, operands: &[u32]) -> CountedMask {
-        CountedMask {
-            values,
-            number: node(kind, operands, || Kind::Truth(values[0])),
-        }
+    fn compared(self, o: Self, kind: Kind, f: impl Fn(f64, f64) -> bool) -> CountedMask {
+        CountedMask::of(kind, [self.number, o.number, NONE], f)
     }
 
     fn is(self, x: f64) -> bool {
@@ -302,46 +337,52 @@ impl<P: Format> Counted<P> {
 }
 
 impl CountedMask {
-    fn with(self, o: Self, f: impl Fn(bool, bool) -> bool) -> [bool; TOGETHER] {
-        array::from_fn(|i| f(self.values[i], o.values[i]))
+    fn of(kind: Kind, operands: [u32; 3], f: impl Fn(f64, f64) -> bool) -> Self {
+        let value = |[a, b, _]: [f64; 3]| f64::from(u8::from(f(a, b)));
+        Self {
+            number: node(kind, operands, value),
+        }
+    }
+
+    fn values(self) -> [bool; TOGETHER] {
+        GRAPH.with_borrow(|graph| graph.values[self.number as usize].map(|it| it != 0.0))
     }
 }
 
 impl BitAnd for CountedMask {
     type Output = Self;
+    #[inline(never)]
     fn bitand(self, o: Self) -> Self {
-        Counted::<f32>::compared(
-            self.with(o, |a, b| a & b),
-            Kind::And,
-            &[self.number, o.number],
-        )
+        let both = |a, b| a != 0.0 && b != 0.0;
+        Self::of(Kind::And, [self.number, o.number, NONE], both)
     }
 }
 
 impl BitOr for CountedMask {
     type Output = Self;
+    #[inline(never)]
     fn bitor(self, o: Self) -> Self {
-        Counted::<f32>::compared(
-            self.with(o, |a, b| a | b),
-            Kind::Or,
-            &[self.number, o.number],
-        )
+        let either = |a, b| a != 0.0 || b != 0.0;
+        Self::of(Kind::Or, [self.number, o.number, NONE], either)
     }
 }
 
 impl Not for CountedMask {
     type Output = Self;
+    #[inline(never)]
     fn not(self) -> Self {
-        Counted::<f32>::compared(self.values.map(|a| !a), Kind::Not, &[self.number])
+        Self::of(Kind::Not, [self.number, NONE, NONE], |a, _| a == 0.0)
     }
 }
 
 impl Mask for CountedMask {
+    #[inline(never)]
     fn any(self) -> bool {
-        self.values.contains(&true)
+        self.values().contains(&true)
     }
+    #[inline(never)]
     fn all(self) -> bool {
-        !self.values.contains(&false)
+        !self.values().contains(&false)
     }
 }
 
@@ -349,11 +390,7 @@ impl<P: Format> Add for Counted<P> {
     type Output = Self;
     #[inline(never)]
     fn add(self, o: Self) -> Self {
-        Self::of(
-            self.with(o, |a, b| a + b),
-            Kind::Sum,
-            &[self.number, o.number],
-        )
+        self.with(o, Kind::Sum, |a, b| a + b)
     }
 }
 
@@ -364,11 +401,7 @@ impl<P: Format> Sub for Counted<P> {
         if o.is(0.0) {
             return self;
         }
-        Self::of(
-            self.with(o, |a, b| a - b),
-            Kind::Difference,
-            &[self.number, o.number],
-        )
+        self.with(o, Kind::Difference, |a, b| a - b)
     }
 }
 
@@ -382,11 +415,7 @@ impl<P: Format> Mul for Counted<P> {
         if o.is(1.0) {
             return self;
         }
-        Self::of(
-            self.with(o, |a, b| a * b),
-            Kind::Product,
-            &[self.number, o.number],
-        )
+        self.with(o, Kind::Product, |a, b| a * b)
     }
 }
 
@@ -397,14 +426,8 @@ impl<P: Format> Div for Counted<P> {
         // A quotient by a power of two is a product.
         let mantissa = (1_u64 << 52) - 1;
         match constant_of(o.number) {
-            Some(c) if c.is_normal() && c.to_bits() & mantissa == 0 => {
-                self * Self::fixed(P::round(1.0 / c))
-            }
-            _ => Self::of(
-                self.with(o, |a, b| a / b),
-                Kind::Quotient,
-                &[self.number, o.number],
-            ),
+            Some(c) if c.is_normal() && c.to_bits() & mantissa == 0 => self * Self::fixed(1.0 / c),
+            _ => self.with(o, Kind::Quotient, |a, b| a / b),
         }
     }
 }
@@ -413,14 +436,13 @@ impl<P: Format> Neg for Counted<P> {
     type Output = Self;
     #[inline(never)]
     fn neg(self) -> Self {
-        Self::of(self.each(|x| -x), Kind::Negative, &[self.number])
+        self.each(Kind::Negative, |x| -x)
     }
 }
 
 macro_rules! assign {
     ($($operator:ident $function:ident $by:tt),*) => {$(
         impl<P: Format> $operator for Counted<P> {
-            #[inline(never)]
             fn $function(&mut self, o: Self) {
                 *self = *self $by o;
             }
@@ -435,76 +457,53 @@ impl<P: Format> Real for Counted<P> {
     const IS_WIDE: bool = P::IS_WIDE;
 
     fn literal<const BITS: u64>() -> Self {
-        Self::fixed(P::literal::<BITS>())
+        Self::fixed(P::literal::<BITS>().widen())
     }
     #[inline(never)]
     fn epsilon() -> Self {
-        Self::fixed(P::epsilon())
+        Self::fixed(P::epsilon().widen())
     }
     #[inline(never)]
     fn sqrt(self) -> Self {
-        Self::of(self.each(P::sqrt), Kind::Root, &[self.number])
+        self.each(Kind::Root, P::sqrt)
     }
     #[inline(never)]
     fn abs(self) -> Self {
-        Self::of(self.each(P::abs), Kind::Magnitude, &[self.number])
+        self.each(Kind::Magnitude, P::abs)
     }
     #[inline(never)]
     fn floor(self) -> Self {
-        Self::of(self.each(P::floor), Kind::Floor, &[self.number])
+        self.each(Kind::Floor, P::floor)
     }
     #[inline(never)]
     fn min(self, o: Self) -> Self {
-        Self::of(
-            self.with(o, |a, b| a.min(b)),
-            Kind::Least,
-            &[self.number, o.number],
-        )
+        self.with(o, Kind::Least, P::min)
     }
     #[inline(never)]
     fn max(self, o: Self) -> Self {
-        Self::of(
-            self.with(o, |a, b| a.max(b)),
-            Kind::Greatest,
-            &[self.number, o.number],
-        )
+        self.with(o, Kind::Greatest, P::max)
     }
     #[inline(never)]
     fn lt(self, o: Self) -> CountedMask {
-        Self::compared(
-            self.with(o, |a, b| a.lt(b)),
-            Kind::Less,
-            &[self.number, o.number],
-        )
+        self.compared(o, Kind::Less, |a, b| a < b)
     }
     #[inline(never)]
     fn le(self, o: Self) -> CountedMask {
-        Self::compared(
-            self.with(o, |a, b| a.le(b)),
-            Kind::AtMost,
-            &[self.number, o.number],
-        )
+        self.compared(o, Kind::AtMost, |a, b| a <= b)
     }
     #[inline(never)]
     fn eq(self, o: Self) -> CountedMask {
-        Self::compared(
-            self.with(o, |a, b| a.eq(b)),
-            Kind::Equal,
-            &[self.number, o.number],
-        )
+        self.compared(o, Kind::Equal, |a, b| a == b)
     }
     #[inline(never)]
     fn select(mask: CountedMask, a: Self, b: Self) -> Self {
         let is_known = GRAPH.with_borrow(|graph| graph.is_constant(mask.number));
         if is_known || a.number == b.number {
-            return if mask.values[0] { a } else { b };
+            return if mask.values()[0] { a } else { b };
         }
-        let choose = |i: usize| if mask.values[i] { a } else { b }.values[i];
-        Self::of(
-            array::from_fn(choose),
-            Kind::Select,
-            &[mask.number, a.number, b.number],
-        )
+        let operands = [mask.number, a.number, b.number];
+        let chosen = |[mask, a, b]: [f64; 3]| if mask != 0.0 { a } else { b };
+        Self::numbered(node(Kind::Select, operands, chosen))
     }
     // As lanes do both.
     #[inline(never)]
@@ -516,9 +515,9 @@ impl<P: Format> Real for Counted<P> {
     #[inline(never)]
     fn two_product(self, o: Self) -> (Self, Self) {
         let product = self * o;
-        let error = self.with(o, |a, b| a.two_product(b).1);
         let operands = [self.number, o.number, product.number];
-        (product, Self::of(error, Kind::Fused, &operands))
+        let error = |[a, b, _]: [f64; 3]| P::round(a).two_product(P::round(b)).1.widen();
+        (product, Self::numbered(node(Kind::Fused, operands, error)))
     }
 }
 
@@ -540,7 +539,7 @@ unsafe impl<P: Format> Lane for Counted<P> {
     fn put_columns<T: Pod>(columns: &[Self], rows: &mut [T]) {
         let table: &mut [P] = cast_slice_mut(rows);
         for (at, column) in columns.iter().enumerate() {
-            for (row, value) in column.values.into_iter().enumerate() {
+            for (row, value) in column.values().into_iter().enumerate() {
                 table[row * columns.len() + at] = value;
             }
             GRAPH.with_borrow_mut(|graph| graph.outputs.push(column.number));

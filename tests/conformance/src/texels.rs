@@ -1,8 +1,10 @@
 //! Textures of integers, storage textures that are read, and gathers from cubes.
 
 use hankel_dsl::access::{Read, ReadWrite};
-use hankel_dsl::format::{R32Float, R32Sint, R32Uint, Rgba8Sint, Rgba16Float, Rgba32Float};
-use hankel_dsl::glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec3, Vec4};
+use hankel_dsl::format::{
+    R32Float, R32Sint, R32Uint, Rg16Float, Rgba8Sint, Rgba8Snorm, Rgba16Float, Rgba32Float,
+};
+use hankel_dsl::glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
     ComparisonSampler, DepthTextureCube, Element, Sampler, StorageTexture2d, StorageTexture2dArray,
     StorageTexture3d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
@@ -40,6 +42,96 @@ pub fn counted_texels(#[index] at: UVec2) -> UVec4 {
 pub fn signed_texels(#[index] at: UVec2) -> IVec4 {
     let x = at.x as i32;
     IVec4::new(x - 30, at.y as i32, -128, if x & 1 == 0 { -x } else { 127 })
+}
+
+/// Steps of formats with four channels: none is in the middle between two numbers that a format has, so that none is
+/// rounded in different ways.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(
+        rgba32float,
+        rgba16float,
+        rgba16unorm,
+        rgba16snorm,
+        rgba8unorm,
+        rgba8snorm
+    )
+)]
+pub fn four_shares(#[index] at: UVec2) -> Vec4 {
+    let [x, y] = shares(at);
+    Vec4::new(x, y, -x, 1.0 - y)
+}
+
+/// The same of two, also drawn.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rg32float, rg16float, rg16unorm, rg16snorm, rg8unorm, rg8snorm),
+    forms(fragment)
+)]
+pub fn two_shares(#[index] at: UVec2) -> Vec2 {
+    let [x, y] = shares(at);
+    Vec2::new(x, -y)
+}
+
+/// The same of one.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(r32float, r16float, r16unorm, r16snorm, r8unorm, r8snorm)
+)]
+pub fn one_share(#[index] at: UVec2) -> f32 {
+    let [x, y] = shares(at);
+    x - y
+}
+
+/// Two numbers from 0 to 1 for a texel.
+fn shares(at: UVec2) -> [f32; 2] {
+    let share = |i: u32| ((i & 63) as f32 + 0.25) / 64.0;
+    [share(at.x), share(at.y)]
+}
+
+/// Two integers that every format holds.
+#[kernel(compute, threads(8, 8), texture(rg8uint, rg16uint, rg32uint))]
+pub fn counted_pairs(#[index] at: UVec2) -> UVec2 {
+    UVec2::new(255 - at.x, at.y)
+}
+
+/// Two signed ones.
+#[kernel(compute, threads(8, 8), texture(rg8sint, rg16sint, rg32sint))]
+pub fn small_pairs(#[index] at: UVec2) -> IVec2 {
+    IVec2::new(at.x as i32 - 128, 127 - at.y as i32)
+}
+
+/// One integer that every format holds.
+#[kernel(compute, threads(8, 8), texture(r8uint, r16uint, r32uint))]
+pub fn counted(#[index] at: UVec2) -> u32 {
+    (at.x ^ at.y) & 255
+}
+
+/// One signed one.
+#[kernel(compute, threads(8, 8), texture(r8sint, r16sint, r32sint))]
+pub fn small(#[index] at: UVec2) -> i32 {
+    at.x as i32 - at.y as i32
+}
+
+/// Storage textures of two channels and of signed numbers, written at any texel.
+#[kernel(compute, threads(8, 8), range(16, 16))]
+pub fn small_stores(
+    #[index] at: UVec2,
+    #[texture] two: StorageTexture2d<'_, Rg16Float>,
+    #[texture]
+    #[layers(2)]
+    signed: StorageTexture2dArray<'_, Rgba8Snorm>,
+) {
+    let [x, y] = shares(at);
+    if at.cmplt(two.size()).all() {
+        two.store(at, Vec2::new(x, y));
+    }
+    if at.cmplt(signed.size()).all() {
+        signed.store(at, at.x & 1, Vec4::new(-x, x, -y, y));
+    }
 }
 
 /// Two integers.

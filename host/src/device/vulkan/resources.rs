@@ -64,23 +64,22 @@ fn padded(bytes: usize) -> u64 {
 
 /// The format in wgpu.
 pub fn format(format: Format) -> wgpu::TextureFormat {
+    macro_rules! by_name {
+        ($texel:expr; $($name:ident)*) => {
+            match $texel {
+                $(TexelFormat::$name => wgpu::TextureFormat::$name,)*
+            }
+        };
+    }
     match format {
         Format::Depth32 => wgpu::TextureFormat::Depth32Float,
-        Format::Texel(TexelFormat::R32Float) => wgpu::TextureFormat::R32Float,
-        Format::Texel(TexelFormat::Rgba32Float) => wgpu::TextureFormat::Rgba32Float,
-        Format::Texel(TexelFormat::Rgba16Float) => wgpu::TextureFormat::Rgba16Float,
-        Format::Texel(TexelFormat::Rgba16Unorm) => wgpu::TextureFormat::Rgba16Unorm,
-        Format::Texel(TexelFormat::Rgba8Unorm) => wgpu::TextureFormat::Rgba8Unorm,
-        Format::Texel(TexelFormat::R32Uint) => wgpu::TextureFormat::R32Uint,
-        Format::Texel(TexelFormat::Rgba32Uint) => wgpu::TextureFormat::Rgba32Uint,
-        Format::Texel(TexelFormat::R32Sint) => wgpu::TextureFormat::R32Sint,
-        Format::Texel(TexelFormat::Rgba32Sint) => wgpu::TextureFormat::Rgba32Sint,
-        Format::Texel(TexelFormat::Rg32Uint) => wgpu::TextureFormat::Rg32Uint,
-        Format::Texel(TexelFormat::Rg32Sint) => wgpu::TextureFormat::Rg32Sint,
-        Format::Texel(TexelFormat::Rgba16Uint) => wgpu::TextureFormat::Rgba16Uint,
-        Format::Texel(TexelFormat::Rgba16Sint) => wgpu::TextureFormat::Rgba16Sint,
-        Format::Texel(TexelFormat::Rgba8Uint) => wgpu::TextureFormat::Rgba8Uint,
-        Format::Texel(TexelFormat::Rgba8Sint) => wgpu::TextureFormat::Rgba8Sint,
+        Format::Texel(texel) => by_name! { texel;
+            R32Float Rg32Float Rgba32Float R16Float Rg16Float Rgba16Float
+            R16Unorm Rg16Unorm Rgba16Unorm R8Unorm Rg8Unorm Rgba8Unorm
+            R16Snorm Rg16Snorm Rgba16Snorm R8Snorm Rg8Snorm Rgba8Snorm
+            R32Uint Rg32Uint Rgba32Uint R16Uint Rg16Uint Rgba16Uint R8Uint Rg8Uint Rgba8Uint
+            R32Sint Rg32Sint Rgba32Sint R16Sint Rg16Sint Rgba16Sint R8Sint Rg8Sint Rgba8Sint
+        },
     }
 }
 

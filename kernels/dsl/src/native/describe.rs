@@ -887,42 +887,19 @@ pub struct Field {
     pub inputs: Inputs,
 }
 
-/// Formats that a kernel can write, or that a texture it reads can have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[repr(u32)]
-pub enum TexelFormat {
-    /// One 32-bit float.
-    R32Float,
-    /// Four 32-bit floats.
-    Rgba32Float,
-    /// Four 16-bit floats.
-    Rgba16Float,
-    /// Four 16-bit numbers from 0 to 1.
-    Rgba16Unorm,
-    /// Four 8-bit numbers from 0 to 1.
-    Rgba8Unorm,
-    /// One 32-bit unsigned integer.
-    R32Uint,
-    /// Four 32-bit unsigned integers.
-    Rgba32Uint,
-    /// One 32-bit signed integer.
-    R32Sint,
-    /// Four 32-bit signed integers.
-    Rgba32Sint,
-    /// Two 32-bit unsigned integers.
-    Rg32Uint,
-    /// Two 32-bit signed integers.
-    Rg32Sint,
-    /// Four 16-bit unsigned integers.
-    Rgba16Uint,
-    /// Four 16-bit signed integers.
-    Rgba16Sint,
-    /// Four 8-bit unsigned integers.
-    Rgba8Uint,
-    /// Four 8-bit signed integers.
-    Rgba8Sint,
+macro_rules! texel_format {
+    ($($(#[doc = $doc:literal])* $name:ident $word:literal $spirv:ident $value:ident $channels:literal $channel:ident;)*) => {
+        /// Formats that a kernel can write, or that a texture it reads can have.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "lowercase")]
+        #[repr(u32)]
+        pub enum TexelFormat {
+            $($(#[doc = $doc])* $name,)*
+        }
+    };
 }
+
+texel_formats!(texel_format);
 
 /// What the channels of a texel are in a shader, whatever their bits in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -779,6 +779,7 @@ fn target_format<T: Texel<Channels: Channels>>() -> TexelFormat {
     use describe::Channels as C;
     match (<T::Channels as Channels>::NUMBERS, size_of::<T>()) {
         (C::Float, 4) => TexelFormat::R32Float,
+        (C::Float, 8) => TexelFormat::Rg32Float,
         (C::Float, _) => TexelFormat::Rgba32Float,
         (C::Uint, 4) => TexelFormat::R32Uint,
         (C::Uint, 8) => TexelFormat::Rg32Uint,

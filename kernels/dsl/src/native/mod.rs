@@ -2,6 +2,7 @@
 //! for SPIR-V.
 
 pub mod call;
+pub mod channel;
 pub mod describe;
 #[doc(hidden)]
 pub mod exec;

@@ -3,26 +3,113 @@
 
 use glam::{UVec4, Vec4};
 
+use super::channel::{self, Channel};
 use super::describe::{Channels, TexelFormat};
 
-/// Every format, in the order of their numbers.
-pub const FORMATS: [TexelFormat; 15] = [
-    TexelFormat::R32Float,
-    TexelFormat::Rgba32Float,
-    TexelFormat::Rgba16Float,
-    TexelFormat::Rgba16Unorm,
-    TexelFormat::Rgba8Unorm,
-    TexelFormat::R32Uint,
-    TexelFormat::Rgba32Uint,
-    TexelFormat::R32Sint,
-    TexelFormat::Rgba32Sint,
-    TexelFormat::Rg32Uint,
-    TexelFormat::Rg32Sint,
-    TexelFormat::Rgba16Uint,
-    TexelFormat::Rgba16Sint,
-    TexelFormat::Rgba8Uint,
-    TexelFormat::Rgba8Sint,
-];
+/// A texel; channels that the format lacks are 0, alpha 1.
+#[inline(always)]
+fn all<T>(channels: usize, zero: T, one: T, channel: impl Fn(usize) -> T) -> [T; 4]
+where
+    T: Copy,
+{
+    let absent = [zero, zero, zero, one];
+    std::array::from_fn(|i| if i < channels { channel(i) } else { absent[i] })
+}
+
+/// The bytes of channel `i`.
+#[inline(always)]
+fn bytes_of<C: Channel>(bytes: &[u8], i: usize) -> &[u8] {
+    &bytes[i * C::BYTES..(i + 1) * C::BYTES]
+}
+
+macro_rules! formats {
+    ($($(#[doc = $doc:literal])* $name:ident $word:literal $spirv:ident $value:ident $channels:literal $channel:ident;)*) => {
+        /// Every format, in the order of their numbers.
+        pub const FORMATS: [TexelFormat; [$($word),*].len()] = [$(TexelFormat::$name),*];
+
+        impl TexelFormat {
+            /// Channels of one texel.
+            #[must_use]
+            pub const fn channels(self) -> usize {
+                match self {
+                    $(Self::$name => $channels,)*
+                }
+            }
+
+            /// Bytes of one channel.
+            #[must_use]
+            pub const fn channel_bytes(self) -> usize {
+                match self {
+                    $(Self::$name => channel::$channel::BYTES,)*
+                }
+            }
+
+            /// How a channel is stored.
+            #[must_use]
+            pub const fn stored(self) -> channel::Stored {
+                match self {
+                    $(Self::$name => channel::$channel::STORED,)*
+                }
+            }
+
+            /// What the channels are in a shader.
+            #[must_use]
+            pub const fn numbers(self) -> Channels {
+                match self {
+                    $(Self::$name => channel::$channel::NUMBERS,)*
+                }
+            }
+
+            /// The name in lower case, as in WebGPU: `rgba16unorm`.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $word,)*
+                }
+            }
+
+            /// Reads one texel of a float format; channels that the format lacks are 0, alpha 1.
+            /// `bytes` has at least [`Self::bytes`] bytes. Integer formats read as their values.
+            #[inline]
+            #[must_use]
+            pub fn load(self, bytes: &[u8]) -> Vec4 {
+                match self {
+                    $(Self::$name => Vec4::from_array(all($channels, 0.0, 1.0, |i| {
+                        channel::$channel::load(bytes_of::<channel::$channel>(bytes, i))
+                    })),)*
+                }
+            }
+
+            /// Reads one texel of an integer format; channels that the format lacks are 0, alpha 1. Signed
+            /// numbers come as their bits.
+            #[inline]
+            #[must_use]
+            pub fn load_integer(self, bytes: &[u8]) -> UVec4 {
+                match self {
+                    $(Self::$name => UVec4::from_array(all($channels, 0, 1, |i| {
+                        channel::$channel::load_integer(bytes_of::<channel::$channel>(bytes, i))
+                    })),)*
+                }
+            }
+
+            /// Writes one texel of a float format. A normalised format clamps to its range and rounds to
+            /// the nearest step; NaN becomes 0.
+            #[inline]
+            pub fn store(self, bytes: &mut [u8], v: Vec4) {
+                match self {
+                    $(Self::$name => {
+                        let channels = bytes.chunks_exact_mut(channel::$channel::BYTES).take($channels);
+                        for (bytes, x) in channels.zip(v.to_array()) {
+                            channel::$channel::store(x, bytes);
+                        }
+                    })*
+                }
+            }
+        }
+    };
+}
+
+texel_formats!(formats);
 
 impl TexelFormat {
     /// Bytes of one texel.
@@ -31,155 +118,10 @@ impl TexelFormat {
         self.channels() * self.channel_bytes()
     }
 
-    /// Channels of one texel.
-    #[must_use]
-    pub const fn channels(self) -> usize {
-        match self {
-            Self::R32Float | Self::R32Uint | Self::R32Sint => 1,
-            Self::Rg32Uint | Self::Rg32Sint => 2,
-            _ => 4,
-        }
-    }
-
-    /// Bytes of one channel.
-    #[must_use]
-    pub const fn channel_bytes(self) -> usize {
-        match self {
-            Self::Rgba8Unorm | Self::Rgba8Uint | Self::Rgba8Sint => 1,
-            Self::Rgba16Float | Self::Rgba16Unorm | Self::Rgba16Uint | Self::Rgba16Sint => 2,
-            _ => 4,
-        }
-    }
-
-    /// What the channels are in a shader.
-    #[must_use]
-    pub const fn numbers(self) -> Channels {
-        match self {
-            Self::R32Uint
-            | Self::Rg32Uint
-            | Self::Rgba32Uint
-            | Self::Rgba16Uint
-            | Self::Rgba8Uint => Channels::Uint,
-            Self::R32Sint
-            | Self::Rg32Sint
-            | Self::Rgba32Sint
-            | Self::Rgba16Sint
-            | Self::Rgba8Sint => Channels::Sint,
-            _ => Channels::Float,
-        }
-    }
-
     /// Whether the channels are integers.
     #[must_use]
     pub const fn is_integer(self) -> bool {
         !matches!(self.numbers(), Channels::Float)
-    }
-
-    /// The name in lower case, as in WebGPU: `rgba16unorm`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::R32Float => "r32float",
-            Self::Rgba32Float => "rgba32float",
-            Self::Rgba16Float => "rgba16float",
-            Self::Rgba16Unorm => "rgba16unorm",
-            Self::Rgba8Unorm => "rgba8unorm",
-            Self::R32Uint => "r32uint",
-            Self::Rgba32Uint => "rgba32uint",
-            Self::R32Sint => "r32sint",
-            Self::Rgba32Sint => "rgba32sint",
-            Self::Rg32Uint => "rg32uint",
-            Self::Rg32Sint => "rg32sint",
-            Self::Rgba16Uint => "rgba16uint",
-            Self::Rgba16Sint => "rgba16sint",
-            Self::Rgba8Uint => "rgba8uint",
-            Self::Rgba8Sint => "rgba8sint",
-        }
-    }
-
-    /// Reads one texel of a float format; channels that the format lacks are 0, alpha 1.
-    /// `bytes` has at least [`Self::bytes`] bytes. Integer formats read as their values.
-    #[inline]
-    #[must_use]
-    pub fn load(self, bytes: &[u8]) -> Vec4 {
-        let f32_at = |i: usize| f32::from_le_bytes(take(bytes, i));
-        let u16_at = |i: usize| u16::from_le_bytes(take(bytes, i));
-        match self {
-            Self::R32Float => Vec4::new(f32_at(0), 0.0, 0.0, 1.0),
-            Self::Rgba32Float => Vec4::new(f32_at(0), f32_at(1), f32_at(2), f32_at(3)),
-            Self::Rgba16Float => {
-                let h = |i| half::f16::from_bits(u16_at(i)).to_f32();
-                Vec4::new(h(0), h(1), h(2), h(3))
-            }
-            Self::Rgba16Unorm => {
-                let n = |i| f32::from(u16_at(i)) / 65535.0;
-                Vec4::new(n(0), n(1), n(2), n(3))
-            }
-            Self::Rgba8Unorm => {
-                let n = |i: usize| f32::from(bytes[i]) / 255.0;
-                Vec4::new(n(0), n(1), n(2), n(3))
-            }
-            _ => match self.numbers() {
-                Channels::Sint => self.load_integer(bytes).as_ivec4().as_vec4(),
-                _ => self.load_integer(bytes).as_vec4(),
-            },
-        }
-    }
-
-    /// Reads one texel of an integer format; channels that the format lacks are 0, alpha 1. Signed
-    /// numbers come as their bits.
-    #[inline]
-    #[must_use]
-    pub fn load_integer(self, bytes: &[u8]) -> UVec4 {
-        let channel = |i: usize| match self {
-            _ if i >= self.channels() => u32::from(i == 3),
-            Self::Rgba16Uint => u16::from_le_bytes(take(bytes, i)).into(),
-            Self::Rgba16Sint => i32::from(i16::from_le_bytes(take(bytes, i))) as u32,
-            Self::Rgba8Uint => bytes[i].into(),
-            Self::Rgba8Sint => i32::from(bytes[i] as i8) as u32,
-            _ => u32::from_le_bytes(take(bytes, i)),
-        };
-        if self.is_integer() {
-            UVec4::new(channel(0), channel(1), channel(2), channel(3))
-        } else {
-            self.load(bytes).as_uvec4()
-        }
-    }
-
-    /// Writes one texel of a float format. A normalised format clamps to its range and rounds to
-    /// the nearest step; NaN becomes 0.
-    #[inline]
-    pub fn store(self, bytes: &mut [u8], v: Vec4) {
-        let all = v.to_array();
-        match self {
-            Self::R32Float => bytes[..4].copy_from_slice(&all[0].to_le_bytes()),
-            Self::Rgba32Float => {
-                for (b, x) in bytes.chunks_exact_mut(4).zip(all) {
-                    b.copy_from_slice(&x.to_le_bytes());
-                }
-            }
-            Self::Rgba16Float => {
-                for (b, x) in bytes.chunks_exact_mut(2).zip(all) {
-                    b.copy_from_slice(&half::f16::from_f32(x).to_bits().to_le_bytes());
-                }
-            }
-            Self::Rgba16Unorm => {
-                for (b, x) in bytes.chunks_exact_mut(2).zip(all) {
-                    // `as` saturates and takes NaN to 0.
-                    let n = (x.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16;
-                    b.copy_from_slice(&n.to_le_bytes());
-                }
-            }
-            Self::Rgba8Unorm => {
-                for (b, x) in bytes.iter_mut().zip(all) {
-                    *b = (x.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8;
-                }
-            }
-            _ => match self.numbers() {
-                Channels::Sint => self.store_integer(bytes, v.as_ivec4().as_uvec4()),
-                _ => self.store_integer(bytes, v.as_uvec4()),
-            },
-        }
     }
 
     /// Whether an integer format can hold the numbers, of which signed ones are given as their bits.
@@ -205,25 +147,14 @@ impl TexelFormat {
     pub fn store_integer(self, bytes: &mut [u8], v: UVec4) {
         if self.is_integer() {
             let size = self.channel_bytes();
-            let channels = v.to_array();
-            for (b, x) in bytes
-                .chunks_exact_mut(size)
-                .zip(&channels[..self.channels()])
-            {
-                b.copy_from_slice(&x.to_le_bytes()[..size]);
+            let channels = bytes.chunks_exact_mut(size).take(self.channels());
+            for (bytes, x) in channels.zip(v.to_array()) {
+                bytes.copy_from_slice(&x.to_le_bytes()[..size]);
             }
         } else {
             self.store(bytes, v.as_vec4());
         }
     }
-}
-
-/// The `i`-th group of `N` bytes.
-#[inline(always)]
-fn take<const N: usize>(bytes: &[u8], i: usize) -> [u8; N] {
-    let mut out = [0; N];
-    out.copy_from_slice(&bytes[i * N..(i + 1) * N]);
-    out
 }
 
 #[cfg(test)]
@@ -244,6 +175,31 @@ mod tests {
             TexelFormat::Rgba8Unorm.store(&mut b, v);
             assert_eq!(TexelFormat::Rgba8Unorm.load(&b), v);
         }
+    }
+
+    #[test]
+    fn every_step_of_a_signed_normalised_format_survives_a_round_trip() {
+        let mut b = [0u8; 8];
+        for n in -32767..=32767_i16 {
+            let v = Vec4::splat(f32::from(n) / 32767.0);
+            TexelFormat::Rgba16Snorm.store(&mut b, v);
+            assert_eq!(TexelFormat::Rgba16Snorm.load(&b), v);
+        }
+        TexelFormat::Rgba8Snorm.store(&mut b, Vec4::new(-2.0, 2.0, f32::NAN, -0.5));
+        assert_eq!(b[..4], [0x81, 0x7f, 0, 0xc0]);
+        // The least number stands for -1 as well.
+        assert_eq!(TexelFormat::R8Snorm.load(&[0x80]).x, -1.0);
+    }
+
+    #[test]
+    fn channels_that_a_format_lacks_are_0_and_alpha_1() {
+        let mut b = [0xff_u8; 16];
+        TexelFormat::Rg16Float.store(&mut b, Vec4::new(0.5, -2.0, 7.0, 7.0));
+        assert_eq!(b[4..], [0xff; 12]);
+        assert_eq!(
+            TexelFormat::Rg16Float.load(&b),
+            Vec4::new(0.5, -2.0, 0.0, 1.0)
+        );
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! moments. The compensated variant computes them with twice the digits, and the first row of
 //! differences, of products of two moments each, with all that are left.
 
-use hankel_dsl::{Real, apart, array_element, array_element_mut, function, lit, unroll};
+use hankel_dsl::{Mask, Real, apart, array_element, array_element_mut, function, lit, unroll};
 
 use super::twofold::Arithmetic;
 use super::{MAX, MAX_MOMENTS, is_long};
@@ -104,9 +104,22 @@ fn far<R: Real, const N: usize>() -> R {
     }
 }
 
-/// A power of two of which the square times `total` is from 1/4 to 4, for normal numbers up to [`beyond`].
+/// A power of two of which the square times `total` is from 1/4 to 4, for normal numbers up to [`beyond`]; 1 if `total` is
+/// there itself, as in nearly all rows: then nothing is computed.
 #[inline(always)]
 fn per_root<R: Real>(total: R) -> R {
+    let one: R = lit!(1.0);
+    let is_elsewhere = total.lt(lit!(0.25)) | total.gt(lit!(4.0));
+    let mut root = one;
+    if is_elsewhere.any() {
+        root = R::select(is_elsewhere, per_root_of_any(total), one);
+    }
+    root
+}
+
+/// [`per_root`] of a total that may be far from 1.
+#[inline(always)]
+fn per_root_of_any<R: Real>(total: R) -> R {
     let (mut root, mut square): (R, R) = (lit!(1.0), total);
     // To where `power_of_two` reaches.
     if const { R::IS_WIDE } {

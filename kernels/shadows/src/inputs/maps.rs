@@ -296,6 +296,34 @@ pub fn shaded(request: &Request) -> Vec<Given> {
     with_bias(request, &published(how), &[("map", texels(how))])
 }
 
+/// A depth's two moments in a variance shadow map, which is stored as `how` says.
+pub(super) fn two(how: u32, z: f64) -> [f64; 2] {
+    let x = if how == encoding::UNIT {
+        z
+    } else {
+        2.0 * z - 1.0
+    };
+    let first = if how == encoding::SYMMETRIC { z } else { x };
+    [first, x * x]
+}
+
+/// What shading with a variance shadow map reads, for its `encoding`.
+#[must_use]
+pub fn shaded_variance(request: &Request) -> Vec<Given> {
+    let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
+    let map = filtered(|z| two(how, z));
+    let texels = map.iter().map(|m| stored_two(how, *m));
+    with_bias(request, &published(how), &[("map", texels.collect())])
+}
+
+/// Two moments as a map stores them: 16 bits, or floats.
+pub(super) fn stored_two(how: u32, [first, second]: [f64; 2]) -> Vec4 {
+    match how {
+        encoding::PLAIN => Vec4::new(first as f32, second as f32, 0.0, 1.0),
+        _ => unorm([first, second, 0.0, 1.0]),
+    }
+}
+
 /// The same for the Hausdorff problem.
 #[must_use]
 pub fn shaded_in_range(request: &Request) -> Vec<Given> {

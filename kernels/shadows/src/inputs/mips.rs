@@ -194,6 +194,17 @@ fn shaded_with(request: &Request, bias: impl Fn(u32) -> Bias) -> Vec<Given> {
     with_levels(request, &bias, strength, of, &MAP, store)
 }
 
+/// What shading with a variance shadow map reads, for its `encoding`.
+#[must_use]
+pub fn shaded_variance(request: &Request) -> Vec<Given> {
+    let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
+    let bias = maps::published(how);
+    let strength = bias.strength as f32;
+    let of = |z| maps::two(how, z);
+    let store = |_, m| maps::stored_two(how, m);
+    with_levels(request, &bias, strength, of, &MAP, store)
+}
+
 /// What shading with maps of six moments reads, for their `encoding`.
 #[must_use]
 pub fn shaded_6(request: &Request) -> Vec<Given> {

@@ -89,24 +89,39 @@ pub fn blended_plain_6(request: &Request) -> Vec<Given> {
     })
 }
 
-/// Depths of opaque surfaces, and both halves of what `of` gives for a depth, blended before them.
-fn halves(request: &Request, of: impl Fn(bool, f64) -> [f64; 3]) -> Vec<Given> {
-    let half = |second: bool| {
-        let of = &of;
-        panes().map(move |panes| {
-            let sum = panes.fold([0.0; 4], |sum: [f64; 4], [depth, opacity, _]| {
-                let [x, y, z] = of(second, depth);
-                let source = [x, y, z, 1.0];
-                std::array::from_fn(|i| opacity * source[i] + (1.0 - opacity) * sum[i])
-            });
-            Vec4::from_array(sum.map(|x| x as f32))
-        })
+/// Two moments, stored as the kernel's `encoding` says.
+#[must_use]
+pub fn blended_variance(request: &Request) -> Vec<Given> {
+    let how = request.constant("encoding").unwrap_or(encoding::SYMMETRIC);
+    let of = |z| {
+        let [first, second] = maps::two(how, z);
+        [first, second, 0.0]
     };
     maps::depths(request)
         .into_iter()
-        .map(|given| texture(request, given, "first", half(false)))
-        .map(|given| texture(request, given, "second", half(true)))
+        .map(|given| texture(request, given, "blended", blended_panes(of)))
         .collect()
+}
+
+/// Depths of opaque surfaces, and both halves of what `of` gives for a depth, blended before them.
+fn halves(request: &Request, of: impl Fn(bool, f64) -> [f64; 3]) -> Vec<Given> {
+    maps::depths(request)
+        .into_iter()
+        .map(|given| texture(request, given, "first", blended_panes(|z| of(false, z))))
+        .map(|given| texture(request, given, "second", blended_panes(|z| of(true, z))))
+        .collect()
+}
+
+/// What `of` gives for the depths of the panes of a sample, blended.
+fn blended_panes(of: impl Fn(f64) -> [f64; 3]) -> impl Iterator<Item = Vec4> {
+    panes().map(move |panes| {
+        let sum = panes.fold([0.0; 4], |sum: [f64; 4], [depth, opacity, _]| {
+            let [x, y, z] = of(depth);
+            let source = [x, y, z, 1.0];
+            std::array::from_fn(|i| opacity * source[i] + (1.0 - opacity) * sum[i])
+        });
+        Vec4::from_array(sum.map(|x| x as f32))
+    })
 }
 
 /// Fragments in the middle of a map's texels, as a rasteriser has them: surfaces, and places in clip space, of

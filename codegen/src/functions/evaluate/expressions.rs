@@ -1,0 +1,297 @@
+//! Expressions: every kind has its arm here, and those of a few lines are evaluated here, too: literals, paths,
+//! fields, arrays, tuples and structures.
+
+use std::rc::Rc;
+
+use proc_macro2::Span;
+use syn::spanned::Spanned;
+
+use super::{Done, Evaluator, Frame, Stop};
+use crate::functions::fold::{float, literal};
+use crate::functions::ir::{Literal, Scalar};
+use crate::functions::linear::{matrix_constant, matrix_name, vector_name};
+use crate::functions::source::{Item, segments};
+use crate::functions::value::{Closure, Generic, Step, Value};
+
+impl Evaluator<'_> {
+    pub(super) fn value(&mut self, frame: &mut Frame, e: &syn::Expr) -> Done<Value> {
+        let value = self.expr(frame, e)?;
+        Ok(self.read(value))
+    }
+
+    pub(super) fn expr(&mut self, frame: &mut Frame, e: &syn::Expr) -> Done<Value> {
+        match e {
+            syn::Expr::Paren(p) => self.expr(frame, &p.expr),
+            syn::Expr::Group(g) => self.expr(frame, &g.expr),
+            syn::Expr::Block(b) => self.block(frame, &b.block),
+            syn::Expr::Const(c) => self.block(frame, &c.block),
+            syn::Expr::Lit(l) => self.literal(frame, &l.lit),
+            syn::Expr::Path(p) => self.path(frame, p),
+            syn::Expr::Unary(u) => self.unary(frame, u),
+            syn::Expr::Binary(b) => self.binary(frame, b),
+            syn::Expr::Assign(a) => self.assignment(frame, a),
+            syn::Expr::Field(f) => {
+                let base = self.value(frame, &f.base)?;
+                self.field(frame, base, &f.member, f.span())
+            }
+            syn::Expr::Index(i) => {
+                let base = self.value(frame, &i.expr)?;
+                let index = self.value(frame, &i.index)?;
+                match (base, index.as_int()) {
+                    (Value::Array(all), Some(at)) => {
+                        let found = usize::try_from(at).ok().and_then(|at| all.get(at).cloned());
+                        found.ok_or_else(|| {
+                            let reason = format!("element {at} of an array of {}", all.len());
+                            self.refuse(frame, i.span(), reason)
+                        })
+                    }
+                    (Value::Array(_), None) => {
+                        let reason = "an array is indexed by what is known when the text is written: \
+                                      use `unroll!`";
+                        Err(self.refuse(frame, i.span(), reason))
+                    }
+                    (other, _) => {
+                        let reason = format!("{} is not indexed", other.what());
+                        Err(self.refuse(frame, i.span(), reason))
+                    }
+                }
+            }
+            syn::Expr::Tuple(t) => {
+                if t.elems.is_empty() {
+                    return Ok(Value::Unit);
+                }
+                let all = t.elems.iter().map(|e| self.value(frame, e));
+                Ok(Value::Tuple(all.collect::<Done<_>>()?))
+            }
+            syn::Expr::Array(a) => {
+                let all = a.elems.iter().map(|e| self.value(frame, e));
+                Ok(Value::Array(all.collect::<Done<_>>()?))
+            }
+            syn::Expr::Repeat(r) => {
+                let value = self.value(frame, &r.expr)?;
+                let value = self.part(value, "element");
+                let length = self.value(frame, &r.len)?;
+                let Some(length) = length.as_int().and_then(|n| usize::try_from(n).ok()) else {
+                    return Err(self.refuse(frame, r.len.span(), "the length is not known"));
+                };
+                Ok(Value::Array(vec![value; length]))
+            }
+            syn::Expr::Struct(s) => self.construct(frame, s),
+            syn::Expr::Closure(c) => Ok(Value::Closure(Rc::new(Closure {
+                source: c.clone(),
+                names: frame
+                    .scopes
+                    .iter()
+                    .flatten()
+                    .map(|(n, s)| (n.clone(), *s))
+                    .collect(),
+                generics: frame.generics.clone(),
+                module: frame.module,
+                own: frame.own.clone(),
+            }))),
+            syn::Expr::Reference(r) => {
+                if r.mutability.is_some() {
+                    let place = self.place(frame, &r.expr)?;
+                    return Ok(Value::Ref(place));
+                }
+                self.expr(frame, &r.expr)
+            }
+            syn::Expr::Call(c) => self.call(frame, c),
+            syn::Expr::MethodCall(m) => self.method(frame, m),
+            syn::Expr::Cast(c) => {
+                let value = self.value(frame, &c.expr)?;
+                self.cast(frame, value, &c.ty, c.span())
+            }
+            syn::Expr::If(i) => self.branch(frame, i),
+            syn::Expr::Match(m) => self.matched(frame, m),
+            syn::Expr::While(w) => self.repeated(frame, w),
+            syn::Expr::Macro(m) => self.invocation(frame, &m.mac),
+            syn::Expr::Return(r) => {
+                let value = match &r.expr {
+                    Some(e) => self.value(frame, e)?,
+                    None => Value::Unit,
+                };
+                Err(Stop::Return(value))
+            }
+            syn::Expr::Unsafe(u) => Err(self.refuse(frame, u.span(), "`unsafe` has no form here")),
+            syn::Expr::ForLoop(f) => Err(self.refuse(
+                frame,
+                f.span(),
+                "`for` has no form here: count with `while`, or use `unroll!`",
+            )),
+            other => Err(self.refuse(frame, other.span(), "this expression has no form here")),
+        }
+    }
+
+    pub(super) fn literal(&mut self, frame: &Frame, lit: &syn::Lit) -> Done<Value> {
+        Ok(match lit {
+            syn::Lit::Bool(b) => Value::bool(b.value),
+            syn::Lit::Int(i) => {
+                let value: i128 = i
+                    .base10_parse()
+                    .map_err(|e| self.refuse(frame, i.span(), e.to_string()))?;
+                match i.suffix() {
+                    "u32" => Value::Scalar(literal(Literal::U32(value as u32))),
+                    "i32" => Value::Scalar(literal(Literal::I32(value as i32))),
+                    "f32" => Value::Scalar(float(value as f32)),
+                    "f64" => Value::Double(value as f64),
+                    _ => Value::Int(value),
+                }
+            }
+            syn::Lit::Float(f) => {
+                let wrong = |e: std::num::ParseFloatError| e.to_string();
+                let digits = f.base10_digits();
+                let double: f64 = digits
+                    .parse()
+                    .map_err(wrong)
+                    .map_err(|e| self.refuse(frame, f.span(), e))?;
+                let single: f32 = digits
+                    .parse()
+                    .map_err(wrong)
+                    .map_err(|e| self.refuse(frame, f.span(), e))?;
+                match f.suffix() {
+                    "f32" => Value::Scalar(float(single)),
+                    "f64" => Value::Double(double),
+                    _ => Value::Fraction(double, single),
+                }
+            }
+            syn::Lit::Str(_) => Value::Text,
+            other => return Err(self.refuse(frame, other.span(), "this literal has no form here")),
+        })
+    }
+
+    pub(super) fn path(&mut self, frame: &mut Frame, p: &syn::ExprPath) -> Done<Value> {
+        let names = segments(&p.path);
+        if let [name] = names.as_slice() {
+            if let Some(slot) = frame.find(name) {
+                return Ok(self.slots[slot].value.clone());
+            }
+            match frame.generics.get(name) {
+                Some(Generic::Const(value)) => return Ok(Value::Int(*value)),
+                Some(Generic::Bool(value)) => return Ok(Value::bool(*value)),
+                Some(_) => return Ok(Value::Path(frame.module, Rc::new(p.clone()))),
+                None => {}
+            }
+        }
+        if let [first, second] = names.as_slice() {
+            if frame.generics.get(first) == Some(&Generic::Real) || first == "f32" {
+                match second.as_str() {
+                    "IS_WIDE" => return Ok(Value::bool(false)),
+                    "EPSILON" => return Ok(Value::Scalar(float(f32::EPSILON))),
+                    _ => {}
+                }
+            }
+            if first == "f64" && second == "EPSILON" {
+                return Ok(Value::Double(f64::EPSILON));
+            }
+            if first == "u32" && second == "MAX" {
+                return Ok(Value::Scalar(literal(Literal::U32(u32::MAX))));
+            }
+            if let Some((scalar, size)) = vector_name(first) {
+                let each = |v: f32| match scalar {
+                    Scalar::F32 => Value::Scalar(float(v)),
+                    Scalar::U32 => Value::Scalar(literal(Literal::U32(v as u32))),
+                    Scalar::I32 => Value::Scalar(literal(Literal::I32(v as i32))),
+                    Scalar::Bool => Value::bool(v != 0.0),
+                };
+                match second.as_str() {
+                    "ZERO" => return Ok(Value::Vector(scalar, vec![each(0.0); size])),
+                    "ONE" => return Ok(Value::Vector(scalar, vec![each(1.0); size])),
+                    _ => return Ok(Value::Path(frame.module, Rc::new(p.clone()))),
+                }
+            }
+            if let Some(size) = matrix_name(first) {
+                return Ok(matrix_constant(size, second)
+                    .unwrap_or_else(|| Value::Path(frame.module, Rc::new(p.clone()))));
+            }
+            let head = syn::Path::from(p.path.segments[0].clone());
+            if let Some(identity) = self.identity(frame, &head) {
+                let key = (identity.to_string(), second.clone());
+                if let Some((module, source)) = self.tree.constants.get(&key) {
+                    let mut inner = self.frame_for(frame, *module, Some(identity));
+                    let value = self.expr(&mut inner, &source.expr)?;
+                    return self.typed(&inner, value, Some(&source.ty), source.span());
+                }
+                return Ok(Value::Path(frame.module, Rc::new(p.clone())));
+            }
+        }
+        match self.tree.resolve(frame.module, &names) {
+            Some((home, Item::Const(source))) => {
+                let mut inner = self.frame_for(frame, home, None);
+                let value = self.expr(&mut inner, &source.expr)?;
+                self.typed(&inner, value, Some(&source.ty), source.span())
+            }
+            Some((_, Item::Function(_) | Item::Struct(_))) => {
+                Ok(Value::Path(frame.module, Rc::new(p.clone())))
+            }
+            _ => match names.join("::").as_str() {
+                "core::f64::consts::PI" => Ok(Value::Double(std::f64::consts::PI)),
+                "core::f64::consts::LOG2_E" => Ok(Value::Double(std::f64::consts::LOG2_E)),
+                "core::f32::consts::PI" => Ok(Value::Scalar(float(std::f32::consts::PI))),
+                // A variant of an enumeration, or a function that the call knows.
+                _ if names.len() > 1 => Ok(Value::Variant(names.join("::"))),
+                name => Err(self.refuse(frame, p.span(), format!("`{name}` is not found"))),
+            },
+        }
+    }
+
+    fn field(&mut self, frame: &Frame, base: Value, name: &syn::Member, span: Span) -> Done<Value> {
+        let key = match name {
+            syn::Member::Named(n) => n.to_string(),
+            syn::Member::Unnamed(i) => i.index.to_string(),
+        };
+        let mut base = base;
+        let what = base.what();
+        match base.part(&[Step::Field(key.clone())]) {
+            Some(v) => {
+                let v = v.clone();
+                Ok(self.read(v))
+            }
+            None => Err(self.refuse(frame, span, format!("{what} has no field `{key}`"))),
+        }
+    }
+
+    fn construct(&mut self, frame: &mut Frame, s: &syn::ExprStruct) -> Done<Value> {
+        let Some(identity) = self.identity(frame, &s.path) else {
+            return Err(self.refuse(frame, s.path.span(), "this structure is not found"));
+        };
+        let Some((home, source)) = self.tree.structure_of(&identity) else {
+            return Err(self.refuse(frame, s.path.span(), "this structure is not found"));
+        };
+        let mut inner = self.frame_for(frame, home, Some(identity.clone()));
+        self.generics(&mut inner, &source.generics, None, s.span())?;
+        let mut given = Vec::new();
+        for field in &s.fields {
+            let syn::Member::Named(name) = &field.member else {
+                return Err(self.refuse(frame, field.span(), "a field by number has no form here"));
+            };
+            let value = self.value(frame, &field.expr)?;
+            given.push((name.to_string(), value));
+        }
+        let rest = match &s.rest {
+            Some(e) => match self.value(frame, e)? {
+                Value::Struct(_, fields) => fields,
+                other => {
+                    let reason = format!("{} is not a structure", other.what());
+                    return Err(self.refuse(frame, e.span(), reason));
+                }
+            },
+            None => Vec::new(),
+        };
+        let mut fields = Vec::new();
+        for field in &source.fields {
+            let name = field
+                .ident
+                .as_ref()
+                .map(ToString::to_string)
+                .unwrap_or_default();
+            let found = given.iter().chain(&rest).find(|(n, _)| *n == name);
+            let Some((_, value)) = found else {
+                return Err(self.refuse(frame, s.span(), format!("`{name}` has no value")));
+            };
+            let value = self.typed(&inner, value.clone(), Some(&field.ty), s.span())?;
+            fields.push((name, value));
+        }
+        Ok(Value::Struct(identity, fields))
+    }
+}
