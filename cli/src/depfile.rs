@@ -20,15 +20,18 @@ pub fn rule(target: &Path, inputs: &[PathBuf]) -> Result<String> {
     Ok(text)
 }
 
-/// A path with what has a meaning in Make marked. Nothing marks a line break: what follows it would
-/// be a rule of its own.
+/// A path with what has a meaning in Make marked, as Make and Ninja both read it. For some letters there is no such mark:
+/// what follows a line break, for example, would be a rule of its own.
 fn escaped(path: &Path) -> Result<String> {
+    const UNMARKED: &str = ":;=%|*?[]'\"`&<>()\\";
     let mut text = String::new();
     for letter in path.to_string_lossy().chars() {
         match letter {
-            '\n' | '\r' => {
+            _ if letter.is_control() || UNMARKED.contains(letter) => {
                 return Err(Failure::input(
-                    format!("--depfile: {path:?} has a line break, which no rule of Make can hold"),
+                    format!(
+                        "--depfile: {path:?} has the letter {letter:?}, which rules of Make and Ninja do not have in names"
+                    ),
                     "Give the folder or file another name, or leave out --depfile.",
                 ));
             }
@@ -53,6 +56,16 @@ mod tests {
             "out/manifest.json: \\\n  a\\ b/lib.rs \\\n  c\\#/$$d.rs\n"
         );
         assert_eq!(rule(Path::new("x"), &[]).unwrap(), "x:\n");
+    }
+
+    #[test]
+    fn letters_that_cannot_be_marked_are_refused() {
+        for name in [
+            "a:b", "a;b", "a=b", "a\tb", "a'b", "a&b", "a*", "a|b", "a\\ b", "a%",
+        ] {
+            let failure = rule(Path::new("out"), &[name.into()]).unwrap_err();
+            assert_eq!(failure.code(), 2, "{name}");
+        }
     }
 
     #[test]

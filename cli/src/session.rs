@@ -458,7 +458,7 @@ impl Session {
             (what, Wanted::Only(names))
         };
         progress.begin(&format!(
-            "Compiling {what} to SPIR-V (half a minute the first time, then seconds)"
+            "Compiling {what} to SPIR-V (a minute or two the first time, then seconds)"
         ));
         if let Some(ahead) = self.ahead.take()
             && let Some(compiled) = ahead.finish(&compiler, wanted)

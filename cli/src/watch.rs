@@ -44,6 +44,7 @@ impl Edits {
     pub fn add(&mut self, inputs: &[PathBuf], sources: &Path) {
         let mut folders = BTreeSet::new();
         below(sources, &mut folders);
+        below(&sources.join(".cargo"), &mut folders);
         for input in inputs {
             let folder = if input.is_dir() {
                 Some(input.as_path())
@@ -93,7 +94,9 @@ impl Edits {
             || event.paths.iter().any(|path| {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
                 // cargo writes the lock file, editors hidden files and copies.
-                let own = name.starts_with('.') || name.ends_with('~') || name == "Cargo.lock";
+                let own = name.starts_with('.') && name != ".cargo"
+                    || name.ends_with('~')
+                    || name == "Cargo.lock";
                 !own && !path.starts_with(&self.ignored)
             })
     }

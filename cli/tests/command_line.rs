@@ -157,6 +157,10 @@ fn bindings_go_where_they_are_wanted() {
         let text = text(file);
         assert!(text.contains(words), "no `{words}` in {file}:\n{text}");
     }
+    // A constant that a variant has a value for is none that a pipeline can be given.
+    let header = text("s/include/hankel.h");
+    assert!(header.contains("HANKEL_SHADE_HAMBURGER_CONSTANT_ENCODING"));
+    assert!(!header.contains("HANKEL_SHADE_HAMBURGER_UNIT_CONSTANT_ENCODING"));
     assert!(!text("s/hlsl/shade_hamburger_unit.hlsl").contains("encoding"));
     assert!(text("s.d").contains("places.toml"), "{}", text("s.d"));
     desk.hankel(&format!("check s {options}")).code(0);

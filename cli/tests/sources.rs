@@ -212,9 +212,18 @@ fn main() {
     );
     desk.write("my-kernels/src/lib.rs", KERNEL);
     let shader = || fs::read_to_string(desk.path("my-kernels/shaders/wgsl/add.wgsl"));
-    desk.hankel("build --manifest-path Cargo.toml --target wgsl")
+    desk.hankel("build --manifest-path Cargo.toml --target wgsl --depfile rule.d")
         .code(0);
     let mut before = shader().expect("it was built");
+    // Of a folder that a build script watches, its files: editing one does not change the folder.
+    let rule = fs::read_to_string(desk.path("my-kernels/rule.d")).expect("it was written");
+    for file in [
+        "my-kernels/weight.txt",
+        "my-kernels/data",
+        "my-kernels/data/a.txt",
+    ] {
+        assert!(rule.contains(&format!("{file} ")), "no {file} in {rule}");
+    }
     let built = |before: &mut String, what: &str, offset: &str| {
         let line = "build --manifest-path Cargo.toml --target wgsl";
         desk.hankel_with(line, offset).code(0);
@@ -396,8 +405,8 @@ fn errors_name_the_line_where_it_is_now() {
     for (wrong, message, at) in [
         // Found in the module that was linked, which has no lines: that of the kernel is told.
         (
-            "((x as u64).rotate_left(35) & 255) as f32",
-            "rust-gpu rotates a 64-bit number",
+            "hankel_dsl::dpdx(x as f32)",
+            "only a fragment has neighbours",
             "#[kernel",
         ),
         // Found by the linker.

@@ -283,11 +283,11 @@ pub fn of_manifests(old: &Manifest, new: &Manifest) -> Diff {
         let mut found = changes("", one, other, is_interface);
         // The place in the source is no property of the shader.
         found.retain(|change| !["file", "line"].contains(&change.what.as_str()));
-        // Another language is an offer.
+        // Another language is an offer, and so is another one that lets a constant be specialised.
         for change in &mut found {
-            if change.what.starts_with("languages.") && change.old.is_none() {
-                change.interface = false;
-            }
+            let is_offer = change.what.starts_with("languages.") && change.old.is_none()
+                || change.what.ends_with(".overridable_in") && !loses_overrides(one, other);
+            change.interface &= !is_offer;
         }
         let texts = one
             .languages
@@ -342,10 +342,27 @@ pub fn of_libraries(old: &api::Record, new: &api::Record) -> Diff {
     diff
 }
 
+/// Whether some language lets a constant be specialised in the old one alone.
+fn loses_overrides(old: &KernelEntry, new: &KernelEntry) -> bool {
+    let of = |kernel: &KernelEntry| -> BTreeSet<(String, Language)> {
+        let constants = kernel.constants.iter();
+        constants
+            .flat_map(|it| {
+                it.overridable_in
+                    .iter()
+                    .map(|language| (it.name.clone(), *language))
+            })
+            .collect()
+    };
+    !of(old).is_subset(&of(new))
+}
+
 /// Whether code that binds a kernel follows from what the manifest's entry says at `path`.
 fn is_interface(path: &str) -> bool {
     let first = path.split('.').next().unwrap_or_default();
-    let value_of_constant = first == "constants" && path.rsplit('.').next() != Some("id");
+    let last = path.rsplit('.').next().unwrap_or_default();
+    let value_of_constant =
+        first == "constants" && !["id", "macro", "overridable_in"].contains(&last);
     let interface = [
         "stage",
         "workgroup_size",

@@ -116,6 +116,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
     trim::memory_model(&mut module);
     trim::accesses_of_textures(&mut module);
     reading::coordinate_types(&mut module);
+    reading::subgroup_operands(&mut module);
     split::apply(&mut module, kernel);
     names::apply(&mut module, kernel)?;
     let words = spirv::store(&module);
@@ -166,6 +167,7 @@ pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool
     let mut has_references = false;
     exact::pin(&mut module);
     exact::fold(&mut module);
+    tables::reach_constants(&mut module);
     // Inlining and unrolling bring constants together, and what they decide may bring more.
     for _ in 0..MOST_ROUNDS {
         let words = run_passes(&module, name, |passes| {

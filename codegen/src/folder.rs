@@ -228,7 +228,9 @@ impl Folder {
         let stopped = self.take_over(&mut owned)?;
         owned.retain(|name, _| files.contains_key(name) || can_be_removed(name));
         let mut change = Change::default();
-        for (name, bytes) in files {
+        // That which says what the others are comes first: if it is damaged, nothing else is known.
+        let described = files.iter().filter(|(name, _)| *name == last);
+        for (name, bytes) in described.chain(files.iter().filter(|(name, _)| *name != last)) {
             match self.read(name)? {
                 Found::File(there) if there == *bytes => {
                     change.unchanged += 1;

@@ -149,11 +149,20 @@ impl Inputs {
     /// One of the latter cannot be read.
     pub fn paths(&self, folder: &Path) -> Result<BTreeSet<PathBuf>, InputError> {
         let folder = normal(&std::path::absolute(folder).map_err(|error| fail(folder, error))?);
-        let recorded = self.files.iter().chain(&self.folders);
-        let present = recorded.filter(|(_, hash)| hash.is_some());
-        let mut paths: BTreeSet<PathBuf> = present
-            .map(|(name, _)| normal(&folder.join(name)))
-            .collect();
+        let present = |(name, hash): (&String, &Option<String>)| {
+            hash.as_ref().map(|_| normal(&folder.join(name)))
+        };
+        let mut paths: BTreeSet<PathBuf> = self.files.iter().filter_map(present).collect();
+        for root in self.folders.iter().filter_map(present) {
+            let mut found = Vec::new();
+            list(&root, &root, &mut found)?;
+            for (_, path) in found {
+                // A folder changes when a file is added to it, or taken away, and not when one is edited.
+                paths.extend(path.parent().map(Path::to_owned));
+                paths.insert(path);
+            }
+            paths.insert(root);
+        }
         let lock = workspace_of(&folder)?.join("Cargo.lock");
         paths.extend(lock.is_file().then_some(lock));
         let files = self.files.keys().cloned().collect();

@@ -633,6 +633,14 @@ pub(crate) fn entry(
     }
 }
 
+impl Constant {
+    /// Whether some file lets it be specialised.
+    #[must_use]
+    pub fn is_overridable(&self) -> bool {
+        !self.overridable_in.is_empty()
+    }
+}
+
 fn constants(kernel: &Kernel, options: &Options) -> Vec<Constant> {
     let constant = |param: &describe::Param| match param.role {
         Role::Constant { id, default } => {

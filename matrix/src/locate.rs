@@ -36,7 +36,7 @@ fn number(line: &str) -> Option<usize> {
     })
 }
 
-/// The last line that writes the output that the number `value` belongs to.
+/// The line that writes the output that the number `value` belongs to; none where several do.
 #[must_use]
 pub fn of_output(text: &str, kernel: &Kernel, code: &Code, value: &str) -> Option<Line> {
     let slots = slots::slots(kernel);
@@ -57,8 +57,9 @@ pub fn of_output(text: &str, kernel: &Kernel, code: &Code, value: &str) -> Optio
         // A stage returns it.
         None => line.trim_start().starts_with("return ") || line.contains("gl_Position ="),
     };
-    let (number, found) = text.lines().enumerate().filter(|(_, l)| writes(l)).last()?;
-    Some(Line {
+    let mut lines = text.lines().enumerate().filter(|(_, l)| writes(l));
+    let (number, found) = lines.next()?;
+    lines.next().is_none().then(|| Line {
         number: number + 1,
         text: found.trim().into(),
     })

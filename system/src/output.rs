@@ -167,6 +167,13 @@ impl Output {
         if inputs.iter().any(|input| is_same(input, there.as_ref())) {
             return Err(OutputError::IsInput { path: path.into() });
         }
+        if let Some(open) = standard_stream(&target) {
+            let file = File::from(open.map_err(fail)?);
+            return Ok(Self {
+                path: path.into(),
+                way: Way::InPlace(BufWriter::new(file)),
+            });
+        }
         let way = match &there {
             Some(metadata) if metadata.is_dir() => {
                 return Err(fail(io::ErrorKind::IsADirectory.into()));
@@ -342,6 +349,34 @@ fn is_stream(path: &Path) -> bool {
         "/proc",
     ];
     cfg!(unix) && open.iter().any(|name| path.starts_with(name))
+}
+
+/// What is open already where a name means standard output or standard error. Opened once more, a file there would have a
+/// position of its own, and what others write would go over what is written here.
+#[cfg(unix)]
+fn standard_stream(path: &Path) -> Option<io::Result<std::os::fd::OwnedFd>> {
+    use std::os::fd::AsFd;
+    let names = |word: &str, number: u8| {
+        [
+            format!("/dev/{word}"),
+            format!("/dev/fd/{number}"),
+            format!("/proc/self/fd/{number}"),
+        ]
+        .iter()
+        .any(|name| path == Path::new(name))
+    };
+    if names("stdout", 1) {
+        Some(io::stdout().as_fd().try_clone_to_owned())
+    } else if names("stderr", 2) {
+        Some(io::stderr().as_fd().try_clone_to_owned())
+    } else {
+        None
+    }
+}
+
+#[cfg(not(unix))]
+fn standard_stream(_: &Path) -> Option<io::Result<File>> {
+    None
 }
 
 #[cfg(unix)]

@@ -1,6 +1,7 @@
 //! Standard streams that are closed or full.
 
 use std::fs::File;
+use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
 use std::process::Stdio;
 
@@ -42,6 +43,28 @@ fn a_reader_that_is_gone_ends_a_command_without_a_word() {
         );
         assert_eq!(words.trim(), "", "{line}");
     }
+}
+
+/// A file that a shell opened, and that others write to as well.
+#[test]
+fn the_standard_output_stream_is_written_where_it_is() {
+    let desk = Desk::new();
+    desk.write("rows.csv", "b1,b2,depth\n0.5,0.3,0.2\n");
+    let file = desk.path("all.txt");
+    let mut shared = File::create(&file).expect("a file");
+    writeln!(shared, "before").expect("it is written");
+    let mut command = desk.command(EVAL);
+    let own = shared.try_clone().expect("the same place in the file");
+    let output = command.stdout(own).stderr(Stdio::piped()).output();
+    Run(output.expect("it starts")).code(0);
+    writeln!(shared, "after").expect("it is written");
+    let lines = desk.read("all.txt");
+    let lines: Vec<&str> = lines.lines().collect();
+    assert_eq!(
+        (lines[0], lines[1], lines[3]),
+        ("before", "shadow", "after"),
+        "{lines:?}"
+    );
 }
 
 /// What reads a message finds whole paths in it.

@@ -57,7 +57,11 @@ fn file_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
 }
 
 /// What messages are known: words that they contain, and what to write instead.
-const KNOWN: [(&[&str], &str); 25] = [
+const KNOWN: [(&[&str], &str); 27] = [
+    (
+        &["memset invalid on bool pattern"],
+        "an array of one truth value, `[false; N]`, cannot be made: write `[0_u32; N]`, or keep them as the bits of a `u32`",
+    ),
     (
         &["cannot offset a pointer"],
         "a shader cannot walk through memory by pointer, as `windows` and `chunks` do: count an \
@@ -122,8 +126,12 @@ const KNOWN: [(&[&str], &str); 25] = [
         "`hankel_dsl::math::fma(a, b, c)`, which rounds once everywhere, or `a * b + c`",
     ),
     (
+        &["no method named `rem_euclid`"],
+        "`use hankel_dsl::Real;`, then `x - y * Real::floor(x / y)`",
+    ),
+    (
         &["no method named", "f32"],
-        "a shader's crate has no `std`: call the function of `hankel_dsl::math`, `math::sin(x)`, which \
+        "a shader's crate has no `std`: call the function of that name in `hankel_dsl::math`, as `math::sin(x)`, which \
          has the same bits everywhere, or the device's own, `math::native::sin(x)`",
     ),
     (

@@ -265,7 +265,7 @@ fn is_prefix(prefix: &str) -> bool {
             .chars()
             .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
     // GLSL keeps `GL_` for itself; file systems take names of 255 bytes.
-    let is_free = !super::names::is_taken(prefix) && !prefix.starts_with("gl_");
+    let is_free = !super::names::is_taken(prefix) && !format!("{prefix}_").starts_with("gl_");
     is_name && is_free && prefix.len() <= LONGEST_PREFIX
 }
 

@@ -7,7 +7,7 @@ use hankel_dsl::native::describe::{Scalar, Type};
 use serde_json::json;
 
 use super::{Groups, InWgsl, Layouts, one_line, scalar_size};
-use crate::manifest::{Binding, BindingKind, KernelEntry, StageName};
+use crate::manifest::{Binding, BindingKind, Constant, KernelEntry, StageName};
 use crate::{Language, VERSION};
 
 /// The module: for each structure a writer into a `DataView`, for each kernel what WebGPU asks.
@@ -64,9 +64,7 @@ pub fn module(
             numbers.collect::<BTreeMap<_, _>>()
         };
         let bindings = of_bindings(&|b| groups.place(b).1);
-        let constants: BTreeMap<_, _> = kernel
-            .constants
-            .iter()
+        let constants: BTreeMap<_, _> = overridable(kernel)
             .map(|c| (&c.name, c.id.to_string()))
             .collect();
         let mut value = json!({
@@ -163,10 +161,16 @@ pub fn types(
             "\n/** {} */\nexport const {name}_kernel: Kernel<{}, {}>;\n",
             one_line(&kernel.summary).replace("*/", "* /"),
             union(kernel.bindings.iter().map(|b| &b.name).collect()),
-            union(kernel.constants.iter().map(|c| &c.name).collect()),
+            union(overridable(kernel).map(|c| &c.name).collect()),
         );
     }
     text
+}
+
+/// The constants that the text in WGSL has: a pipeline must not be given others.
+fn overridable(kernel: &KernelEntry) -> impl Iterator<Item = &Constant> {
+    let constants = kernel.constants.iter();
+    constants.filter(|it| it.overridable_in.contains(&Language::Wgsl))
 }
 
 /// The kernels that there is WGSL of.

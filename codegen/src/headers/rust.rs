@@ -195,7 +195,7 @@ fn of_kernel(text: &mut String, name: &str, kernel: &KernelEntry, groups: &Group
             of_bindings(&|b| groups.place(b).0),
         );
     }
-    let constants = kernel.constants.iter();
+    let constants = kernel.constants.iter().filter(|it| it.is_overridable());
     let constants =
         constants.map(|c| (format!("By default {}.", c.default), c.name.as_str(), c.id));
     let title = "Specialisation constants: their ids in SPIR-V and WGSL.";

@@ -2,16 +2,13 @@
 //!
 //! Differences between neighbours, in a stage that has none: derivatives, and textures that are
 //! sampled at the level that follows from them.
-//!
-//! What rust-gpu 0.10.0 gets wrong. Rotations of 64-bit numbers: it rotates by the amount modulo 32 and takes what falls off from 32
-//! bits (EmbarkStudios/rust-gpu#1062). Constant amounts of 3 and 35 look alike afterwards.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use rspirv::dr::{Function, Instruction, Module, Operand};
 use rspirv::spirv::{ExecutionModel, Op, Word};
 
-use super::{global, id, literal, op};
+use super::{global, op};
 use crate::error::{Failure, Step};
 
 const FRAGMENT: ExecutionModel = ExecutionModel::Fragment;
@@ -22,12 +19,6 @@ const FRAGMENT: ExecutionModel = ExecutionModel::Fragment;
 ///
 /// The first thing that is wrong.
 pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
-    let made: HashMap<Word, &Instruction> = module
-        .functions
-        .iter()
-        .flat_map(|function| function.all_inst_iter())
-        .filter_map(|it| Some((it.result_id?, it)))
-        .collect();
     let fragment = module
         .entry_points
         .iter()
@@ -41,18 +32,6 @@ pub fn check(module: &Module, kernel: &str) -> Result<(), Failure> {
                         step: Step::Meaning,
                         construct: None,
                         message: format!("only a fragment has neighbours: {instead}"),
-                        panicked: false,
-                    });
-                }
-                if op(it) == Op::Select && rotates_wrongly(module, &made, it) == Some(true) {
-                    return Err(Failure {
-                        kernel: kernel.into(),
-                        step: Step::Meaning,
-                        construct: None,
-                        message: "rust-gpu rotates a 64-bit number as if it had 32 bits: write \
-                                  `(x << n) | (x >> (64 - n))` with n between 1 and 63 for \
-                                  `x.rotate_left(n)`"
-                            .into(),
                         panicked: false,
                     });
                 }
@@ -115,31 +94,6 @@ pub(super) fn of_neighbours(op: Op) -> Option<&'static str> {
         | Op::FwidthCoarse => Some("no derivative is taken elsewhere"),
         _ => None,
     }
-}
-
-/// `n == 0 ? x : (x << n | x >> m)` of 64 bits, or the other way round: rust-gpu writes nothing else
-/// so, and a person `m = 64 - n`, which is no constant of 32.
-fn rotates_wrongly(
-    module: &Module,
-    made: &HashMap<Word, &Instruction>,
-    select: &Instruction,
-) -> Option<bool> {
-    let ty = global(module, select.result_type?)?;
-    if op(ty) != Op::TypeInt || literal(ty, 0) != Some(64) {
-        return Some(false);
-    }
-    let is =
-        |word: Option<Word>, wanted: Op| made.get(&word?).copied().filter(|it| op(it) == wanted);
-    let zero = is(id(select, 0), Op::IEqual)?;
-    let both = is(id(select, 2), Op::BitwiseOr)?;
-    let (first, second) = (id(both, 0), id(both, 1));
-    let left = is(first, Op::ShiftLeftLogical).or(is(second, Op::ShiftLeftLogical))?;
-    let right = is(first, Op::ShiftRightLogical).or(is(second, Op::ShiftRightLogical))?;
-    let number = id(select, 1);
-    let same = id(left, 0) == number && id(right, 0) == number;
-    let amount = id(zero, 0);
-    let by_it = id(left, 1) == amount || id(right, 1) == amount;
-    Some(same && by_it)
 }
 
 #[cfg(test)]

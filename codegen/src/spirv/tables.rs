@@ -6,8 +6,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use rspirv::dr::{Function, Module, Operand};
-use rspirv::spirv::{Op, Word};
+use rspirv::dr::{Function, Instruction, Module, Operand};
+use rspirv::spirv::{Op, StorageClass, Word};
 
 use super::{id, op};
 
@@ -28,6 +28,38 @@ pub fn keep(module: &mut Module) -> bool {
         }
     }
     changed
+}
+
+/// Lets spirv-opt see through structures of constants that are compared by reference, as in `(x, y) != (0, 0)`: it moves a
+/// private variable into the function that uses it, but only if no chain into it is said to be in bounds. Variables
+/// that are indexed by what is not known stay tables.
+pub fn reach_constants(module: &mut Module) {
+    let is_private = |it: &&Instruction| {
+        op(it) == Op::Variable
+            && it.operands.first() == Some(&Operand::StorageClass(StorageClass::Private))
+    };
+    let globals = || module.types_global_values.iter();
+    let mut private: HashSet<Word> = globals()
+        .filter(is_private)
+        .filter_map(|it| it.result_id)
+        .collect();
+    let constants: HashSet<Word> = globals()
+        .filter(|it| op(it) == Op::Constant)
+        .filter_map(|it| it.result_id)
+        .collect();
+    let chains = || module.functions.iter().flat_map(Function::all_inst_iter);
+    for it in chains().filter(|it| op(it) == Op::InBoundsAccessChain) {
+        let indices = it.operands.iter().skip(1).filter_map(Operand::id_ref_any);
+        if !indices.into_iter().all(|index| constants.contains(&index)) {
+            private.remove(&id(it, 0).unwrap_or_default());
+        }
+    }
+    for it in module.all_inst_iter_mut() {
+        if op(it) == Op::InBoundsAccessChain && id(it, 0).is_some_and(|it| private.contains(&it)) {
+            let operands = std::mem::take(&mut it.operands);
+            *it = Instruction::new(Op::AccessChain, it.result_type, it.result_id, operands);
+        }
+    }
 }
 
 /// Variables without an initial value that are filled with one constant only, and that is all that is ever written.

@@ -363,6 +363,14 @@ impl Ir {
                 ir.info = validate(&ir.module, &ir.kernel)?;
             }
         }
+        if language == Language::Hlsl {
+            let mut module = ir.module.clone();
+            if cleanup::convert_wide_signs(&mut module, &ir.info) {
+                let ir = ir.to_mut();
+                ir.info = validate(&module, &ir.kernel)?;
+                ir.module = module;
+            }
+        }
         if matches!(language, Language::Essl310 | Language::Essl300)
             && cleanup::has_bit_counts(&ir.module)
         {

@@ -5,12 +5,13 @@
 //! | what | without it | case in `tests/upstream` |
 //! | --- | --- | --- |
 //! | a type of two whole numbers for coordinates into arrays of textures | naga 30.0.1 panics | `naga-arrayed-fetch` |
+//! | a copy of what an operation of a subgroup takes from another block | naga 30.0.1 panics | `naga-subgroup-operand` |
 //! | the remainder of signed numbers in GLSL | `%`, which GLSL leaves undefined below zero | `naga-glsl-remainder` |
 //! | exchanged bytes in HLSL | DXC 1.7 makes an intrinsic of them that Direct3D does not have | `dxc-byte-swap` |
 //!
 //! And what the reader drops without a word is looked for: [`Dropped`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use naga::Sampling;
 use rspirv::dr::{Instruction, Module, Operand};
@@ -153,6 +154,57 @@ pub fn coordinate_types(module: &mut Module) {
         header.bound += 1;
         module.types_global_values.push(new);
     }
+}
+
+/// naga reads what an operation of a subgroup takes after it has ended the list of expressions that it would add a load to:
+/// of a value from another block it needs one. A copy in the same block is such a load. It is part of the final SPIR-V, as
+/// above.
+pub fn subgroup_operands(module: &mut Module) {
+    let Some(header) = &mut module.header else {
+        return;
+    };
+    for function in &mut module.functions {
+        let made = function.all_inst_iter();
+        let types: HashMap<Word, Word> = made
+            .filter_map(|it| Some((it.result_id?, it.result_type?)))
+            .collect();
+        for block in &mut function.blocks {
+            let own: HashSet<Word> = block
+                .instructions
+                .iter()
+                .filter_map(|it| it.result_id)
+                .collect();
+            let mut instructions = Vec::with_capacity(block.instructions.len());
+            for mut it in block.instructions.drain(..) {
+                if is_of_subgroup(op(&it)) {
+                    // The scope is first.
+                    for operand in it.operands.iter_mut().skip(1) {
+                        let Operand::IdRef(value) = operand else {
+                            continue;
+                        };
+                        if let Some(ty) = types.get(value).filter(|_| !own.contains(value)) {
+                            let copied = vec![Operand::IdRef(*value)];
+                            let copy = Instruction::new(
+                                Op::CopyObject,
+                                Some(*ty),
+                                Some(header.bound),
+                                copied,
+                            );
+                            *value = header.bound;
+                            header.bound += 1;
+                            instructions.push(copy);
+                        }
+                    }
+                }
+                instructions.push(it);
+            }
+            block.instructions = instructions;
+        }
+    }
+}
+
+fn is_of_subgroup(op: Op) -> bool {
+    (Op::GroupNonUniformElect as u32..=Op::GroupNonUniformQuadSwap as u32).contains(&(op as u32))
 }
 
 /// `x % y` of signed numbers is `x - x / y * y`: quotients are truncated everywhere.

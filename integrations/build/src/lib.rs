@@ -28,12 +28,13 @@
 //! The work is done by the program `hankel`: the one that the environment variable `HANKEL` names, or
 //! else the one in `PATH`. This crate only starts it, so that a build script compiles in seconds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fmt;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 use sha2::{Digest, Sha256};
 
@@ -72,8 +73,26 @@ pub struct Build {
     manifest: Option<PathBuf>,
     committed: Option<PathBuf>,
     arguments: Vec<OsString>,
+    /// What a manifest records of the arguments that have a method here.
+    recorded: Recorded,
     bindings: Option<PathBuf>,
     program: Option<PathBuf>,
+    name: Option<String>,
+}
+
+/// Options of a build as `manifest.json` and `functions.json` have them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+struct Recorded {
+    #[serde(default)]
+    kernels: Vec<String>,
+    #[serde(default)]
+    targets: Vec<String>,
+    #[serde(default)]
+    placement: BTreeMap<String, serde_json::Value>,
+    #[serde(default)]
+    prefix: Option<String>,
+    #[serde(default)]
+    functions: Vec<String>,
 }
 
 /// Why there are no shaders.
@@ -81,6 +100,10 @@ pub struct Build {
 pub enum BuildError {
     /// A variable that cargo sets for build scripts is not there.
     NoBuildScript(&'static str),
+    /// An earlier build of this build script has the name.
+    SameName(String),
+    /// No name of a folder and a variable.
+    Name(String),
     /// The program is not there, or does not start.
     NoProgram {
         /// Its name or path.
@@ -110,6 +133,15 @@ impl fmt::Display for BuildError {
             Self::NoBuildScript(name) => write!(
                 f,
                 "{name} is not set: call hankel_build in a build script, which cargo runs"
+            ),
+            Self::SameName(name) => write!(
+                f,
+                "two builds of this build script are named `{name}`, and the second would replace what the first made: \
+                 give each a name with Build::named"
+            ),
+            Self::Name(name) => write!(
+                f,
+                "a build cannot be named `{name}`: names are of small letters, digits and `_`, and begin with a letter"
             ),
             Self::NoProgram { program, source } => write!(
                 f,
@@ -144,9 +176,19 @@ impl Build {
             manifest: None,
             committed: None,
             arguments: Vec::new(),
+            recorded: Recorded::default(),
             bindings: None,
             program: None,
+            name: None,
         }
+    }
+
+    /// A name for a build script with several builds: of the folder in `OUT_DIR`, instead of `shaders` or `functions`, and
+    /// in the variable that it is found by: `HANKEL_SKY` for `sky`. Small letters, digits and `_`.
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        self.name = Some(name.to_owned());
+        self
     }
 
     /// The libraries of functions of the crate whose Cargo.toml is at `manifest`, in every form. The
@@ -168,57 +210,67 @@ impl Build {
 
     /// Libraries: what the names of functions begin with, instead of `hankel`.
     #[must_use]
-    pub fn prefix(self, prefix: &str) -> Self {
+    pub fn prefix(mut self, prefix: &str) -> Self {
+        self.recorded.prefix = Some(prefix.to_owned());
         self.argument("--prefix").argument(prefix)
     }
 
     /// Libraries: only functions of this name, where `*` stands for any letters, and what they call. May be called
     /// again.
     #[must_use]
-    pub fn function(self, pattern: &str) -> Self {
+    pub fn function(mut self, pattern: &str) -> Self {
+        self.recorded.functions.push(pattern.to_owned());
         self.argument("--function").argument(pattern)
     }
 
     /// Only kernels of this name, where `*` stands for any letters. May be called again.
     #[must_use]
-    pub fn kernel(self, pattern: &str) -> Self {
+    pub fn kernel(mut self, pattern: &str) -> Self {
+        self.recorded.kernels.push(pattern.to_owned());
         self.argument("--kernel").argument(pattern)
     }
 
     /// Only this language, by its name on the command line: `wgsl`, `spirv`, … May be called again.
     #[must_use]
-    pub fn target(self, language: &str) -> Self {
+    pub fn target(mut self, language: &str) -> Self {
+        self.recorded.targets.push(language.to_owned());
         self.argument("--target").argument(language)
     }
 
     /// HLSL: the register space of every binding.
     #[must_use]
     pub fn hlsl_space(self, space: u8) -> Self {
-        self.argument(format!("--hlsl-space={space}"))
+        self.placed("hlsl_space", space.into())
     }
 
     /// HLSL: the first register of every class (t, u, b, s).
     #[must_use]
     pub fn register_base(self, register: u16) -> Self {
-        self.argument(format!("--register-base={register}"))
+        self.placed("register_base", register.into())
     }
 
     /// WGSL: the group of every binding.
     #[must_use]
     pub fn wgsl_group(self, group: u8) -> Self {
-        self.argument(format!("--wgsl-group={group}"))
+        self.placed("wgsl_group", group.into())
     }
 
     /// MSL: the first slot of buffers, of textures and of samplers.
     #[must_use]
     pub fn msl_slot_base(self, slot: u8) -> Self {
-        self.argument(format!("--msl-slot-base={slot}"))
+        self.placed("msl_slot_base", slot.into())
     }
 
     /// GLSL 4.50 and GLSL ES 3.10: what is added to every binding.
     #[must_use]
     pub fn glsl_binding_base(self, binding: u8) -> Self {
-        self.argument(format!("--glsl-binding-base={binding}"))
+        self.placed("glsl_binding_base", binding.into())
+    }
+
+    /// An option of placement, by its name in the manifest.
+    fn placed(mut self, option: &str, number: u16) -> Self {
+        self.recorded.placement.insert(option.into(), number.into());
+        self.argument(format!("--{}={number}", option.replace('_', "-")))
     }
 
     /// A TOML file with places of single bindings, from the including crate's folder.
@@ -236,8 +288,9 @@ impl Build {
     }
 
     /// A folder that `hankel build` wrote and that is under version control. It is used where there
-    /// is no program `hankel`: as it stands, if every file is as its manifest says, and with a
-    /// warning, since only `hankel check` can tell whether it follows from the present sources.
+    /// is no program `hankel`: as it stands, if every file is as its manifest says and it was built with the options
+    /// given here, and with a warning, since only `hankel check` can tell whether it follows from the present
+    /// sources. Those of [`Build::argument`] and [`Build::bindings`] are not compared.
     #[must_use]
     pub fn committed(mut self, folder: impl Into<PathBuf>) -> Self {
         self.committed = Some(folder.into());
@@ -261,16 +314,13 @@ impl Build {
         let variable = |name| std::env::var_os(name).ok_or(BuildError::NoBuildScript(name));
         let here = PathBuf::from(variable("CARGO_MANIFEST_DIR")?);
         let out = PathBuf::from(variable("OUT_DIR")?);
+        self.claim(&out)?;
         let (folder, lines) = self.make(&here, &out)?;
         println!("cargo::rerun-if-env-changed={PROGRAM}");
         for line in lines {
             println!("cargo::{line}");
         }
-        println!(
-            "cargo::rustc-env={}={}",
-            self.form.variable(),
-            folder.display()
-        );
+        println!("cargo::rustc-env={}={}", self.variable(), folder.display());
         Ok(folder)
     }
 
@@ -284,6 +334,41 @@ impl Build {
         }
     }
 
+    /// The name of the folder.
+    fn folder(&self) -> &str {
+        let default = match self.form {
+            Form::Kernels => "shaders",
+            Form::Functions => "functions",
+        };
+        self.name.as_deref().unwrap_or(default)
+    }
+
+    /// What the including crate finds the folder by.
+    fn variable(&self) -> String {
+        match &self.name {
+            Some(name) => format!("HANKEL_{}", name.to_uppercase()),
+            None => self.form.variable().to_owned(),
+        }
+    }
+
+    /// Refuses a name that another build of this build script has, or that cannot be one.
+    fn claim(&self, out: &Path) -> Result<(), BuildError> {
+        static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+        let name = self.folder();
+        let is_name = name.starts_with(|it: char| it.is_ascii_lowercase())
+            && name
+                .chars()
+                .all(|it| it.is_ascii_lowercase() || it.is_ascii_digit() || it == '_');
+        if !is_name || name == "target" {
+            return Err(BuildError::Name(name.to_owned()));
+        }
+        let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
+        match claimed.insert(out.join(name)) {
+            true => Ok(()),
+            false => Err(BuildError::SameName(name.to_owned())),
+        }
+    }
+
     /// The folder of the shaders, and what cargo is told.
     fn make(&self, here: &Path, out: &Path) -> Result<(PathBuf, Vec<String>), BuildError> {
         let named = self
@@ -291,10 +376,7 @@ impl Build {
             .clone()
             .or_else(|| std::env::var_os(PROGRAM).map(Into::into));
         let program = named.clone().unwrap_or_else(|| "hankel".into());
-        let name = match self.form {
-            Form::Kernels => "shaders",
-            Form::Functions => "functions",
-        };
+        let name = self.folder();
         let folder = out.join(name);
         let dependencies = out.join(format!("{name}.d"));
         let environment = out.join(format!("{name}.env"));
@@ -331,7 +413,9 @@ impl Build {
             Err(source) => {
                 let missing = named.is_none() && source.kind() == io::ErrorKind::NotFound;
                 return match &self.committed {
-                    Some(folder) if missing => as_committed(&here.join(folder), self.form),
+                    Some(folder) if missing => {
+                        as_committed(&here.join(folder), self.form, &self.recorded)
+                    }
                     _ => Err(BuildError::NoProgram { program, source }),
                 };
             }
@@ -431,11 +515,78 @@ fn prerequisites(text: &str) -> impl Iterator<Item = String> {
     paths.into_iter().filter(|path| !path.is_empty())
 }
 
+/// The folder that `cargo install` puts programs into, if it is there.
+fn cargo_programs() -> Option<PathBuf> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")))?;
+    Some(home.join("bin")).filter(|folder| folder.is_dir())
+}
+
+/// The first option that is not as it should be.
+fn difference(wanted: &Recorded, recorded: &Recorded) -> Option<String> {
+    let lists = [
+        ("kernels", &wanted.kernels, &recorded.kernels),
+        ("targets", &wanted.targets, &recorded.targets),
+        ("functions", &wanted.functions, &recorded.functions),
+    ];
+    for (what, wanted, recorded) in lists {
+        if wanted != recorded {
+            let all = |list: &[String]| match list {
+                [] => "all".to_owned(),
+                some => some.join(", "),
+            };
+            return Some(format!(
+                "{what} are {} there, and {} here",
+                all(recorded),
+                all(wanted)
+            ));
+        }
+    }
+    let names = wanted.placement.keys().chain(recorded.placement.keys());
+    for name in names.filter(|name| *name != "bindings") {
+        let [wanted, recorded] = [wanted, recorded].map(|of| of.placement.get(name));
+        if wanted != recorded {
+            let number =
+                |it: Option<&serde_json::Value>| it.map_or("not set".into(), ToString::to_string);
+            return Some(format!(
+                "{name} is {} there, and {} here",
+                number(recorded),
+                number(wanted)
+            ));
+        }
+    }
+    let prefix = |of: &Recorded| of.prefix.clone().filter(|it| it != "hankel");
+    (prefix(wanted) != prefix(recorded)).then(|| {
+        let word = |of| prefix(of).unwrap_or_else(|| "hankel".into());
+        format!(
+            "the prefix is {} there, and {} here",
+            word(recorded),
+            word(wanted)
+        )
+    })
+}
+
 /// A committed folder, if nothing in it was changed or lost.
-fn as_committed(folder: &Path, form: Form) -> Result<(PathBuf, Vec<String>), BuildError> {
+fn as_committed(
+    folder: &Path,
+    form: Form,
+    wanted: &Recorded,
+) -> Result<(PathBuf, Vec<String>), BuildError> {
     #[derive(serde::Deserialize)]
     struct Record {
         files: BTreeMap<String, File>,
+        /// Of shaders; those of libraries stand beside.
+        #[serde(default)]
+        options: Option<Recorded>,
+        #[serde(flatten)]
+        of_libraries: OfLibraries,
+    }
+    #[derive(serde::Deserialize)]
+    struct OfLibraries {
+        #[serde(default)]
+        prefix: Option<String>,
+        #[serde(default)]
+        functions: Vec<String>,
     }
     /// Of shaders, and of libraries.
     #[derive(serde::Deserialize)]
@@ -447,7 +598,26 @@ fn as_committed(folder: &Path, form: Form) -> Result<(PathBuf, Vec<String>), Bui
     let path = folder.join(form.record());
     let text = std::fs::read(&path).map_err(|e| at(&path, e))?;
     let record: Record = serde_json::from_slice(&text).map_err(|e| at(&path, e))?;
-    let mut lines = vec![format!("rerun-if-changed={}", path.display())];
+    let recorded = record.options.unwrap_or_else(|| Recorded {
+        prefix: record.of_libraries.prefix,
+        functions: record.of_libraries.functions,
+        ..Recorded::default()
+    });
+    if let Some(difference) = difference(wanted, &recorded) {
+        return Err(at(
+            &path,
+            format!(
+                "it was built with other options than those of the build script: {difference}; build the folder anew \
+                 with hankel"
+            ),
+        ));
+    }
+    let mut lines = vec![
+        format!("rerun-if-changed={}", path.display()),
+        // Where the program may come to be.
+        "rerun-if-env-changed=PATH".to_owned(),
+    ];
+    lines.extend(cargo_programs().map(|folder| format!("rerun-if-changed={}", folder.display())));
     for (name, file) in &record.files {
         let (File::Entry { sha256 } | File::Hash(sha256)) = file;
         let inside = Path::new(name)
@@ -608,12 +778,13 @@ mod tests {
             .iter()
             .map(|b| format!("{b:02x}"))
             .collect();
+        let any = Recorded::default();
         write("a.wgsl", "text");
         write(
             "manifest.json",
             &format!("{{\"files\":{{\"a.wgsl\":{{\"sha256\":\"{hash}\"}}}}}}"),
         );
-        let (_, lines) = as_committed(folder.path(), Form::Kernels).expect("it is whole");
+        let (_, lines) = as_committed(folder.path(), Form::Kernels, &any).expect("it is whole");
         assert!(
             lines
                 .iter()
@@ -628,19 +799,77 @@ mod tests {
         // The record of libraries has bare hashes.
         let record = format!("{{\"files\":{{\"a.wgsl\":\"{hash}\"}}}}");
         write("functions.json", &record);
-        as_committed(folder.path(), Form::Functions).expect("it is whole");
+        as_committed(folder.path(), Form::Functions, &any).expect("it is whole");
 
         write("a.wgsl", "other");
-        as_committed(folder.path(), Form::Functions).unwrap_err();
-        let error = as_committed(folder.path(), Form::Kernels)
+        as_committed(folder.path(), Form::Functions, &any).unwrap_err();
+        let error = as_committed(folder.path(), Form::Kernels, &any)
             .unwrap_err()
             .to_string();
         assert!(error.contains("a.wgsl"), "{error}");
         let outside = "{\"files\":{\"../b\":{\"sha256\":\"\"}}}";
         write("manifest.json", outside);
-        let error = as_committed(folder.path(), Form::Kernels)
+        let error = as_committed(folder.path(), Form::Kernels, &any)
             .unwrap_err()
             .to_string();
         assert!(error.contains("../b"), "{error}");
+    }
+
+    /// As `hankel build --kernel vsm --target wgsl --wgsl-group 2` and `--form functions --prefix own` record them.
+    #[test]
+    fn committed_shaders_have_the_options_of_the_build() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).expect("the folder can be written");
+        };
+        write(
+            "manifest.json",
+            r#"{"files": {}, "options": {"kernels": ["vsm"], "targets": ["wgsl"], "bounds_checks": "unchecked",
+                "placement": {"wgsl_group": 2}}}"#,
+        );
+        write(
+            "functions.json",
+            r#"{"files": {}, "hankel": "0.1.0", "prefix": "own", "functions": ["mix_*"], "libraries": {}}"#,
+        );
+        let of = |build: &Build| as_committed(folder.path(), build.form, &build.recorded);
+        let same = || Build::built_in().kernel("vsm").target("wgsl").wgsl_group(2);
+        of(&same()).expect("the options are the same");
+        let same_library = || Build::built_in_functions().function("mix_*");
+        of(&same_library().prefix("own")).expect("the options are the same");
+        for (other, said) in [
+            (same().wgsl_group(0), "wgsl_group is 2 there, and 0 here"),
+            (
+                same().hlsl_space(1),
+                "hlsl_space is not set there, and 1 here",
+            ),
+            (
+                same().kernel("blur"),
+                "kernels are vsm there, and vsm, blur here",
+            ),
+            (
+                Build::built_in().kernel("vsm"),
+                "targets are wgsl there, and all here",
+            ),
+            (same_library(), "the prefix is own there, and hankel here"),
+        ] {
+            let error = of(&other).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+    }
+
+    #[test]
+    fn each_build_of_a_script_has_its_own_name() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let claim = |build: Build| build.claim(folder.path()).map_err(|e| e.to_string());
+        assert_eq!(claim(Build::built_in()), Ok(()));
+        assert_eq!(claim(Build::built_in_functions()), Ok(()));
+        let error = claim(Build::built_in()).unwrap_err();
+        assert!(error.contains("Build::named"), "{error}");
+        let sky = || Build::of("sky/Cargo.toml").named("sky");
+        assert_eq!(sky().variable(), "HANKEL_SKY");
+        assert_eq!(claim(sky()), Ok(()));
+        for name in ["", "Sky", "../sky", "target", "sky shaders"] {
+            assert!(claim(Build::built_in().named(name)).is_err(), "{name}");
+        }
     }
 }

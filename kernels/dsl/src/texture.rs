@@ -1,5 +1,5 @@
 //! Textures and samplers as a kernel sees them. On both sides a value of a few words that is
-//! passed by copy; coordinates beyond the edge read the nearest texel with `load`.
+//! passed by copy.
 //!
 //! Every texture of a kind is declared once, in [`textures`]; what its methods compute is declared
 //! once for each side: `spirv` and `host`.
@@ -488,7 +488,7 @@ mod host {
         TextureCubeArray, UVec2, UVec3, Vec2, Vec3, Vec4,
     };
     use crate::native::sampling::{self, Place};
-    use crate::native::{TextureRef, fragment, level_size};
+    use crate::native::{TextureRef, fragment, level_size, sanitize};
     use core::panic::Location;
 
     const fn flat(uv: Vec2, layer: u32) -> Place {
@@ -568,16 +568,19 @@ mod host {
         ($(($($of:tt)*) $name:ty: $value:ty, ($($arg:ident: $ty:ty),*), $at:expr, $layer:expr, $take:expr;)*) => { $(
             impl $($of)* $name {
                 /// The texel at `at`, which must lie inside. (Natively the nearest one is read
-                /// otherwise; on a GPU it is the bounds-check policy's choice.)
+                /// otherwise, and the sanitizer says so; on a GPU it is the bounds-check policy's choice.)
                 #[inline]
                 #[must_use]
+                #[track_caller]
                 pub fn load(self, $($arg: $ty),*) -> $value {
                     self.load_level($($arg,)* 0)
                 }
                 /// The same of a level, which must exist.
                 #[inline]
                 #[must_use]
+                #[track_caller]
                 pub fn load_level(self, $($arg: $ty,)* level: u32) -> $value {
+                    sanitize::look_for_texel(&self.0, $at, $layer, level, 0, Location::caller());
                     $take(&self.0, $at, $layer, level)
                 }
             }
@@ -749,7 +752,9 @@ mod host {
         /// The texel at `at`, which must lie inside; see [`Texture2d::load`].
         #[inline]
         #[must_use]
+        #[track_caller]
         pub fn load(self, at: u32) -> Vec4 {
+            sanitize::look_for_texel(&self.0, [at, 0, 0], 0, 0, 0, Location::caller());
             sampling::load(&self.0, [at, 0, 0], 0, 0, 0)
         }
         /// A filtered value; see [`Texture2d::sample`]. In fragment kernels only: not every language
@@ -784,7 +789,9 @@ mod host {
         /// One sample of the texel at `at`; both must exist.
         #[inline]
         #[must_use]
+        #[track_caller]
         pub fn load(self, at: UVec2, sample: u32) -> Vec4 {
+            sanitize::look_for_texel(&self.0, [at.x, at.y, 0], 0, 0, sample, Location::caller());
             sampling::load(&self.0, [at.x, at.y, 0], 0, 0, sample)
         }
     }

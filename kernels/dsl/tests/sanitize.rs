@@ -4,10 +4,12 @@
 use hankel_dsl::access::ReadWrite;
 use hankel_dsl::format::R32Uint;
 use hankel_dsl::glam::UVec2;
+use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::sanitize::Order;
-use hankel_dsl::native::{Arg, Call, CallError, Mode, TextureMut};
+use hankel_dsl::native::{Arg, Call, CallError, Mode, TextureMut, TextureRef};
 use hankel_dsl::{
-    Atomics, Shared, SharedAtomics, StorageMut, StorageTexture2d, barrier, kernel, storage_barrier,
+    Atomics, Shared, SharedAtomics, StorageMut, StorageTexture2d, Texture2dArray, barrier, kernel,
+    storage_barrier,
 };
 
 /// Reads what its neighbour writes.
@@ -127,7 +129,22 @@ fn beyond(#[index] i: u32, #[storage] all: StorageMut<'_, u32>) {
     all.set(i * 3, i);
 }
 
+/// Reads a texel of a layer and a level, of which the last may not be there.
+#[kernel(compute, threads(8), range(8))]
+fn sample(
+    #[index] i: u32,
+    #[constant(id = 0, default = 0)] layer: u32,
+    #[constant(id = 1, default = 0)] level: u32,
+    #[texture] layers: Texture2dArray<'_>,
+) -> f32 {
+    let width = layers.level_size(level).x;
+    layers
+        .load_level(UVec2::new(i % 4, width - 1), layer, level)
+        .x
+}
+
 hankel_dsl::kernels![
+    sample,
     neighbour,
     both,
     counted,
@@ -263,7 +280,7 @@ fn a_texel_has_one_writer() {
     let result = (entry.unwrap().run)(&mut Call {
         args: vec![Arg::TextureMut(TextureMut {
             size: [4, 2, 1],
-            format: hankel_dsl::native::describe::TexelFormat::R32Uint,
+            format: TexelFormat::R32Uint,
             bytes: bytemuck::cast_slice_mut(&mut bytes),
         })],
         constants: vec![],
@@ -282,7 +299,7 @@ fn no_barrier_orders_texels() {
     let result = (entry.unwrap().run)(&mut Call {
         args: vec![Arg::TextureMut(TextureMut {
             size: [8, 1, 1],
-            format: hankel_dsl::native::describe::TexelFormat::R32Uint,
+            format: TexelFormat::R32Uint,
             bytes: bytemuck::cast_slice_mut(&mut bytes),
         })],
         constants: vec![],
@@ -303,6 +320,48 @@ fn what_is_out_of_range_is_named_with_its_line() {
     let place = format!("sanitize.rs:{}:", line("all.set(i * 3, i);"));
     assert!(message.contains("index 9 is out of range"), "{message}");
     assert!(message.contains(&place), "{message}");
+}
+
+#[test]
+fn texels_levels_and_layers_that_are_not_there_are_named() {
+    let read = |[layer, level]: [u32; 2], mode| {
+        let entry = entries().into_iter().find(|e| e.kernel.name == "sample");
+        // Four by four texels, and two by two.
+        let texels = vec![0_u8; 4 * (16 + 4) * 2];
+        let mut out = [0.0_f32; 8];
+        (entry.unwrap().run)(&mut Call {
+            args: vec![
+                Arg::Texture(TextureRef {
+                    size: [4, 4, 1],
+                    levels: 2,
+                    layers: 2,
+                    samples: 1,
+                    format: TexelFormat::R32Float,
+                    bytes: &texels,
+                }),
+                Arg::BytesMut(bytemuck::cast_slice_mut(&mut out)),
+            ],
+            constants: vec![layer, level],
+            mode,
+        })
+        .map_err(|e| e.to_string())
+    };
+    let sanitized = Mode::sanitized(Order::Ascending);
+    read([1, 0], sanitized).unwrap();
+    let place = format!(
+        "sanitize.rs:{}:",
+        line(".load_level(UVec2::new(i % 4, width - 1), layer, level)")
+    );
+    for (wrong, reader) in [([2, 0], 0), ([0, 2], 0), ([0, 1], 2)] {
+        let message = read(wrong, sanitized).unwrap_err();
+        assert!(
+            message.contains(&format!("invocation ({reader}, 0, 0) reads texel")),
+            "{message}"
+        );
+        assert!(message.contains(&place), "{message}");
+        // Otherwise the nearest one is read.
+        read(wrong, Mode::REFERENCE).unwrap();
+    }
 }
 
 #[test]

@@ -118,8 +118,8 @@ impl Shape {
 pub(super) struct Texture {
     raw: glow::Texture,
     target: u32,
-    texel: Texel,
-    size: [u32; 3],
+    pub(super) texel: Texel,
+    pub(super) size: [u32; 3],
 }
 
 impl Texture {

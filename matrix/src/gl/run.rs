@@ -263,7 +263,7 @@ impl<'a> Run<'a> {
         for (slot, it) in self.job.slots.iter().zip(written) {
             match it {
                 Some(Written::Buffer(it)) => results.extend(self.context.read_buffer(it)?),
-                Some(Written::Texture(it)) => results.extend(self.context.read_texture(it)?),
+                Some(Written::Texture(it)) => results.extend(self.texels(it)?),
                 Some(Written::Bytes(it)) => results.extend(it),
                 None if slot.role.is_written() => {
                     return Err(format!("{}: nothing wrote it", slot.name));
@@ -550,7 +550,7 @@ impl<'a> Run<'a> {
             self.context.draw(glow::POINTS, count, &attributes)?;
         }
         if let Some(slot) = depth {
-            let pixels = self.depths(attached, [width, height])?;
+            let pixels = self.floats(attached, [width, height])?;
             let values = pixels.chunks_exact(16).take(count as usize);
             let values = values.flat_map(|it| &it[..4]).copied().collect();
             written[slot] = Some(Written::Bytes(values));
@@ -568,9 +568,24 @@ impl<'a> Run<'a> {
 }
 
 impl Run<'_> {
-    /// What a depth buffer holds, as the first of four floats each: OpenGL ES does not read it as it
-    /// is.
-    fn depths(&mut self, depth: Texture, size: [u32; 2]) -> Result<Vec<u8>, String> {
+    /// The texels of a texture as they lie in memory.
+    fn texels(&mut self, texture: Texture) -> Result<Vec<u8>, String> {
+        if !texture.texel.is_spread() {
+            return self.context.read_texture(texture);
+        }
+        let [width, height, 1] = texture.size else {
+            return Err("signed shares are read from flat textures only".into());
+        };
+        let pixels = self.floats(texture, [width, height])?;
+        let mut bytes = Vec::new();
+        for pixel in pixels.chunks_exact(16) {
+            texture.texel.pack(pixel, &mut bytes);
+        }
+        Ok(bytes)
+    }
+
+    /// What a texture holds that OpenGL ES does not read as it is, as four floats for each texel; depths are the first of them.
+    fn floats(&mut self, texture: Texture, size: [u32; 2]) -> Result<Vec<u8>, String> {
         let texel = Texel::named("rgba32float")?;
         let into = self
             .context
@@ -583,7 +598,7 @@ impl Run<'_> {
         self.context.use_program(program);
         self.context.set_number(program, "u_samples", 0)?;
         self.context.set_number(program, "u_count", 1)?;
-        self.context.bind_texture(0, depth);
+        self.context.bind_texture(0, texture);
         self.context.draw_into(&[(0, into)], None, size)?;
         self.context.draw(glow::TRIANGLES, 3, &[])?;
         self.context.read_texture(into)

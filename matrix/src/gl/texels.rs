@@ -35,6 +35,7 @@ pub(super) fn in_text(name: &str) -> Result<&'static str, String> {
         "rgba32float" => "rgba32f",
         "rgba16float" => "rgba16f",
         "rgba8unorm" => "rgba8",
+        "rgba8snorm" => "rgba8_snorm",
         "r32uint" => "r32ui",
         "rgba32uint" => "rgba32ui",
         "r32sint" => "r32i",
@@ -76,6 +77,7 @@ impl Texel {
             "r8unorm" => (glow::R8, glow::UNSIGNED_BYTE),
             "rg8unorm" => (glow::RG8, glow::UNSIGNED_BYTE),
             "rgba8unorm" => (glow::RGBA8, glow::UNSIGNED_BYTE),
+            "rgba8snorm" => (glow::RGBA8_SNORM, glow::BYTE),
             "r32uint" => (glow::R32UI, glow::UNSIGNED_INT),
             "r32sint" => (glow::R32I, glow::INT),
             "rg32uint" => (glow::RG32UI, glow::UNSIGNED_INT),
@@ -110,6 +112,8 @@ impl Texel {
         };
         let bytes = channels * channel_bytes;
         let (read_format, read_component, read_channel_bytes) = match component {
+            // Signed shares cannot be drawn into, and so not be read: they are spread into floats.
+            _ if name.ends_with("snorm") => (glow::RGBA, glow::FLOAT, 4),
             // Integers are read as integers of 32 bits, of either sign.
             glow::INT | glow::SHORT | glow::BYTE => (glow::RGBA_INTEGER, glow::INT, 4),
             _ if is_integer => (glow::RGBA_INTEGER, glow::UNSIGNED_INT, 4),
@@ -129,6 +133,11 @@ impl Texel {
         })
     }
 
+    /// Whether texels are read by way of floats that they are drawn into.
+    pub(super) fn is_spread(&self) -> bool {
+        self.component == glow::BYTE && self.read_component == glow::FLOAT
+    }
+
     /// Appends a pixel as it was read, of which all channels are there, as the format has it in memory.
     pub(super) fn pack(&self, pixel: &[u8], to: &mut Vec<u8>) {
         let own = self.bytes / self.channels;
@@ -136,9 +145,12 @@ impl Texel {
             .chunks_exact(self.read_channel_bytes)
             .take(self.channels)
         {
+            let float = || f32::from_le_bytes([channel[0], channel[1], channel[2], channel[3]]);
             if self.component == glow::HALF_FLOAT {
-                let float = f32::from_le_bytes([channel[0], channel[1], channel[2], channel[3]]);
-                to.extend(half(float).to_le_bytes());
+                to.extend(half(float()).to_le_bytes());
+            } else if self.is_spread() {
+                let step = (float() * 127.0).round() as i8;
+                to.extend(step.to_le_bytes());
             } else {
                 // The lower bytes of an integer.
                 to.extend(&channel[..own]);

@@ -242,7 +242,10 @@ fn judge(
         line: None,
         seconds: took.as_secs_f64(),
     };
-    let text = code.map(|code| String::from_utf8_lossy(&code.bytes));
+    // SPIR-V has no lines.
+    let text = code
+        .and_then(|code| str::from_utf8(&code.bytes).ok())
+        .filter(|text| !text.contains('\0'));
     let numbers = Numbers::of(kernel);
     let intervals = match column.language() {
         // This processor's lanes round as its scalar code does.
@@ -268,9 +271,7 @@ fn judge(
     match (results, expected) {
         (Err(Failure::Lacks { what }), _) => cell.outcome = Outcome::Lacking { what },
         (Err(failure), _) => {
-            cell.line = text
-                .as_deref()
-                .and_then(|text| locate::of_message(text, &failure.to_string()));
+            cell.line = text.and_then(|text| locate::of_message(text, &failure.to_string()));
             cell.outcome = Outcome::Foreign { failure };
         }
         (Ok(results), Ok((references, intervals))) => {
@@ -282,12 +283,11 @@ fn judge(
                 .unwrap_or_default();
             if found.beyond > 0 {
                 cell.outcome = Outcome::Differs;
-                cell.line =
-                    text.as_deref()
-                        .zip(found.first.as_ref())
-                        .and_then(|(text, difference)| {
-                            locate::of_output(text, kernel, code?, &difference.value)
-                        });
+                cell.line = text
+                    .zip(found.first.as_ref())
+                    .and_then(|(text, difference)| {
+                        locate::of_output(text, kernel, code?, &difference.value)
+                    });
             }
             cell.found = Some(found);
         }

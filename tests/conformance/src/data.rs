@@ -1,7 +1,7 @@
 //! What memory can hold beside numbers of 32 bits and vectors of them: truth values, 64-bit integers,
 //! vectors of three without padding, numbers of 16 bits, matrices.
 
-use hankel_dsl::glam::{Mat4, UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::glam::{Mat4, UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{Bool, Buffer, Element, F16, F16x2, PackedVec3, kernel};
 
 /// What to do with a number.
@@ -40,14 +40,15 @@ pub fn switched(#[uniform] switches: &Switches, #[element] vote: Vote) -> Vote {
     }
 }
 
-/// The next state of a random number generator (Knuth, MMIX), turned.
+/// The next state of a random number generator (Knuth, MMIX), shifted and turned.
 #[kernel(compute, threads(64))]
 pub fn wide(#[element] state: u64, #[element] by: u32) -> u64 {
     let next = state
         .wrapping_mul(6_364_136_223_846_793_005)
         .wrapping_add(1_442_695_040_888_963_407);
+    let turned = state.rotate_left(by) ^ next.rotate_right(35);
     let by = by & 63;
-    (next >> by) ^ (next / (state | 1))
+    (next >> by) ^ (next / (state | 1)) ^ turned
 }
 
 /// A sum, and its distance from zero.
@@ -64,6 +65,19 @@ pub fn extended(#[element] a: i32, #[element] b: u32) -> (u64, i64) {
     let signed = a as u64 ^ (b as i16 as u64) << 3;
     let unsigned = b as i64 ^ (a as u8 as i64) << 3;
     (signed, unsigned)
+}
+
+/// 64-bit numbers that are read with the other sign: shifted by a constant and by a number, compared, shifted back.
+#[kernel(compute, threads(64))]
+pub fn signs(#[element] x: UVec2) -> UVec4 {
+    let wide = (x.x as u64) << 32 | x.y as u64;
+    let signed = wide as i64;
+    UVec4::new(
+        (signed >> 40) as u32,
+        (signed >> (x.y & 63)) as u32,
+        u32::from(signed < 5),
+        (signed.wrapping_mul(3) as u64 >> 40) as u32,
+    )
 }
 
 /// Points that are turned a quarter round the third axis.

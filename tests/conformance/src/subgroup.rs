@@ -96,6 +96,32 @@ pub fn votes(#[subgroup_invocation_id] lane: u32, #[element] x: Option<u32>) -> 
     )
 }
 
+/// What each invocation sums up in a loop, summed over the subgroup, and said by the first one: all of it from another
+/// block than that of the operation.
+#[kernel(compute, threads(64), depends(subgroup_size))]
+pub fn after_loops(#[subgroup_invocation_id] lane: u32, #[element] x: Option<u32>) -> UVec4 {
+    let x = x.unwrap_or(1);
+    let mut sum = 0_u32;
+    let mut i = 0;
+    while i < (x & 3) + 1 {
+        sum = sum.wrapping_mul(3).wrapping_add(x >> i);
+        i += 1;
+    }
+    let all = subgroup_add(sum);
+    let mut from = lane;
+    while from > 5 {
+        from /= 2;
+    }
+    let shuffled = subgroup_shuffle(sum, from);
+    let mut is_odd = false;
+    while i > 0 {
+        is_odd ^= x >> i & 1 == 1;
+        i -= 1;
+    }
+    let which = subgroup_ballot(is_odd);
+    UVec4::new(all, shuffled, which.x, which.y)
+}
+
 /// Values of other invocations of the subgroup; of the neighbours where there are some.
 #[kernel(compute, threads(64), depends(subgroup_size))]
 pub fn exchanged(

@@ -22,6 +22,21 @@ pub fn linked(#[element] x: UVec4, #[element] y: UVec4) -> u32 {
         .fold(sum, |sum, number| sum.rotate_left(3) ^ number)
 }
 
+/// The neighbours of a cell, which are told by a pair that is compared with a constant one.
+#[kernel(compute, threads(64))]
+pub fn neighbours(#[element] x: UVec4) -> i32 {
+    let (at, other) = ((x.x & 0xffff) as i32, (x.y & 0xffff) as i32);
+    let mut sum = 0_i32;
+    for dy in -1..=1 {
+        for dx in -1..=1 {
+            if (dx, dy) != (0, 0) {
+                sum = sum.wrapping_add((at ^ dx).wrapping_mul(other ^ dy));
+            }
+        }
+    }
+    sum
+}
+
 /// Numbers in order, in descending order of their low bytes, and turned.
 #[kernel(compute, threads(64))]
 pub fn sorted(#[element] x: UVec4) -> UVec4 {

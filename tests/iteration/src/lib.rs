@@ -44,6 +44,7 @@ hankel_dsl::kernels![
     rewritten,
     attempts,
     linked,
+    neighbours,
     sorted,
     in_order,
     placed,

@@ -156,6 +156,27 @@ fn naga_panics_at_a_fetch_from_an_array_of_textures() {
 }
 
 #[test]
+fn naga_panics_at_an_operation_of_a_subgroup_on_a_value_from_a_loop() {
+    let spirv = assembled("naga-subgroup-operand");
+    let read = std::panic::catch_unwind(|| {
+        naga::front::spv::parse_u8_slice(&spirv, &naga::front::spv::Options::default()).is_ok()
+    });
+    assert!(
+        read.is_err(),
+        "mended: drop the workaround in codegen/src/translate/reading.rs, `subgroup_operands`"
+    );
+}
+
+#[test]
+fn naga_drops_the_sign_of_long_integers_in_hlsl() {
+    let hlsl = to_hlsl(&wgsl("naga-hlsl-wide-sign"));
+    assert!(
+        hlsl.contains(" >> ") && !hlsl.contains("int64_t("),
+        "mended: drop the workaround in codegen/src/translate/cleanup/bits.rs, `convert_wide_signs`\n{hlsl}"
+    );
+}
+
+#[test]
 fn naga_compares_at_level_0() {
     let wgsl = to_wgsl(&read_by_naga("naga-compare-level"));
     assert!(

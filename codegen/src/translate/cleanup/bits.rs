@@ -2,9 +2,14 @@
 //! are `lowp` (GLSL ES 3.10, section 8.8): computed with further, they overflow after 8 bits on
 //! devices that take the word at its value. A variable is `highp`, as the text says at its top.
 
-use naga::{Expression, Handle, MathFunction, Module, Statement};
+//!
+//! And 64-bit integers that are read with or without a sign are converted in HLSL: naga writes nothing there
+//! (`tests/upstream/naga-hlsl-wide-sign`), so that shifts and comparisons were those of the other sign.
 
-use super::walk::{each_statement, functions, functions_mut};
+use naga::valid::ModuleInfo;
+use naga::{Expression, Handle, MathFunction, Module, ScalarKind, Statement};
+
+use super::walk::{each_statement, functions, functions_mut, with_types};
 
 fn counts(expression: &Expression) -> bool {
     matches!(
@@ -63,4 +68,32 @@ pub fn name_bit_counts(module: &mut Module) {
             name.or_insert_with(|| "bits".into());
         }
     }
+}
+
+/// Whether a type is one of 64-bit integers.
+fn is_wide_integer(inner: &naga::TypeInner) -> bool {
+    inner
+        .scalar()
+        .is_some_and(|it| it.width == 8 && matches!(it.kind, ScalarKind::Sint | ScalarKind::Uint))
+}
+
+/// Makes conversions of 64-bit integers that are read with or without a sign. Says whether there were any.
+pub fn convert_wide_signs(module: &mut Module, info: &ModuleInfo) -> bool {
+    let types = &module.types;
+    let mut changed = false;
+    for (info, function) in with_types(&mut module.functions, &mut module.entry_points, info) {
+        for (_, expression) in function.expressions.iter_mut() {
+            if let Expression::As {
+                expr,
+                kind: ScalarKind::Sint | ScalarKind::Uint,
+                convert: convert @ None,
+            } = expression
+                && is_wide_integer(info[*expr].ty.inner_with(types))
+            {
+                *convert = Some(8);
+                changed = true;
+            }
+        }
+    }
+    changed
 }

@@ -34,7 +34,7 @@ mod shapes;
 mod values;
 mod walk;
 
-pub use bits::{has_bit_counts, has_functions_of_bits, name_bit_counts};
+pub use bits::{convert_wide_signs, has_bit_counts, has_functions_of_bits, name_bit_counts};
 pub use blocks::unwrap_blocks;
 pub use entry_point::fold_entry_point;
 pub use locals::{drop_dead_locals, drop_unused_locals};

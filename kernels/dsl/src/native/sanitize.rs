@@ -29,7 +29,7 @@ use std::{format, panic, thread_local};
 use glam::UVec3;
 use serde::{Deserialize, Serialize};
 
-use super::call::Mode;
+use super::call::{Mode, TextureRef, level_size};
 
 /// In which order invocations run; those of a workgroup between two barriers, and workgroups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -355,6 +355,52 @@ pub(crate) fn look<T>(
     if SESSIONS.load(Relaxed) != 0 {
         looked(space, access, words.as_ptr_range(), place);
     }
+}
+
+/// Looks whether a texel is there that is read without a sampler.
+#[inline(always)]
+pub(crate) fn look_for_texel(
+    texture: &TextureRef<'_>,
+    at: [u32; 3],
+    layer: u32,
+    level: u32,
+    sample: u32,
+    place: &'static Location<'static>,
+) {
+    if SESSIONS.load(Relaxed) != 0 {
+        looked_for_texel(texture, at, layer, level, sample, place);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn looked_for_texel(
+    texture: &TextureRef<'_>,
+    at: [u32; 3],
+    layer: u32,
+    level: u32,
+    sample: u32,
+    place: &'static Location<'static>,
+) {
+    let size = level_size(texture.size, level.min(texture.levels - 1));
+    let is_there = level < texture.levels
+        && layer < texture.layers
+        && sample < texture.samples
+        && (0..3).all(|d| at[d] < size[d]);
+    let Some(reader) = SESSION
+        .with_borrow(|session| Some(session.as_ref()?.at))
+        .filter(|_| !is_there)
+    else {
+        return;
+    };
+    let [width, height, depth] = size;
+    refuse(format!(
+        "{} reads texel {at:?} of layer {layer}, level {level}, sample {sample}, at {place}: the texture has {} layers, {} levels and {} samples, and {width} x {height} x {depth} texels there; what is read beyond differs from device to device",
+        invocation(reader),
+        texture.layers,
+        texture.levels,
+        texture.samples,
+    ));
 }
 
 #[cold]
