@@ -28,9 +28,13 @@ fn escaped(path: &Path) -> Result<String> {
     for letter in path.to_string_lossy().chars() {
         match letter {
             _ if letter.is_control() || UNMARKED.contains(letter) => {
+                let what = match letter {
+                    '\n' | '\r' => "a line break".to_owned(),
+                    other => format!("the letter {other:?}"),
+                };
                 return Err(Failure::input(
                     format!(
-                        "--depfile: {path:?} has the letter {letter:?}, which rules of Make and Ninja do not have in names"
+                        "--depfile: {path:?} has {what}, which rules of Make and Ninja do not have in names"
                     ),
                     "Give the folder or file another name, or leave out --depfile.",
                 ));

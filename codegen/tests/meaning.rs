@@ -209,26 +209,6 @@ fn functions_of_libm_are_what_rust_calls_so() {
     );
 }
 
-#[test]
-fn a_rotation_of_64_bits_is_refused() {
-    let body = "%w = OpBitcast %uint %x\n%l = OpUConvert %ulong %w\n%up = OpShiftLeftLogical %ulong %l %three\n\
-                %down = OpShiftRightLogical %ulong %l %by29\n%or = OpBitwiseOr %ulong %up %down\n\
-                %no = OpIEqual %bool %three %zero\n%s = OpSelect %ulong %no %l %or\n%n = OpUConvert %uint %s\n\
-                %r = OpBitcast %float %n";
-    let wrong = finish(&support::assemble(&listed(&computing(body))), &compute()).unwrap_err();
-    assert_eq!(wrong.step, Step::Meaning);
-    assert!(wrong.to_string().contains("64 - n"), "{wrong}");
-    // By hand, without a choice.
-    let plain = body
-        .replace("%no = OpIEqual %bool %three %zero\n", "")
-        .replace(
-            "%s = OpSelect %ulong %no %l %or",
-            "%s = OpCopyObject %ulong %or",
-        );
-    finish(&support::assemble(&listed(&computing(&plain))), &compute())
-        .unwrap_or_else(|e| panic!("{e}"));
-}
-
 /// A barrier in a branch that depends on `BUILT_IN`.
 const BARRIER: &str = "
     OpCapability Shader

@@ -191,7 +191,7 @@ fn forms_have_the_same_parameters() {
     let all = kernels.iter().filter(|e| e.kernel.is_fragment_form());
     assert_eq!(all.count(), forms.len(), "each is somebody's form");
     // One for all formats.
-    assert_eq!(forms["blur_fragment"], 4);
+    assert_eq!(forms["blur_fragment"], 7);
 }
 
 /// In the fragment form nothing that has one is computed, and no texture is stored to but by other passes.
@@ -266,6 +266,9 @@ fn both_forms_agree_on_vulkan() {
     for format in [
         "r32float",
         "r32uint",
+        "rg16float",
+        "rg16unorm",
+        "rg32float",
         "rg32uint",
         "rgba16float",
         "rgba16unorm",

@@ -367,8 +367,9 @@ fn glass_in_a_medium_is_made_once_and_what_is_left_out_is_said() {
         let medium = format!("technique = '{technique}'");
         for (shadow, resolves, halves) in [
             ("technique = 'hamburger'", 1, 1),
-            ("technique = 'vsm'", 1, 1),
-            // Another format; and one whose surfaces have no map.
+            ("technique = 'hausdorff'", 1, 1),
+            // Two moments; another format; and one whose surfaces have no map.
+            ("technique = 'vsm'", 2, 1),
             ("technique = 'hamburger'\nformat = 'rgba32float'", 2, 2),
             ("technique = 'pcf'", 1, 1),
         ] {
