@@ -246,7 +246,7 @@ impl Build {
     /// HLSL: the first register of every class (t, u, b, s).
     #[must_use]
     pub fn register_base(self, register: u16) -> Self {
-        self.placed("register_base", register.into())
+        self.placed("register_base", register)
     }
 
     /// WGSL: the group of every binding.
