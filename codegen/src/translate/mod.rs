@@ -1076,14 +1076,17 @@ impl Job<'_> {
         }
         names.sort_unstable();
         names.dedup();
-        let present = text::all_names(&text.source);
+        let present = text::numbered_names(&text.source);
         let renamed: HashMap<String, &str> = names
             .into_iter()
             .filter(|name| name.ends_with(|letter: char| letter.is_ascii_digit()))
             .filter(|name| !looks_like_a_type(name) && !present.contains(name))
             .map(|name| (format!("{name}_"), name))
             .collect();
-        text.source = text::rename_all(&text.source, &renamed);
+        if renamed.is_empty() {
+            return;
+        }
+        text.source = text::without_underscores(&text.source, &renamed);
         if let Some(name) = renamed.get(&text.entry_point) {
             text.entry_point = (*name).to_owned();
         }

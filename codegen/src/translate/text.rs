@@ -11,23 +11,37 @@ fn is_name(letter: char) -> bool {
 /// The names, and the words and numbers, of a text, each with what follows it up to the next one. The first one is empty
 /// where the text begins with something else.
 fn names(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    // Letters of names are bytes, and what is beside them is none of theirs: texts are cut between whole letters.
+    let is_letter = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_';
     let mut rest = text;
     iter::from_fn(move || {
         if rest.is_empty() {
             return None;
         }
-        let (name, after) = rest.split_at(rest.find(|it| !is_name(it)).unwrap_or(rest.len()));
-        let (gap, after) = after.split_at(after.find(is_name).unwrap_or(after.len()));
-        rest = after;
+        let bytes = rest.as_bytes();
+        let end = bytes
+            .iter()
+            .position(|it| !is_letter(it))
+            .unwrap_or(bytes.len());
+        let next = bytes[end..]
+            .iter()
+            .position(is_letter)
+            .map_or(bytes.len(), |gap| end + gap);
+        let (name, gap) = (&rest[..end], &rest[end..next]);
+        rest = &rest[next..];
         Some((name, gap))
     })
 }
 
-/// Replaces names, all in one pass: a text of a shader has thousands of them.
-pub fn rename_all(text: &str, renamed: &HashMap<String, &str>) -> String {
+/// Takes the underscores away from names that end in one, where `renamed` has another name for them.
+pub fn without_underscores(text: &str, renamed: &HashMap<String, &str>) -> String {
     let mut all = String::with_capacity(text.len());
     for (name, gap) in names(text) {
-        all.push_str(renamed.get(name).copied().unwrap_or(name));
+        let other = match name.as_bytes().last() {
+            Some(b'_') => renamed.get(name).copied(),
+            _ => None,
+        };
+        all.push_str(other.unwrap_or(name));
         all.push_str(gap);
     }
     all
@@ -35,12 +49,21 @@ pub fn rename_all(text: &str, renamed: &HashMap<String, &str>) -> String {
 
 /// Replaces a name wherever it stands by itself.
 pub fn rename(text: &str, from: &str, to: &str) -> String {
-    rename_all(text, &HashMap::from([(from.to_owned(), to)]))
+    let mut all = String::with_capacity(text.len());
+    for (name, gap) in names(text) {
+        all.push_str(if name == from { to } else { name });
+        all.push_str(gap);
+    }
+    all
 }
 
-/// All names that stand anywhere in the text.
-pub fn all_names(text: &str) -> HashSet<&str> {
-    names(text).map(|(name, _)| name).collect()
+/// All names that stand anywhere in the text and end in a digit.
+pub fn numbered_names(text: &str) -> HashSet<&str> {
+    let ends_in_digit = |name: &&str| name.as_bytes().last().is_some_and(u8::is_ascii_digit);
+    names(text)
+        .map(|(name, _)| name)
+        .filter(ends_in_digit)
+        .collect()
 }
 
 /// Puts `f` after decimal fractions that have no suffix, and makes the `L` of whole numbers `LL`: with
@@ -168,7 +191,7 @@ mod tests {
         assert_eq!(rename("a ab a_ (a)a", "a", "x"), "x ab a_ (x)x");
         assert_eq!(rename(".é1_ 1_", "1_", "x"), ".éx x");
         assert_eq!(
-            rename_all(
+            without_underscores(
                 "(a1_, b1_) a1",
                 &HashMap::from([("a1_".into(), "b1"), ("b1_".into(), "a1")])
             ),
