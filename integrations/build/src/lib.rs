@@ -75,6 +75,8 @@ pub struct Build {
     arguments: Vec<OsString>,
     /// What a manifest records of the arguments that have a method here.
     recorded: Recorded,
+    /// Whether there are no other arguments.
+    is_recorded: bool,
     bindings: Option<PathBuf>,
     program: Option<PathBuf>,
     name: Option<String>,
@@ -177,6 +179,7 @@ impl Build {
             committed: None,
             arguments: Vec::new(),
             recorded: Recorded::default(),
+            is_recorded: true,
             bindings: None,
             program: None,
             name: None,
@@ -212,7 +215,7 @@ impl Build {
     #[must_use]
     pub fn prefix(mut self, prefix: &str) -> Self {
         self.recorded.prefix = Some(prefix.to_owned());
-        self.argument("--prefix").argument(prefix)
+        self.pass("--prefix").pass(prefix)
     }
 
     /// Libraries: only functions of this name, where `*` stands for any letters, and what they call. May be called
@@ -220,21 +223,21 @@ impl Build {
     #[must_use]
     pub fn function(mut self, pattern: &str) -> Self {
         self.recorded.functions.push(pattern.to_owned());
-        self.argument("--function").argument(pattern)
+        self.pass("--function").pass(pattern)
     }
 
     /// Only kernels of this name, where `*` stands for any letters. May be called again.
     #[must_use]
     pub fn kernel(mut self, pattern: &str) -> Self {
         self.recorded.kernels.push(pattern.to_owned());
-        self.argument("--kernel").argument(pattern)
+        self.pass("--kernel").pass(pattern)
     }
 
     /// Only this language, by its name on the command line: `wgsl`, `spirv`, … May be called again.
     #[must_use]
     pub fn target(mut self, language: &str) -> Self {
         self.recorded.targets.push(language.to_owned());
-        self.argument("--target").argument(language)
+        self.pass("--target").pass(language)
     }
 
     /// HLSL: the register space of every binding.
@@ -270,7 +273,7 @@ impl Build {
     /// An option of placement, by its name in the manifest.
     fn placed(mut self, option: &str, number: u16) -> Self {
         self.recorded.placement.insert(option.into(), number.into());
-        self.argument(format!("--{}={number}", option.replace('_', "-")))
+        self.pass(format!("--{}={number}", option.replace('_', "-")))
     }
 
     /// A TOML file with places of single bindings, from the including crate's folder.
@@ -283,6 +286,11 @@ impl Build {
     /// Any other argument of `hankel build`; `hankel build --help` has them.
     #[must_use]
     pub fn argument(mut self, argument: impl Into<OsString>) -> Self {
+        self.is_recorded = false;
+        self.pass(argument)
+    }
+
+    fn pass(mut self, argument: impl Into<OsString>) -> Self {
         self.arguments.push(argument.into());
         self
     }
@@ -290,7 +298,8 @@ impl Build {
     /// A folder that `hankel build` wrote and that is under version control. It is used where there
     /// is no program `hankel`: as it stands, if every file is as its manifest says and it was built with the options
     /// given here, and with a warning, since only `hankel check` can tell whether it follows from the present
-    /// sources. Those of [`Build::argument`] and [`Build::bindings`] are not compared.
+    /// sources. Options are not compared where there are others, by [`Build::argument`], and the file of
+    /// [`Build::bindings`] never is.
     #[must_use]
     pub fn committed(mut self, folder: impl Into<PathBuf>) -> Self {
         self.committed = Some(folder.into());
@@ -414,7 +423,8 @@ impl Build {
                 let missing = named.is_none() && source.kind() == io::ErrorKind::NotFound;
                 return match &self.committed {
                     Some(folder) if missing => {
-                        as_committed(&here.join(folder), self.form, &self.recorded)
+                        let wanted = self.is_recorded.then_some(&self.recorded);
+                        as_committed(&here.join(folder), self.form, wanted)
                     }
                     _ => Err(BuildError::NoProgram { program, source }),
                 };
@@ -544,10 +554,11 @@ fn difference(wanted: &Recorded, recorded: &Recorded) -> Option<String> {
     }
     let names = wanted.placement.keys().chain(recorded.placement.keys());
     for name in names.filter(|name| *name != "bindings") {
-        let [wanted, recorded] = [wanted, recorded].map(|of| of.placement.get(name));
+        // 0 is where everything is by itself.
+        let number = |of: &Recorded| of.placement.get(name).filter(|it| **it != 0).cloned();
+        let [wanted, recorded] = [wanted, recorded].map(number);
         if wanted != recorded {
-            let number =
-                |it: Option<&serde_json::Value>| it.map_or("not set".into(), ToString::to_string);
+            let number = |it: Option<serde_json::Value>| it.map_or("0".into(), |it| it.to_string());
             return Some(format!(
                 "{name} is {} there, and {} here",
                 number(recorded),
@@ -570,7 +581,7 @@ fn difference(wanted: &Recorded, recorded: &Recorded) -> Option<String> {
 fn as_committed(
     folder: &Path,
     form: Form,
-    wanted: &Recorded,
+    wanted: Option<&Recorded>,
 ) -> Result<(PathBuf, Vec<String>), BuildError> {
     #[derive(serde::Deserialize)]
     struct Record {
@@ -603,7 +614,7 @@ fn as_committed(
         functions: record.of_libraries.functions,
         ..Recorded::default()
     });
-    if let Some(difference) = difference(wanted, &recorded) {
+    if let Some(difference) = wanted.and_then(|wanted| difference(wanted, &recorded)) {
         return Err(at(
             &path,
             format!(
@@ -778,13 +789,13 @@ mod tests {
             .iter()
             .map(|b| format!("{b:02x}"))
             .collect();
-        let any = Recorded::default();
+        let any = None;
         write("a.wgsl", "text");
         write(
             "manifest.json",
             &format!("{{\"files\":{{\"a.wgsl\":{{\"sha256\":\"{hash}\"}}}}}}"),
         );
-        let (_, lines) = as_committed(folder.path(), Form::Kernels, &any).expect("it is whole");
+        let (_, lines) = as_committed(folder.path(), Form::Kernels, any).expect("it is whole");
         assert!(
             lines
                 .iter()
@@ -799,17 +810,17 @@ mod tests {
         // The record of libraries has bare hashes.
         let record = format!("{{\"files\":{{\"a.wgsl\":\"{hash}\"}}}}");
         write("functions.json", &record);
-        as_committed(folder.path(), Form::Functions, &any).expect("it is whole");
+        as_committed(folder.path(), Form::Functions, any).expect("it is whole");
 
         write("a.wgsl", "other");
-        as_committed(folder.path(), Form::Functions, &any).unwrap_err();
-        let error = as_committed(folder.path(), Form::Kernels, &any)
+        as_committed(folder.path(), Form::Functions, any).unwrap_err();
+        let error = as_committed(folder.path(), Form::Kernels, any)
             .unwrap_err()
             .to_string();
         assert!(error.contains("a.wgsl"), "{error}");
         let outside = "{\"files\":{\"../b\":{\"sha256\":\"\"}}}";
         write("manifest.json", outside);
-        let error = as_committed(folder.path(), Form::Kernels, &any)
+        let error = as_committed(folder.path(), Form::Kernels, any)
             .unwrap_err()
             .to_string();
         assert!(error.contains("../b"), "{error}");
@@ -831,17 +842,15 @@ mod tests {
             "functions.json",
             r#"{"files": {}, "hankel": "0.1.0", "prefix": "own", "functions": ["mix_*"], "libraries": {}}"#,
         );
-        let of = |build: &Build| as_committed(folder.path(), build.form, &build.recorded);
+        let of = |build: &Build| as_committed(folder.path(), build.form, Some(&build.recorded));
         let same = || Build::built_in().kernel("vsm").target("wgsl").wgsl_group(2);
         of(&same()).expect("the options are the same");
+        of(&same().register_base(0)).expect("0 is the default");
         let same_library = || Build::built_in_functions().function("mix_*");
         of(&same_library().prefix("own")).expect("the options are the same");
         for (other, said) in [
             (same().wgsl_group(0), "wgsl_group is 2 there, and 0 here"),
-            (
-                same().hlsl_space(1),
-                "hlsl_space is not set there, and 1 here",
-            ),
+            (same().hlsl_space(1), "hlsl_space is 0 there, and 1 here"),
             (
                 same().kernel("blur"),
                 "kernels are vsm there, and vsm, blur here",
