@@ -13,8 +13,8 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, branches, canonical, exact, holders, libm, names, narrow, order, parts,
-    references, refused, split, tables, trim, undefined, uniform, widths,
+    self, bounds, branches, canonical, exact, holders, interpolation, libm, names, narrow, offsets,
+    order, parts, references, refused, split, tables, trim, undefined, uniform, widths,
 };
 use crate::translate::reading;
 
@@ -55,6 +55,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         ..failure
     };
     widths::mend(&mut module);
+    offsets::make_constant(&mut module);
     narrow::widen(&mut module, name).map_err(placed)?;
     if holders::are_passed(&module) {
         let words = run_passes(&module, name, |passes| {
@@ -111,6 +112,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         exact::keep(&mut module);
     }
     undefined::fill(&mut module);
+    interpolation::apply(&mut module, kernel);
     trim::debug(&mut module);
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);

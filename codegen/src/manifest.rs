@@ -430,7 +430,7 @@ pub(crate) fn macro_name(kernel: &str, constant: &str) -> String {
 pub struct Interface {
     /// Its name.
     pub name: String,
-    /// `attribute`, `varying`, `position`, `depth` or `target`.
+    /// `attribute`, `varying`, `position`, `depth`, `sample_mask` or `target`.
     pub kind: String,
     /// Location; the position and the depth have none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -438,9 +438,9 @@ pub struct Interface {
     /// Type.
     #[serde(rename = "type")]
     pub ty: String,
-    /// A varying that is not interpolated.
-    #[serde(skip_serializing_if = "core::ops::Not::not", default)]
-    pub flat: bool,
+    /// How a varying is interpolated, in WGSL's words: `flat`, `linear, centroid`; none for `perspective`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub interpolation: Option<String>,
 }
 
 /// How closely backends agree.
@@ -670,7 +670,7 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
         kind: kind.into(),
         location,
         ty,
-        flat: false,
+        interpolation: None,
     };
     let inputs = kernel
         .params
@@ -682,8 +682,12 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
                 Some(*location),
                 layouts.spell(ty),
             )),
-            Role::Varying { location, ty, flat } => Some(Interface {
-                flat: *flat,
+            Role::Varying {
+                location,
+                ty,
+                interpolation,
+            } => Some(Interface {
+                interpolation: interpolation.words().map(str::to_owned),
                 ..made(&param.name, "varying", Some(*location), layouts.spell(ty))
             }),
             _ => None,
@@ -698,8 +702,13 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
             match output {
                 Output::Position => Some(made(&name, "position", None, "vec4<f32>".into())),
                 Output::Depth => Some(made(&name, "depth", None, "f32".into())),
-                Output::Varying { location, ty, flat } => Some(Interface {
-                    flat: *flat,
+                Output::SampleMask => Some(made(&name, "sample_mask", None, "u32".into())),
+                Output::Varying {
+                    location,
+                    ty,
+                    interpolation,
+                } => Some(Interface {
+                    interpolation: interpolation.words().map(str::to_owned),
                     ..made(&name, "varying", Some(*location), layouts.spell(ty))
                 }),
                 Output::Target { location, ty } => {

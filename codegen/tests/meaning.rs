@@ -74,6 +74,36 @@ fn centroids_stay() {
 }
 
 #[test]
+fn masks_of_samples_are_numbers() {
+    let source = include_str!("../../tests/upstream/naga-sample-mask/case.spvasm");
+    let kernel = kernel(Stage::Fragment);
+    for (language, word) in [
+        (Language::Wgsl, "@builtin(sample_mask)"),
+        (Language::Hlsl, "SV_Coverage"),
+        (Language::Msl, "[[sample_mask]]"),
+        (Language::Glsl, "gl_SampleMask[0]"),
+    ] {
+        let text = text(source, &kernel, language);
+        assert!(text.contains(word), "{language}:\n{text}");
+    }
+}
+
+#[test]
+fn layers_are_counted() {
+    let source = include_str!("../../tests/upstream/naga-layers/case.spvasm");
+    let kernel = kernel(Stage::Fragment);
+    for (language, word) in [
+        (Language::Wgsl, "textureNumLayers("),
+        (Language::Hlsl, "GetDimensions("),
+        (Language::Msl, ".get_array_size()"),
+        (Language::Glsl, ".z"),
+    ] {
+        let text = text(source, &kernel, language);
+        assert!(text.contains(word), "{language}:\n{text}");
+    }
+}
+
+#[test]
 fn layers_are_fetched() {
     let source = include_str!("../../tests/upstream/naga-arrayed-fetch/case.spvasm")
         .replace("%main \"main\"", "%main \"main\" %image");

@@ -906,7 +906,7 @@ fn passes_whose_parts_do_not_fit_are_refused() {
         Role::Varying {
             location: 3,
             ty: vector(Scalar::F32, 4),
-            flat: false,
+            interpolation: Interpolation::Perspective,
         },
     );
     let text = refuse(

@@ -28,7 +28,7 @@ use hankel_tests::Crate;
 /// Not the matrix's, which is 1.
 const SEED: u64 = 20_261_121;
 
-fn run_all(subjects: &[Subject]) -> Report {
+fn run_all(known: Known, subjects: &[Subject]) -> Report {
     let request = Request {
         columns: Column::PLAIN.into(),
         seed: SEED,
@@ -36,7 +36,7 @@ fn run_all(subjects: &[Subject]) -> Report {
         tools: Tools::of_cache(None),
         runner: vec![PathBuf::from(env!("CARGO_BIN_EXE_hankel-tests-runner")).into()],
         cache: None,
-        known: Known::default(),
+        known,
         absent: None,
         whole: false,
         required: Column::PLAIN.into(),
@@ -53,7 +53,7 @@ fn subjects(one: &Crate) -> Vec<Subject> {
 #[test]
 fn built_in_kernels_agree_everywhere() {
     let shadows = Crate::shadows();
-    let report = run_all(&subjects(&shadows));
+    let report = run_all(Known::default(), &subjects(&shadows));
     println!("{report}");
     assert!(report.passed, "{report}");
     // All values of the constants are run.
@@ -83,7 +83,9 @@ fn built_in_kernels_agree_everywhere() {
 
 #[test]
 fn everything_that_a_kernel_can_do_agrees_everywhere() {
-    let report = run_all(&subjects(&Crate::conformance()));
+    let known = hankel_tests::root().join("snapshots/known-conformance-differences.toml");
+    let known = Known::read(&known).unwrap_or_else(|e| panic!("{e}"));
+    let report = run_all(known, &subjects(&Crate::conformance()));
     println!("{report}");
     assert!(report.passed, "{report}");
 }
@@ -153,7 +155,7 @@ fn found_in_wgsl(mut subject: Subject, from: &str, to: &str) -> bool {
     let text = String::from_utf8(std::mem::take(&mut code.bytes)).expect("a text is UTF-8");
     assert!(text.contains(from), "no `{from}` in\n{text}");
     code.bytes = text.replacen(from, to, 1).into_bytes();
-    let report = run_all(&[subject]);
+    let report = run_all(Known::default(), &[subject]);
     for (column, cell) in &report.kernels[0].cells {
         assert!(
             !cell.outcome.fails() || (*column == Column::Wgsl && cell.outcome == Outcome::Differs),
@@ -215,7 +217,7 @@ fn infinities_of_finite_inputs_fail_unless_they_are_declared() {
     let mut subject = subject_of_shadows("light_depth");
     assert!(subject.entry.kernel.tolerance.non_finite);
     let passed = |subject: &Subject| {
-        let report = run_all(std::slice::from_ref(subject));
+        let report = run_all(Known::default(), std::slice::from_ref(subject));
         let outcome = report.kernels[0].cells[&Column::Native].outcome.clone();
         (
             report.passed,

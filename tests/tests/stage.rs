@@ -22,10 +22,114 @@ fn what_is_not_interpolated_is_said() {
     let hlsl = text(&generated, "flat", ".hlsl");
     assert_eq!(hlsl.matches("nointerpolation").count(), 3, "{hlsl}");
     let kernel = &generated.manifest.kernels["flat"];
-    assert!(kernel.inputs.iter().all(|input| input.flat));
+    assert!(
+        kernel
+            .inputs
+            .iter()
+            .all(|input| input.interpolation.as_deref() == Some("flat"))
+    );
     let vertex = &generated.manifest.kernels["numbered"];
-    let flat = vertex.outputs.iter().filter(|output| output.flat).count();
+    let flat = vertex
+        .outputs
+        .iter()
+        .filter(|output| output.interpolation.as_deref() == Some("flat"))
+        .count();
     assert_eq!(flat, 3);
+}
+
+#[test]
+fn interpolation_is_said_by_both_stages() {
+    let generated = Crate::conformance().generate();
+    let ways = [
+        None,
+        Some("perspective, centroid"),
+        Some("linear"),
+        Some("linear, centroid"),
+        Some("perspective, sample"),
+        Some("linear, sample"),
+    ];
+    let kernels = &generated.manifest.kernels;
+    let varyings = |all: &[hankel_codegen::manifest::Interface]| -> Vec<Option<String>> {
+        let varyings = all.iter().filter(|it| it.kind == "varying");
+        varyings.map(|it| it.interpolation.clone()).collect()
+    };
+    let ways: Vec<Option<String>> = ways.map(|it| it.map(str::to_owned)).into();
+    assert_eq!(varyings(&kernels["interpolated"].outputs), ways);
+    assert_eq!(varyings(&kernels["at_samples"].inputs), ways);
+    for kernel in ["interpolated", "at_samples"] {
+        for (extension, words) in [
+            (
+                ".wgsl",
+                [
+                    "@interpolate(perspective, centroid)",
+                    "@interpolate(linear)",
+                    "@interpolate(linear, centroid)",
+                    "@interpolate(perspective, sample)",
+                    "@interpolate(linear, sample)",
+                ],
+            ),
+            (
+                ".hlsl",
+                [
+                    "centroid float2",
+                    "noperspective float3",
+                    "noperspective centroid float",
+                    "sample float",
+                    "noperspective sample float",
+                ],
+            ),
+        ] {
+            let text = text(&generated, kernel, extension);
+            for word in words {
+                assert!(text.contains(word), "{word}:\n{text}");
+            }
+        }
+        assert!(kernels[kernel].unsupported.contains_key(&Essl310));
+    }
+    assert!(kernels["covered_place"].unsupported.is_empty());
+}
+
+#[test]
+fn masks_and_numbers_of_primitives_are_said() {
+    let generated = Crate::conformance().generate();
+    for (kernel, extension, word) in [
+        ("coverage", ".wgsl", "@builtin(sample_mask)"),
+        ("coverage", ".hlsl", "SV_Coverage"),
+        ("coverage", ".metal", "[[sample_mask]]"),
+        ("coverage", "glsl/coverage.frag", "gl_SampleMask[0] = int("),
+        ("primitives", ".wgsl", "@builtin(primitive_index)"),
+        ("primitives", ".hlsl", "SV_PrimitiveID"),
+        ("primitives", ".metal", "[[primitive_id]]"),
+    ] {
+        let text = text(&generated, kernel, extension);
+        assert!(text.contains(word), "{word}:\n{text}");
+    }
+    let kernels = &generated.manifest.kernels;
+    for language in [Essl310, Essl300] {
+        assert!(kernels["coverage"].unsupported[&language].contains("masks of samples"));
+    }
+    assert!(kernels["primitives"].unsupported[&Essl300].contains("primitive's number"));
+    let wgsl = &kernels["primitives"].languages[&Wgsl];
+    assert_eq!(wgsl.requires, ["primitive-index"]);
+}
+
+#[test]
+fn texels_beside_others_are_asked_for_by_offsets() {
+    let generated = Crate::conformance().generate();
+    for (kernel, extension, word) in [
+        ("blurred_sideways", ".wgsl", "vec2<i32>(-1i, 0i)"),
+        ("blurred_sideways", ".hlsl", "int2(int(-1), int(0))"),
+        ("blurred_sideways", ".metal", "metal::int2(-1, 0)"),
+        (
+            "blurred_sideways",
+            "essl310/blurred_sideways.frag",
+            "textureOffset(",
+        ),
+        ("four_by_offsets", ".wgsl", "textureSampleCompareLevel("),
+    ] {
+        let text = text(&generated, kernel, extension);
+        assert!(text.contains(word), "{word}:\n{text}");
+    }
 }
 
 #[test]
@@ -234,7 +338,6 @@ fn what_a_language_does_not_sample_is_refused() {
             "through a sampler that compares",
         ),
         ("layers_lit", &[Glsl, Essl310], "a gather of comparisons"),
-        ("hidden", &[Msl], "leaves level 0 out of a comparison"),
         ("along", &[Essl310], "one-dimensional"),
     ] {
         let kernel = &generated.manifest.kernels[kernel];

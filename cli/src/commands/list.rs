@@ -2,7 +2,7 @@ use hankel_codegen::Language;
 use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::describe::{
-    BuiltIn, Kernel, Output, Precision, Role, Rounding, Stage, Type,
+    BuiltIn, Interpolation, Kernel, Output, Precision, Role, Rounding, Stage, Type,
 };
 
 use crate::args::{Format, List};
@@ -169,7 +169,11 @@ fn bindings(kernel: &Kernel) {
             } => format!("binding {binding}: sampler that compares"),
             Role::Constant { id, default } => format!("constant {id}, default {default}"),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
-            Role::Varying { location, ty, flat } => varying(*location, ty, *flat),
+            Role::Varying {
+                location,
+                ty,
+                interpolation,
+            } => varying(*location, ty, *interpolation),
             Role::Index if kernel.is_fragment_form() => "the pixel".into(),
             Role::Index => "the invocation's index".into(),
             Role::BuiltIn { built_in } => match built_in {
@@ -186,6 +190,8 @@ fn bindings(kernel: &Kernel) {
                 BuiltIn::FragCoord => "where the fragment is, and its depth",
                 BuiltIn::FrontFacing => "whether the primitive faces the viewer",
                 BuiltIn::SampleIndex => "which sample of the pixel",
+                BuiltIn::SampleMask => "which samples of the pixel the primitive covers",
+                BuiltIn::PrimitiveIndex => "the primitive's number",
             }
             .into(),
             Role::Shared {
@@ -212,15 +218,25 @@ fn bindings(kernel: &Kernel) {
             }
             Output::Position => "clip-space position".into(),
             Output::Depth => "depth".into(),
-            Output::Varying { location, ty, flat } => varying(*location, ty, *flat),
+            Output::SampleMask => "which samples are written".into(),
+            Output::Varying {
+                location,
+                ty,
+                interpolation,
+            } => varying(*location, ty, *interpolation),
             Output::Target { location, ty } => format!("target {location}: {}", spell(ty)),
         };
         say!("    {:<12} {what}", "output");
     }
 }
 
-fn varying(location: u32, ty: &Type, flat: bool) -> String {
-    let how = if flat { ", not interpolated" } else { "" };
+fn varying(location: u32, ty: &Type, interpolation: Interpolation) -> String {
+    let how = match interpolation {
+        Interpolation::Flat => ", not interpolated".into(),
+        it => it
+            .words()
+            .map_or_else(String::new, |words| format!(", {words}")),
+    };
     format!("varying {location}: {}{how}", spell(ty))
 }
 

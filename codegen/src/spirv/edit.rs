@@ -112,6 +112,11 @@ impl<'a> Editor<'a> {
         self.once(Op::Constant, Some(ty), vec![Operand::LiteralBit32(value)])
     }
 
+    /// The constant of type `ty` that is made of others.
+    pub fn composite(&mut self, ty: Word, parts: Vec<Operand>) -> Word {
+        self.once(Op::ConstantComposite, Some(ty), parts)
+    }
+
     pub fn float(&mut self, ty: FloatType, value: f64) -> Word {
         let operand = match ty.bits {
             32 => Operand::LiteralBit32((value as f32).to_bits()),

@@ -98,8 +98,12 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                     names.set(variable, &name);
                 }
             }
-            Output::Position | Output::Depth => {
-                let number = if *output == Output::Depth { 22 } else { 0 };
+            Output::Position | Output::Depth | Output::SampleMask => {
+                let number = match output {
+                    Output::Depth => 22,
+                    Output::SampleMask => 20,
+                    _ => 0,
+                };
                 if let Some(variable) = built_in(module, number) {
                     names.set(variable, &name);
                 }
@@ -127,7 +131,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
 }
 
 /// Input variables that every stage names alike: SPIR-V's number, name.
-const INPUTS: [(u32, &str); 13] = [
+const INPUTS: [(u32, &str); 14] = [
     (28, "id"),
     (27, "local_id"),
     (26, "group_id"),
@@ -141,6 +145,7 @@ const INPUTS: [(u32, &str); 13] = [
     (15, "frag_coord"),
     (17, "front_facing"),
     (18, "sample_index"),
+    (7, "primitive_index"),
 ];
 
 /// What an output is called where it needs a name: `out` if it is the only one of its kind,
@@ -150,6 +155,7 @@ pub fn output_name(kernel: &Kernel, index: usize) -> String {
         Output::Buffer { .. } | Output::Texture { .. } => "out",
         Output::Position => "position",
         Output::Depth => "depth",
+        Output::SampleMask => "sample_mask",
         Output::Varying { .. } => "varying",
         Output::Target { .. } => "color",
     };
@@ -243,7 +249,7 @@ pub(super) fn bound(module: &Module, binding: u32) -> Option<Word> {
     })
 }
 
-fn located(module: &Module, class: StorageClass, location: u32) -> Option<Word> {
+pub(super) fn located(module: &Module, class: StorageClass, location: u32) -> Option<Word> {
     variables(module).find(|variable| {
         decoration(module, *variable, Decoration::Location) == Some(location)
             && global(module, *variable).and_then(|it| it.operands.first())

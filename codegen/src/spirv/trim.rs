@@ -28,7 +28,9 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 17] = [
+pub const ENABLED: [Capability; 18] = [
+    // Of the number of a primitive.
+    Capability::Geometry,
     // `narrow` leaves no such number.
     Capability::Int8,
     Capability::Int16,
@@ -78,7 +80,13 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
         | Op::DPdxCoarse
         | Op::DPdyCoarse
         | Op::FwidthCoarse => Some(Capability::DerivativeControl),
+        Op::Decorate
+            if instruction.operands.get(1) == Some(&Operand::Decoration(Decoration::Sample)) =>
+        {
+            Some(Capability::SampleRateShading)
+        }
         Op::Decorate => match instruction.operands.get(2) {
+            Some(Operand::BuiltIn(BuiltIn::PrimitiveId)) => Some(Capability::Geometry),
             Some(Operand::BuiltIn(BuiltIn::SampleId)) => Some(Capability::SampleRateShading),
             Some(Operand::BuiltIn(
                 BuiltIn::SubgroupSize

@@ -97,6 +97,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
             "(uint(gl_InstanceID) + naga_vs_first_instance)",
             "uint(gl_InstanceID)",
         );
+    let source = plain_queries(&with_mask_arrays(&source));
     let source = job.open_constants(source)?;
     let types = ["float", "double", "vec", "dvec", "mat", "dmat"];
     let mut source = if job.language == Language::Essl300 {
@@ -182,6 +183,41 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         sized: Vec::new(),
         requires,
     }))
+}
+
+/// Masks of samples are arrays in GLSL, of which naga knows no elements (`tests/upstream/naga-glsl-sample-mask`).
+fn with_mask_arrays(source: &str) -> String {
+    let source = text::rename(source, "gl_SampleMaskIn", "uint(gl_SampleMaskIn[0])");
+    let mut written = String::with_capacity(source.len());
+    for line in source.split_inclusive('\n') {
+        let value = line
+            .split_once("gl_SampleMask = ")
+            .and_then(|(indent, rest)| Some((indent, rest.split_once(';')?)));
+        match value {
+            Some((indent, (value, rest))) => {
+                written += &format!("{indent}gl_SampleMask[0] = int({value});{rest}");
+            }
+            None => written += line,
+        }
+    }
+    written
+}
+
+/// The size of a storage texture is asked for without a level, which naga gives where it wants the layers
+/// (`tests/upstream/naga-glsl-storage-layers`).
+fn plain_queries(source: &str) -> String {
+    let mut parts = source.split("imageSize(");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text += "imageSize(";
+        text += &match part.split_once(')') {
+            Some((image, rest)) => {
+                format!("{}){rest}", image.strip_suffix(", 0").unwrap_or(image))
+            }
+            None => part.to_owned(),
+        };
+    }
+    text
 }
 
 /// The extensions of GLSL for the operations of subgroups that a text has.

@@ -36,7 +36,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::str::FromStr;
 
-use hankel_dsl::native::describe::{BuiltIn, Kernel, Role, Rounding, Stage};
+use hankel_dsl::native::describe::{BuiltIn, Kernel, Output, Role, Rounding, Stage};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{
@@ -301,10 +301,13 @@ impl Ir {
     fn of(spirv: rspirv::dr::Module, kernel: &Kernel) -> Result<Self, Failure> {
         let name = kernel.name.as_str();
         let dropped = Dropped::of(&spirv);
-        let bytes = spirv::bytes(&spirv::store(&spirv));
+        let words = reading::with_number_masks(&spirv)
+            .map_or_else(|| spirv::store(&spirv), |it| spirv::store(&it));
+        let bytes = spirv::bytes(&words);
         let read = || {
             let mut module = parse(&bytes, name)?;
             cleanup::restore_sampling(&mut module, &dropped.sampling);
+            cleanup::restore_layers(&mut module);
             Ok(module)
         };
         let mut module = guarded(read, name, Step::Parse)?;
@@ -498,10 +501,22 @@ impl Ir {
             );
         }
         let es = matches!(language, Language::Essl310 | Language::Essl300);
-        if es && kernel.params.iter().any(|p| p.role == SAMPLE_INDEX) {
+        let takes = |built_in| {
+            let role = Role::BuiltIn { built_in };
+            kernel.params.iter().any(|p| p.role == role)
+        };
+        if es && takes(BuiltIn::SampleIndex) {
             return Some(format!(
                 "{language} does not know the sample: it came with 3.20"
             ));
+        }
+        if es && (takes(BuiltIn::SampleMask) || kernel.outputs.contains(&Output::SampleMask)) {
+            return Some(format!(
+                "{language} has no masks of samples: they came with 3.20"
+            ));
+        }
+        if language == Language::Essl300 && takes(BuiltIn::PrimitiveIndex) {
+            return Some(format!("{language} does not know the primitive's number"));
         }
         if (es || language == Language::Msl) && self.has_grained_derivatives() {
             return Some(format!(
@@ -520,16 +535,6 @@ impl Ir {
                 "naga's {language} writer gives a gather of comparisons in an array of textures or a \
                  cube gradients, which it does not take"
             ));
-        }
-        if language == Language::Msl
-            && kernel.stage == Stage::Fragment
-            && self.compares_at_level_zero()
-        {
-            return Some(
-                "naga's MSL writer leaves level 0 out of a comparison, and a fragment would compare \
-                 at its own level: use `compare`"
-                    .into(),
-            );
         }
         if !kernel.subgroups.is_unused()
             && let Some(reason) = without_subgroups(language, options)
@@ -704,21 +709,6 @@ impl Ir {
                 expression,
                 Expression::ImageSample {
                     gather: Some(_),
-                    ..
-                }
-            )
-        })
-    }
-
-    /// Whether a sampler compares at level 0, whatever the fragment's level is.
-    fn compares_at_level_zero(&self) -> bool {
-        self.has(|expression| {
-            matches!(
-                expression,
-                Expression::ImageSample {
-                    gather: None,
-                    depth_ref: Some(_),
-                    level: naga::SampleLevel::Zero,
                     ..
                 }
             )
@@ -916,11 +906,6 @@ fn without_subgroups(language: Language, options: &Options) -> Option<String> {
 
 /// The first version of MSL with all operations of SIMD-groups on every device that has it.
 const SUBGROUPS_MSL: MslVersion = MslVersion { major: 2, minor: 3 };
-
-/// The role of a parameter that is the sample's number.
-const SAMPLE_INDEX: Role = Role::BuiltIn {
-    built_in: BuiltIn::SampleIndex,
-};
 
 /// The first version of MSL that can forbid contraction and reordering.
 const EXACT_MSL: MslVersion = MslVersion { major: 3, minor: 2 };

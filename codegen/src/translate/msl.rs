@@ -1,12 +1,13 @@
 //! MSL.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use hankel_dsl::native::describe::Rounding;
-use naga::ResourceBinding;
 use naga::back::msl::{
     self, BindSamplerTarget, BindTarget, EntryPointResources, Error, Options, PipelineOptions,
 };
+use naga::{Expression, Module, ResourceBinding, SampleLevel};
 
 use super::{Job, Kind, Place, Text, Written, text};
 use crate::error::{Failure, Step};
@@ -19,6 +20,7 @@ const SAMPLERS: u8 = 15;
 
 pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let (module, info) = job.settled()?;
+    let module = with_marked_comparisons(module);
     let bound = job.bound();
     let base = job.options.placement.msl_slot_base;
     let (mut buffers, mut textures, mut samplers) = (base, base, base);
@@ -102,7 +104,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let source = source
         .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
         .replace(" - 0 - ", " - ");
-    let source = fenced(&source);
+    let source = compared_at_level_zero(&fenced(&source));
     let source = job.open_constants(source)?;
     let source = if job.kernel.rounding == Rounding::Exact {
         exact(&source).ok_or_else(|| Failure {
@@ -187,6 +189,76 @@ fn fenced(source: &str) -> String {
     text
 }
 
+/// naga leaves level 0 out of a comparison, and a fragment would compare at its own level. So its writer gets a level
+/// that only these have, the reference, for which [`compared_at_level_zero`] puts the right one. (A number of its own would
+/// have to come before what uses it, and all of the function with it.)
+fn with_marked_comparisons(module: Cow<'_, Module>) -> Cow<'_, Module> {
+    let at_zero = |expression: &Expression| match expression {
+        Expression::ImageSample {
+            gather: None,
+            depth_ref,
+            level: SampleLevel::Zero,
+            ..
+        } => *depth_ref,
+        _ => None,
+    };
+    let has_any = {
+        let entries = module.entry_points.iter().map(|it| &it.function);
+        let mut all = entries.chain(module.functions.iter().map(|(_, it)| it));
+        all.any(|it| it.expressions.iter().any(|(_, it)| at_zero(it).is_some()))
+    };
+    if !has_any {
+        return module;
+    }
+    let mut module = module.into_owned();
+    let entries = module.entry_points.iter_mut().map(|it| &mut it.function);
+    for function in entries.chain(module.functions.iter_mut().map(|(_, it)| it)) {
+        for (_, expression) in function.expressions.iter_mut() {
+            if let Some(reference) = at_zero(expression)
+                && let Expression::ImageSample { level, .. } = expression
+            {
+                *level = SampleLevel::Exact(reference);
+            }
+        }
+    }
+    Cow::Owned(module)
+}
+
+/// Level 0 for the level of each comparison: those of a fragment's own level have none.
+fn compared_at_level_zero(source: &str) -> String {
+    const COMPARE: &str = ".sample_compare(";
+    let mut text = String::new();
+    let mut rest = source;
+    while let Some(at) = rest.find(COMPARE) {
+        let (before, call) = rest.split_at(at + COMPARE.len());
+        let (last, end) = last_argument(call);
+        text += before;
+        if call[last..end].starts_with("metal::level(") {
+            text += &compared_at_level_zero(&call[..last]);
+            text += "metal::level(0)";
+        } else {
+            text += &compared_at_level_zero(&call[..end]);
+        }
+        rest = &call[end..];
+    }
+    text + rest
+}
+
+/// Where the last argument of a call begins and ends, in the text behind the bracket that opens it.
+fn last_argument(call: &str) -> (usize, usize) {
+    let (mut depth, mut last) = (0_u32, 0);
+    for (at, c) in call.char_indices() {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' if depth == 0 => return (last, at),
+            ')' | ']' | '}' => depth = depth.saturating_sub(1),
+            ',' if depth == 0 => last = at + 2,
+            _ => {}
+        }
+    }
+    (call.len(), call.len())
+}
+
 /// Forbids contraction and reordering in all that follows the last header. `safe` by itself still
 /// lets a statement's product and sum become one operation.
 fn exact(source: &str) -> Option<String> {
@@ -198,7 +270,7 @@ fn exact(source: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::fenced;
+    use super::{compared_at_level_zero, fenced};
 
     #[test]
     fn what_is_written_is_fenced_where_it_is_read_too() {
@@ -209,5 +281,16 @@ mod tests {
         assert_eq!(fenced(text), wanted);
         let plain = text.replace("read_write", "read");
         assert_eq!(fenced(&plain), plain);
+    }
+
+    #[test]
+    fn comparisons_at_level_zero_say_so() {
+        let text = "float x = a.sample_compare(s, metal::float2(u, v), i, b.sample_compare(s, w, r), \
+                    metal::level(b.sample_compare(s, w, r))) + c.sample_compare(s, w, r, metal::level(r));\n";
+        let wanted = "float x = a.sample_compare(s, metal::float2(u, v), i, b.sample_compare(s, w, r), \
+                      metal::level(0)) + c.sample_compare(s, w, r, metal::level(0));\n";
+        assert_eq!(compared_at_level_zero(text), wanted);
+        let at_own_level = "x = a.sample_compare(s, metal::float2(u, v), metal::max(p, q));\n";
+        assert_eq!(compared_at_level_zero(at_own_level), at_own_level);
     }
 }

@@ -6,6 +6,7 @@
 //! | --- | --- | --- |
 //! | a type of two whole numbers for coordinates into arrays of textures | naga 30.0.1 panics | `naga-arrayed-fetch` |
 //! | a copy of what an operation of a subgroup takes from another block | naga 30.0.1 panics | `naga-subgroup-operand` |
+//! | a mask of samples as a number, which is an array in SPIR-V | naga 30.0.1 refuses it | `naga-sample-mask` |
 //! | the remainder of signed numbers in GLSL | `%`, which GLSL leaves undefined below zero | `naga-glsl-remainder` |
 //! | exchanged bytes in HLSL | DXC 1.7 makes an intrinsic of them that Direct3D does not have | `dxc-byte-swap` |
 //!
@@ -15,7 +16,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use naga::Sampling;
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{Decoration, ImageOperands, Op, StorageClass, Word};
+use rspirv::spirv::{BuiltIn, Decoration, ImageOperands, Op, StorageClass, Word};
 
 use crate::Language;
 use crate::spirv::edit::{Sequence, replace_each};
@@ -205,6 +206,113 @@ pub fn subgroup_operands(module: &mut Module) {
 
 fn is_of_subgroup(op: Op) -> bool {
     (Op::GroupNonUniformElect as u32..=Op::GroupNonUniformQuadSwap as u32).contains(&(op as u32))
+}
+
+/// The module with masks of samples as numbers, of which naga knows no arrays; none if it has no mask.
+pub fn with_number_masks(module: &Module) -> Option<Module> {
+    let masks: Vec<Word> = module
+        .annotations
+        .iter()
+        .filter(|note| note.operands.get(2) == Some(&Operand::BuiltIn(BuiltIn::SampleMask)))
+        .filter_map(|note| id(note, 0))
+        .collect();
+    if masks.is_empty() {
+        return None;
+    }
+    let mut module = module.clone();
+    let mut numbers = HashMap::new();
+    for mask in masks {
+        numbers.insert(mask, number_in_place_of_array(&mut module, mask)?);
+    }
+    // What refers to the element of an array refers to the number.
+    let elements: HashMap<Word, Word> = module
+        .functions
+        .iter()
+        .flat_map(|function| function.all_inst_iter())
+        .filter(|it| matches!(op(it), Op::AccessChain | Op::InBoundsAccessChain))
+        .filter_map(|it| {
+            Some((
+                it.result_id?,
+                id(it, 0).filter(|of| numbers.contains_key(of))?,
+            ))
+        })
+        .collect();
+    replace_each(&mut module, |editor, it| {
+        if it
+            .result_id
+            .is_some_and(|made| elements.contains_key(&made))
+        {
+            return Some(Vec::new());
+        }
+        match op(it) {
+            Op::Load => {
+                let (mask, ty) = (id(it, 0)?, it.result_type?);
+                let number = *numbers.get(&mask)?;
+                let mut steps = Sequence::new(editor, 0);
+                let loaded = steps.then(Op::Load, number, &[mask]);
+                steps.then(Op::CompositeConstruct, ty, &[loaded]);
+                Some(steps.ending_in(it.result_id?))
+            }
+            Op::Store => {
+                let (mask, array) = (id(it, 0)?, id(it, 1)?);
+                let number = *numbers.get(&mask)?;
+                let stored = editor.new_id();
+                let operands = vec![Operand::IdRef(array), Operand::LiteralBit32(0)];
+                let part =
+                    Instruction::new(Op::CompositeExtract, Some(number), Some(stored), operands);
+                let mut store = it.clone();
+                store.operands[1] = Operand::IdRef(stored);
+                Some(vec![part, store])
+            }
+            _ => None,
+        }
+    });
+    let functions = module.functions.iter_mut();
+    for it in functions.flat_map(|function| function.all_inst_iter_mut()) {
+        for operand in &mut it.operands {
+            if let Operand::IdRef(used) = operand
+                && let Some(mask) = elements.get(used)
+            {
+                *used = *mask;
+            }
+        }
+    }
+    Some(module)
+}
+
+/// Makes a variable that is an array of one number that number, and gives the number's type.
+fn number_in_place_of_array(module: &mut Module, variable: Word) -> Option<Word> {
+    let pointer = global(module, global(module, variable)?.result_type?)?;
+    let class = pointer.operands.first()?.clone();
+    let number = id(global(module, id(pointer, 1)?)?, 0)?;
+    let globals = &mut module.types_global_values;
+    let at = globals
+        .iter()
+        .position(|it| it.result_id == Some(variable))?;
+    let operands = vec![class, Operand::IdRef(number)];
+    let there = globals[..at]
+        .iter()
+        .find(|it| op(it) == Op::TypePointer && it.operands == operands)
+        .and_then(|it| it.result_id);
+    let to_number = match there {
+        Some(found) => found,
+        None => {
+            let header = module.header.as_mut()?;
+            let new = header.bound;
+            header.bound += 1;
+            let globals = &mut module.types_global_values;
+            globals.insert(
+                at,
+                Instruction::new(Op::TypePointer, None, Some(new), operands),
+            );
+            new
+        }
+    };
+    let globals = module.types_global_values.iter_mut();
+    for it in globals.filter(|it| it.result_id == Some(variable)) {
+        it.result_type = Some(to_number);
+    }
+    Some(number)
 }
 
 /// `x % y` of signed numbers is `x - x / y * y`: quotients are truncated everywhere.

@@ -21,6 +21,9 @@ const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
 /// WebGPU's feature for operations of subgroups, and WGSL's extension.
 const SUBGROUPS: &str = "subgroups";
 
+/// WebGPU's feature for numbers of primitives.
+const PRIMITIVES: &str = "primitive-index";
+
 /// WGSL's language feature for push constants.
 const IMMEDIATES: &str = "immediate_address_space";
 
@@ -92,6 +95,9 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     }
     if ir.globals().any(|(_, inner)| reads_storage(inner)) {
         requires.push(READ_STORAGE.to_owned());
+    }
+    if source.contains("enable primitive_index;") {
+        requires.push(PRIMITIVES.to_owned());
     }
     let entry_point = text::name_before(&source_after_stage(&source), "(")
         .unwrap_or_else(|| job.kernel.name.clone());

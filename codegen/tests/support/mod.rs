@@ -273,7 +273,7 @@ pub fn fullscreen() -> Kernel {
             Output::Varying {
                 location: 0,
                 ty: vector(2),
-                flat: false,
+                interpolation: Interpolation::Perspective,
             },
         ],
     )
@@ -301,7 +301,7 @@ pub fn tint() -> Kernel {
                 Role::Varying {
                     location: 0,
                     ty: vector(2),
-                    flat: false,
+                    interpolation: Interpolation::Perspective,
                 },
             ),
         ],

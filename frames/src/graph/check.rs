@@ -540,16 +540,21 @@ impl Graph {
         let vertex = &self.kernels[vertex.kernel].kernel;
         let fragment = &self.kernels[kernel].kernel;
         for param in &fragment.params {
-            let Role::Varying { location, ty, flat } = &param.role else {
+            let Role::Varying {
+                location,
+                ty,
+                interpolation,
+            } = &param.role
+            else {
                 continue;
             };
             let is_float = match ty {
                 Type::Scalar { scalar } | Type::Vector { scalar, .. } => *scalar == Scalar::F32,
                 _ => false,
             };
-            if *flat || !is_float {
-                let problem = "frames interpolate what goes from stage to stage: take an f32 or a \
-                               vector of them, not flat";
+            if !interpolation.is_usual() || !is_float {
+                let problem = "frames interpolate what goes from stage to stage at the centre of each \
+                               pixel, in perspective: take an f32 or a vector of them as it is";
                 return Err(place.argument(&param.name, problem));
             }
             let handed = vertex.outputs.iter().find_map(|o| match o {

@@ -150,7 +150,7 @@ impl Arguments<'_, '_> {
     /// The size that an output asks for; none for other arguments.
     fn size(&self, i: usize) -> Result<Option<[u32; 3]>> {
         // Outputs come last; a texture before them is a parameter, which may be of any size.
-        if i + self.kernel.outputs.len() < self.slots.len() {
+        if i + self.kernel.stored_outputs() < self.slots.len() {
             return Ok(None);
         }
         Ok(match (self.slots[i].role, self.given[i]) {
@@ -204,7 +204,7 @@ impl Arguments<'_, '_> {
     /// Nothing has an element or a texel of its own for each invocation: whether there are enough
     /// cannot be checked where a buffer says the range.
     fn none_for_each_invocation(&self, says: usize) -> Result<()> {
-        let first_output = self.slots.len() - self.kernel.outputs.len();
+        let first_output = self.slots.len() - self.kernel.stored_outputs();
         for (i, slot) in self.slots.iter().enumerate() {
             let own = matches!(slot.role, Use::Element(_) | Use::ElementMut(_));
             if own || i >= first_output {

@@ -263,6 +263,8 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
             ),
             Output::Position => (None, Use::Interface(&POSITION)),
             Output::Depth => (None, Use::Interface(&DEPTH)),
+            // What it leaves of the others is compared.
+            Output::SampleMask => continue,
             Output::Varying { ty, .. } | Output::Target { ty, .. } => (None, Use::Interface(ty)),
         };
         let name = if kernel.outputs.len() == 1 {

@@ -1,8 +1,8 @@
 //! Runs a case of any stage on a device, and gives back what was written.
 
 use hankel_dsl::native::describe::{
-    Inputs, Kernel, Output, Param, Role, Rounding, Scalar, Stage, Subgroups, TexelFormat,
-    Tolerance, Type,
+    Inputs, Interpolation, Kernel, Output, Param, Role, Rounding, Scalar, Stage, Subgroups,
+    TexelFormat, Tolerance, Type,
 };
 
 use super::capture;
@@ -260,13 +260,17 @@ fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), Execut
     Ok((scalar, size, text))
 }
 
-/// How the varying at a location is declared.
-fn interpolation(kernel: &Kernel, at: u32) -> &'static str {
-    let flat = kernel
-        .params
-        .iter()
-        .any(|p| matches!(p.role, Role::Varying { location, flat: true, .. } if location == at));
-    if flat { "@interpolate(flat) " } else { "" }
+/// How the varying at a location is interpolated.
+fn interpolation(kernel: &Kernel, at: u32) -> Interpolation {
+    let found = kernel.params.iter().find_map(|p| match p.role {
+        Role::Varying {
+            location,
+            interpolation,
+            ..
+        } if location == at => Some(interpolation),
+        _ => None,
+    });
+    found.unwrap_or_default()
 }
 
 /// The bytes of `count` values of `size` components out of texels of four.
@@ -308,9 +312,12 @@ fn fragment(
         match slot.role {
             Use::Varying(location, ty) => {
                 let (_, _, text) = interface(kernel, ty)?;
-                let flat = interpolation(kernel, location);
+                let interpolation = interpolation(kernel, location);
+                let how = interpolation
+                    .words()
+                    .map_or_else(String::new, |words| format!("@interpolate({words}) "));
                 members.push_str(&format!(
-                    "@location({location}) {flat}v{location}: {text},\n"
+                    "@location({location}) {how}v{location}: {text},\n"
                 ));
                 inputs.push_str(&format!("@location({location}) v{location}: {text},\n"));
                 copies.push_str(&format!("o.v{location} = v{location};\n"));
@@ -325,7 +332,7 @@ fn fragment(
                 outputs.push(Output::Varying {
                     location,
                     ty: ty.clone(),
-                    flat: !flat.is_empty(),
+                    interpolation,
                 });
                 vertex_args.push(*bind);
             }
@@ -450,7 +457,13 @@ fn vertex(
             Output::Position => Output::Varying {
                 location: captured.location,
                 ty: slots::POSITION,
-                flat: false,
+                interpolation: Interpolation::Flat,
+            },
+            // Each fragment is a point, over which nothing is interpolated.
+            Output::Varying { location, ty, .. } => Output::Varying {
+                location: *location,
+                ty: ty.clone(),
+                interpolation: Interpolation::Flat,
             },
             other => other.clone(),
         })
@@ -513,7 +526,7 @@ fn vertex(
                 role: Role::Varying {
                     location: *location,
                     ty: ty.clone(),
-                    flat: true,
+                    interpolation: Interpolation::Flat,
                 },
                 inputs: Inputs::default(),
             }],

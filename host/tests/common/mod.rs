@@ -553,7 +553,7 @@ pub fn place() -> Sample {
             Output::Varying {
                 location: 0,
                 ty: vector(f, 4),
-                flat: false,
+                interpolation: Interpolation::Perspective,
             },
         ],
     );
@@ -620,7 +620,7 @@ pub fn tint() -> Sample {
                 Role::Varying {
                     location: 0,
                     ty: vector(f, 4),
-                    flat: false,
+                    interpolation: Interpolation::Perspective,
                 },
             ),
         ],

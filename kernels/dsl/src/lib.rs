@@ -161,8 +161,8 @@ pub use real::{Mask, Real, to_i32};
 #[doc(hidden)]
 pub use spirv_std;
 pub use stage::{
-    Depth, Derivative, Flat, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine,
-    fwidth, fwidth_coarse, fwidth_fine,
+    Centroid, Depth, Derivative, Flat, Linear, PerSample, SampleMask, discard, dpdx, dpdx_coarse,
+    dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth, fwidth_coarse, fwidth_fine,
 };
 pub use storage::{StorageMut, Stored};
 pub use storage_texture::{
@@ -178,9 +178,9 @@ pub use subgroup::{
     subgroup_shuffle_up, subgroup_shuffle_xor, subgroup_xor,
 };
 pub use texture::{
-    Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,
-    Texel, Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
-    TextureCubeArray,
+    Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube,
+    DepthTextureCubeArray, Sampler, Shifted, Texel, Texture1d, Texture2d, Texture2dArray,
+    Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray,
 };
 pub use workgroup::{Shared, SharedAtomics, barrier, storage_barrier};
 

@@ -1,5 +1,5 @@
 //! What vertex and fragment kernels say beyond a map from their inputs to their outputs: a depth of
-//! their own, values that are not interpolated, fragments that are dropped, derivatives.
+//! their own, how values are interpolated, fragments that are dropped, derivatives.
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -18,6 +18,35 @@ pub struct Depth(pub f32);
 /// primitive the same value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flat<T>(pub T);
+
+/// A value that is interpolated linearly on the screen, without the perspective's division:
+/// `noperspective` of GLSL and HLSL, `@interpolate(linear)` of WGSL. GLSL ES does not have it.
+///
+/// A vertex kernel returns it, `-> (Vec4, Linear<Vec2>)`, and the fragment kernel takes the same,
+/// `#[varying] x: Linear<Vec2>`; also with [`Centroid`] or [`PerSample`] inside, `Linear<Centroid<Vec2>>`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Linear<T>(pub T);
+
+/// A value that is interpolated at a place that lies in the pixel and in its primitive. A pixel's
+/// centre may lie beyond an edge of the primitive, where values are extrapolated, if the target has
+/// several samples. Both stages say it, as for [`Linear`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Centroid<T>(pub T);
+
+/// A value that is interpolated at each sample of a target with several samples. The fragment kernel
+/// then runs once for each sample. Both stages say it, as for [`Linear`]. GLSL ES 3.10 and 3.00 do not have
+/// it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PerSample<T>(pub T);
+
+/// Which samples of the pixel a fragment writes, a bit for each, the first sample's the lowest. Samples that
+/// its primitive does not cover stay as they are. A fragment kernel returns it beside its colours:
+/// `-> (Vec4, SampleMask)`. GLSL ES 3.10 and 3.00 do not have it.
+///
+/// On the host a pixel has one sample: without the lowest bit nothing of the fragment is written to its
+/// targets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleMask(pub u32);
 
 /// Drops the fragment: nothing of it is written, no colour and no depth.
 ///

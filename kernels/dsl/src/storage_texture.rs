@@ -48,6 +48,12 @@ pub mod format {
                 }
                 #[cfg(target_arch = "spirv")]
                 #[inline(always)]
+                fn layers(image: &Self::Layers) -> u32 {
+                    let size: glam::UVec3 = image.query_size();
+                    size.z
+                }
+                #[cfg(target_arch = "spirv")]
+                #[inline(always)]
                 fn volume_size(image: &Self::Volume) -> glam::UVec3 {
                     image.query_size()
                 }
@@ -123,6 +129,9 @@ pub trait Format: Copy {
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
     fn layers_size(image: &Self::Layers) -> UVec2;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
+    fn layers(image: &Self::Layers) -> u32;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
     fn volume_size(image: &Self::Volume) -> UVec3;
@@ -240,4 +249,20 @@ textures! {
     /// A texture of three dimensions.
     StorageTexture3d, Volume, volume_size, UVec3,
         (at: UVec3), at, at, |size| size;
+}
+
+impl<F: Format, A: Access> StorageTexture2dArray<'_, F, A> {
+    /// Layers, 1 or more.
+    #[inline]
+    #[must_use]
+    pub fn layers(self) -> u32 {
+        #[cfg(target_arch = "spirv")]
+        {
+            F::layers(self.0)
+        }
+        #[cfg(not(target_arch = "spirv"))]
+        {
+            self.0.size()[2]
+        }
+    }
 }

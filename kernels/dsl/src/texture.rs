@@ -64,6 +64,65 @@ pub mod image {
         result
     }
 
+    /// Functions that sample at a constant offset in texels, which spirv-std does not have. `$operands` are the image
+    /// operands, the offset last among them. It is made of two constants, of which `codegen` makes one.
+    macro_rules! shifted {
+        ($($(#[doc = $doc:literal])* $name:ident($($arg:ident: $ty:ty),*) -> $result:ty = $op:literal, $operands:literal;)*) => { $(
+            $(#[doc = $doc])*
+            ///
+            /// # Safety
+            /// The types fit the image.
+            #[inline(always)]
+            pub unsafe fn $name<I, C, const X: i32, const Y: i32>(
+                image: &I,
+                sampler: spirv_std::Sampler,
+                at: C,
+                $($arg: $ty,)*
+            ) -> $result {
+                let mut result = <$result>::default();
+                let offset = glam::IVec2::ZERO;
+                // SAFETY: the caller's.
+                unsafe {
+                    asm!(
+                        "%image = OpLoad _ {image}",
+                        "%sampler = OpLoad _ {sampler}",
+                        "%at = OpLoad _ {at}",
+                        $(concat!("%", stringify!($arg), " = OpLoad _ {", stringify!($arg), "}"),)*
+                        "%offset = OpCompositeConstruct typeof*{offset} {x} {y}",
+                        "%sampled = OpSampledImage _ %image %sampler",
+                        concat!("%result = ", $op, " typeof*{result} %sampled %at ", $operands, " %offset"),
+                        "OpStore {result} %result",
+                        image = in(reg) image, sampler = in(reg) &sampler, at = in(reg) &at,
+                        $($arg = in(reg) &$arg,)*
+                        offset = in(reg) &offset, x = in(reg) X, y = in(reg) Y,
+                        result = in(reg) &mut result,
+                    );
+                }
+                result
+            }
+        )* };
+    }
+    shifted! {
+        /// At the fragment's level.
+        sample_shifted() -> glam::Vec4 = "OpImageSampleImplicitLod", "ConstOffset";
+        /// The same with a bias.
+        sample_bias_shifted(bias: f32) -> glam::Vec4 = "OpImageSampleImplicitLod", "Bias|ConstOffset %bias";
+        /// At a level.
+        sample_level_shifted(level: f32) -> glam::Vec4 = "OpImageSampleExplicitLod", "Lod|ConstOffset %level";
+        /// At the level of derivatives.
+        sample_gradient_shifted(dx: glam::Vec2, dy: glam::Vec2) -> glam::Vec4
+            = "OpImageSampleExplicitLod", "Grad|ConstOffset %dx %dy";
+        /// A channel of four texels.
+        gather_shifted(channel: u32) -> glam::Vec4 = "OpImageGather", "%channel ConstOffset";
+        /// A comparison at the fragment's level.
+        compare_shifted(reference: f32) -> f32 = "OpImageSampleDrefImplicitLod", "%reference ConstOffset";
+        /// A comparison at a level.
+        compare_level_shifted(reference: f32, level: f32) -> f32
+            = "OpImageSampleDrefExplicitLod", "%reference Lod|ConstOffset %level";
+        /// Comparisons of four texels.
+        gather_compare_shifted(reference: f32) -> glam::Vec4 = "OpImageDrefGather", "%reference ConstOffset";
+    }
+
     pub type Texture1d = Image!(1D, type=f32, sampled);
     pub type Texture2d = Image!(2D, type=f32, sampled);
     pub type Texture2dArray = Image!(2D, type=f32, sampled, arrayed);
@@ -74,6 +133,7 @@ pub mod image {
     pub type DepthTexture2d = Image!(2D, type=f32, sampled, depth);
     pub type DepthTexture2dArray = Image!(2D, type=f32, sampled, arrayed, depth);
     pub type DepthTextureCube = Image!(cube, type=f32, sampled, depth);
+    pub type DepthTextureCubeArray = Image!(cube, type=f32, sampled, arrayed, depth);
     pub type UintTexture2d = Image!(2D, type=u32, sampled);
     pub type UintTexture2dArray = Image!(2D, type=u32, sampled, arrayed);
     pub type UintTexture3d = Image!(3D, type=u32, sampled);
@@ -143,6 +203,8 @@ textures! {
     DepthTexture2dArray;
     /// Such depths on the faces of a cube.
     DepthTextureCube;
+    /// Such cubes in an array.
+    DepthTextureCubeArray;
 }
 
 /// What the channels of a texture are: `f32`, `u32` or `i32`.
@@ -233,6 +295,12 @@ textures_of! {
     Texture3d;
 }
 
+/// A texture of two dimensions, or an array of them, that is read `X` texels further to the right and `Y` further down
+/// than the coordinates say, at whichever level: [`Texture2d::shifted`] makes it. What lies beyond the edge follows from the
+/// sampler, as ever.
+#[derive(Clone, Copy)]
+pub struct Shifted<T, const X: i32, const Y: i32>(T);
+
 /// How a texture is filtered between texels, between levels, and beyond the edge.
 #[derive(Clone, Copy)]
 pub struct Sampler(
@@ -311,6 +379,27 @@ mod spirv {
         DepthTexture2d<'_>: UVec2, UVec2, |size| size;
         DepthTexture2dArray<'_>: UVec2, UVec3, UVec3::truncate;
         DepthTextureCube<'_>: UVec2, UVec2, |size| size;
+        DepthTextureCubeArray<'_>: UVec2, UVec3, UVec3::truncate;
+    }
+
+    macro_rules! layers {
+        ($($name:ty: $count:ident;)*) => { $(
+            impl $name {
+                #[inline(always)]
+                pub fn $count(self) -> u32 {
+                    let size: UVec3 = self.0.query_size_lod(0);
+                    size.z
+                }
+            }
+        )* };
+    }
+    layers! {
+        Texture2dArray<'_>: layers;
+        Texture2dArray<'_, u32>: layers;
+        Texture2dArray<'_, i32>: layers;
+        DepthTexture2dArray<'_>: layers;
+        TextureCubeArray<'_>: cubes;
+        DepthTextureCubeArray<'_>: cubes;
     }
 
     macro_rules! loads {
@@ -424,6 +513,7 @@ mod spirv {
         DepthTexture2d: (uv: Vec2), uv;
         DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
         DepthTextureCube: (direction: Vec3), direction;
+        DepthTextureCubeArray: (direction: Vec3, cube: u32), direction.extend(cube as f32);
     }
 
     macro_rules! compared_gathers {
@@ -446,6 +536,97 @@ mod spirv {
         DepthTexture2d: (uv: Vec2), uv;
         DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
         DepthTextureCube: (direction: Vec3), direction;
+        DepthTextureCubeArray: (direction: Vec3, cube: u32), direction.extend(cube as f32);
+    }
+
+    macro_rules! shifted {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
+                    Shifted(self)
+                }
+            }
+            impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
+                #[inline(always)]
+                pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    // SAFETY: the types fit, here and below.
+                    unsafe { image::sample_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at) }
+                }
+                #[inline(always)]
+                pub fn sample_bias(self, sampler: Sampler, $($arg: $ty,)* bias: f32) -> Vec4 {
+                    // SAFETY: as above.
+                    unsafe { image::sample_bias_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, bias) }
+                }
+                #[inline(always)]
+                pub fn sample_level(self, sampler: Sampler, $($arg: $ty,)* level: f32) -> Vec4 {
+                    // SAFETY: as above.
+                    unsafe { image::sample_level_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, level) }
+                }
+                #[inline(always)]
+                pub fn sample_gradient(
+                    self,
+                    sampler: Sampler,
+                    $($arg: $ty,)*
+                    dx: Vec2,
+                    dy: Vec2,
+                ) -> Vec4 {
+                    // SAFETY: as above.
+                    unsafe { image::sample_gradient_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, dx, dy) }
+                }
+                #[inline(always)]
+                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    // SAFETY: as above.
+                    unsafe { image::gather_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, CHANNEL) }
+                }
+            }
+        )* };
+    }
+    shifted! {
+        Texture2d: (uv: Vec2), uv;
+        Texture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+    }
+
+    macro_rules! shifted_comparisons {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
+                    Shifted(self)
+                }
+            }
+            impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
+                #[inline(always)]
+                pub fn compare(self, sampler: ComparisonSampler, $($arg: $ty,)* reference: f32) -> f32 {
+                    // SAFETY: the types fit, here and below.
+                    unsafe { image::compare_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, reference) }
+                }
+                #[inline(always)]
+                pub fn compare_level_zero(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> f32 {
+                    // SAFETY: as above.
+                    unsafe { image::compare_level_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, reference, 0.0) }
+                }
+                #[inline(always)]
+                pub fn gather_compare(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> Vec4 {
+                    // SAFETY: as above.
+                    unsafe { image::gather_compare_shifted::<_, _, X, Y>(self.0.0, sampler.0, $at, reference) }
+                }
+            }
+        )* };
+    }
+    shifted_comparisons! {
+        DepthTexture2d: (uv: Vec2), uv;
+        DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
     }
 
     impl Texture1d<'_> {
@@ -483,9 +664,10 @@ mod spirv {
 #[cfg(not(target_arch = "spirv"))]
 mod host {
     use super::{
-        Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, Sampler,
-        Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
-        TextureCubeArray, UVec2, UVec3, Vec2, Vec3, Vec4,
+        Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube,
+        DepthTextureCubeArray, Sampler, Shifted, Texture1d, Texture2d, Texture2dArray,
+        Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray, UVec2, UVec3, Vec2, Vec3,
+        Vec4,
     };
     use crate::native::sampling::{self, Place};
     use crate::native::{TextureRef, fragment, level_size, sanitize};
@@ -496,6 +678,16 @@ mod host {
             at: Vec3::new(uv.x, uv.y, 0.0),
             dimensions: 2,
             layer,
+            shift: [0; 2],
+        }
+    }
+
+    const fn shifted(uv: Vec2, layer: u32, shift: [i32; 2]) -> Place {
+        Place::Flat {
+            at: Vec3::new(uv.x, uv.y, 0.0),
+            dimensions: 2,
+            layer,
+            shift,
         }
     }
 
@@ -504,6 +696,7 @@ mod host {
             at,
             dimensions: 3,
             layer: 0,
+            shift: [0; 2],
         }
     }
 
@@ -562,6 +755,30 @@ mod host {
         () DepthTexture2d<'_>: UVec2, UVec3::truncate;
         () DepthTexture2dArray<'_>: UVec2, UVec3::truncate;
         () DepthTextureCube<'_>: UVec2, UVec3::truncate;
+        () DepthTextureCubeArray<'_>: UVec2, UVec3::truncate;
+    }
+
+    macro_rules! layers {
+        ($($(#[doc = $doc:literal])* ($($of:tt)*) $name:ty: $count:ident, $faces:literal;)*) => { $(
+            impl $($of)* $name {
+                $(#[doc = $doc])*
+                #[inline]
+                #[must_use]
+                pub fn $count(self) -> u32 {
+                    self.0.layers / $faces
+                }
+            }
+        )* };
+    }
+    layers! {
+        /// Layers, 1 or more.
+        (<T: Channel>) Texture2dArray<'_, T>: layers, 1;
+        /// Layers, 1 or more.
+        () DepthTexture2dArray<'_>: layers, 1;
+        /// Cubes, 1 or more.
+        () TextureCubeArray<'_>: cubes, 6;
+        /// Cubes, 1 or more.
+        () DepthTextureCubeArray<'_>: cubes, 6;
     }
 
     macro_rules! loads {
@@ -716,6 +933,7 @@ mod host {
         DepthTexture2d: (uv: Vec2), flat(uv, 0);
         DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
         DepthTextureCube: (direction: Vec3), cube(direction, 0);
+        DepthTextureCubeArray: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
     }
 
     macro_rules! compared_gathers {
@@ -740,6 +958,131 @@ mod host {
         DepthTexture2d: (uv: Vec2), flat(uv, 0);
         DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
         DepthTextureCube: (direction: Vec3), cube(direction, 0);
+        DepthTextureCubeArray: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
+    }
+
+    /// What every language has.
+    const fn is_offset(x: i32, y: i32) -> bool {
+        x >= -8 && x <= 7 && y >= -8 && y <= 7
+    }
+
+    macro_rules! shifted {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $uv:ident, $layer:expr;)*) => { $(
+            impl $name<'_> {
+                /// The same texture, read `X` texels further to the right and `Y` further down: each from -8 to 7.
+                #[inline]
+                #[must_use]
+                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
+                    const { assert!(is_offset(X, Y), "an offset is from -8 to 7 texels") };
+                    Shifted(self)
+                }
+            }
+            impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
+                /// [`Texture2d::sample`] at the offset.
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    let place = shifted($uv, $layer, [X, Y]);
+                    let detail = detail(&self.0.0, place, Location::caller());
+                    sampling::sample(&self.0.0, &sampler.0, place, detail)
+                }
+                /// [`Texture2d::sample_bias`] at the offset.
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn sample_bias(self, sampler: Sampler, $($arg: $ty,)* bias: f32) -> Vec4 {
+                    let place = shifted($uv, $layer, [X, Y]);
+                    let detail = detail(&self.0.0, place, Location::caller());
+                    sampling::sample(&self.0.0, &sampler.0, place, detail + bias)
+                }
+                /// [`Texture2d::sample_level`] at the offset.
+                #[inline]
+                #[must_use]
+                pub fn sample_level(self, sampler: Sampler, $($arg: $ty,)* level: f32) -> Vec4 {
+                    sampling::sample(&self.0.0, &sampler.0, shifted($uv, $layer, [X, Y]), level)
+                }
+                /// [`Texture2d::sample_gradient`] at the offset.
+                #[inline]
+                #[must_use]
+                pub fn sample_gradient(
+                    self,
+                    sampler: Sampler,
+                    $($arg: $ty,)*
+                    dx: Vec2,
+                    dy: Vec2,
+                ) -> Vec4 {
+                    let place = shifted($uv, $layer, [X, Y]);
+                    let detail = sampling::detail(&self.0.0, place, dx.extend(0.0), dy.extend(0.0));
+                    sampling::sample(&self.0.0, &sampler.0, place, detail)
+                }
+                /// [`Texture2d::gather`] at the offset.
+                #[inline]
+                #[must_use]
+                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                    const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
+                    let place = shifted($uv, $layer, [X, Y]);
+                    sampling::gather(&self.0.0, &sampler.0, place, CHANNEL as usize)
+                }
+            }
+        )* };
+    }
+    shifted! {
+        Texture2d: (uv: Vec2), uv, 0;
+        Texture2dArray: (uv: Vec2, layer: u32), uv, layer;
+    }
+
+    macro_rules! shifted_comparisons {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $uv:ident, $layer:expr;)*) => { $(
+            impl $name<'_> {
+                /// The same texture, read `X` texels further to the right and `Y` further down: each from -8 to 7.
+                #[inline]
+                #[must_use]
+                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
+                    const { assert!(is_offset(X, Y), "an offset is from -8 to 7 texels") };
+                    Shifted(self)
+                }
+            }
+            impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
+                /// [`DepthTexture2d::compare`] at the offset.
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn compare(self, sampler: ComparisonSampler, $($arg: $ty,)* reference: f32) -> f32 {
+                    let place = shifted($uv, $layer, [X, Y]);
+                    let detail = detail(&self.0.0, place, Location::caller());
+                    sampling::compare(&self.0.0, &sampler.0, place, reference, detail)
+                }
+                /// [`DepthTexture2d::compare_level_zero`] at the offset.
+                #[inline]
+                #[must_use]
+                pub fn compare_level_zero(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> f32 {
+                    let place = shifted($uv, $layer, [X, Y]);
+                    sampling::compare(&self.0.0, &sampler.0, place, reference, 0.0)
+                }
+                /// [`DepthTexture2d::gather_compare`] at the offset.
+                #[inline]
+                #[must_use]
+                pub fn gather_compare(
+                    self,
+                    sampler: ComparisonSampler,
+                    $($arg: $ty,)*
+                    reference: f32,
+                ) -> Vec4 {
+                    let place = shifted($uv, $layer, [X, Y]);
+                    sampling::gather_compare(&self.0.0, &sampler.0, place, reference)
+                }
+            }
+        )* };
+    }
+    shifted_comparisons! {
+        DepthTexture2d: (uv: Vec2), uv, 0;
+        DepthTexture2dArray: (uv: Vec2, layer: u32), uv, layer;
     }
 
     impl Texture1d<'_> {
@@ -767,6 +1110,7 @@ mod host {
                 at: Vec3::new(u, 0.0, 0.0),
                 dimensions: 1,
                 layer: 0,
+                shift: [0; 2],
             };
             let detail = detail(&self.0, place, Location::caller());
             sampling::sample(&self.0, &sampler.0, place, detail)

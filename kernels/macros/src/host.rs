@@ -328,11 +328,11 @@ impl Kernel {
                         quote!(Attribute { location: #l, ty: <#ty as layout::Element>::ty() })
                     }
                     Role::Varying(passed) => {
-                        let (ty, flat) = (&passed.ty, passed.flat());
+                        let (ty, interpolation) = (&passed.ty, passed.describe());
                         quote!(Varying {
                             location: #l,
                             ty: <#ty as layout::Element>::ty(),
-                            flat: #flat,
+                            interpolation: #interpolation,
                         })
                     }
                 };
@@ -344,6 +344,18 @@ impl Kernel {
                 })
             })
             .collect()
+    }
+
+    /// How many of the outputs the host has arrays or textures for.
+    fn stored_on_host(&self) -> usize {
+        match self.stage {
+            Stage::Compute(_) => self.outputs.len(),
+            _ => self
+                .returned()
+                .iter()
+                .filter(|it| it.is_stored_on_host())
+                .count(),
+        }
     }
 
     fn describe_outputs(&self, variant: &Variant) -> Vec<TokenStream> {
@@ -390,7 +402,7 @@ impl Kernel {
                     p.role.is_bound() || matches!(p.role, Role::Attribute(_) | Role::Varying(_))
                 })
                 .count()
-                + self.outputs.len(),
+                + self.stored_on_host(),
             self.params
                 .iter()
                 .filter(|p| matches!(p.role, Role::Constant { .. }))
@@ -676,11 +688,18 @@ impl Kernel {
     fn run_interface(&self, variant: &Variant) -> TokenStream {
         let call = self.host_call(variant);
         let checks = self.length_checks();
-        let names: Vec<_> = (0..self.outputs.len())
-            .map(|i| output_name(&self.stage, i))
-            .collect();
         let returned = self.returned();
-        let takes = names.iter().zip(&returned).map(|(name, returned)| {
+        // The arrays, and what is written into them.
+        let kept: Vec<_> = returned
+            .iter()
+            .enumerate()
+            .filter(|(_, it)| it.is_stored_on_host())
+            .collect();
+        let names: Vec<_> = kept
+            .iter()
+            .map(|(i, _)| output_name(&self.stage, *i))
+            .collect();
+        let takes = names.iter().zip(&kept).map(|(name, (_, returned))| {
             let (ty, text) = (returned.ty(), text_of(name));
             quote!(let #name = args.slice_mut::<#ty>(#text)?;)
         });
@@ -689,17 +708,22 @@ impl Kernel {
             let text = text_of(name);
             quote!(exec::enough(#text, #name.len(), __count)?;)
         });
-        let values: Vec<_> = (0..names.len())
+        let values: Vec<_> = (0..returned.len())
             .map(|i| format_ident!("__value{i}"))
             .collect();
-        let stored = returned.iter().zip(&values);
-        let stored = stored.map(|(it, value)| it.stored_on_host(value));
+        let masks = returned
+            .iter()
+            .zip(&values)
+            .filter(|(it, _)| !it.is_stored_on_host())
+            .map(|(it, value)| it.stored_on_host(value));
+        let stored = kept.iter().map(|(i, it)| it.stored_on_host(&values[*i]));
         let pattern = match &values[..] {
             [one] => quote!(#one),
             _ => quote!((#(#values),*)),
         };
         let value = quote!({
             let #pattern = #call;
+            #(#masks;)*
             (#(#stored,)*)
         });
         let map = match self.stage {

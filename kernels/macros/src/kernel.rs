@@ -278,10 +278,12 @@ pub enum BuiltIn {
     FragCoord,
     FrontFacing,
     SampleIndex,
+    SampleMask,
+    PrimitiveIndex,
 }
 
 /// Each by the word of its attribute.
-const BUILT_INS: [(&str, BuiltIn); 13] = [
+const BUILT_INS: [(&str, BuiltIn); 15] = [
     ("local_id", BuiltIn::LocalId),
     ("local_index", BuiltIn::LocalIndex),
     ("group_id", BuiltIn::GroupId),
@@ -295,6 +297,8 @@ const BUILT_INS: [(&str, BuiltIn); 13] = [
     ("frag_coord", BuiltIn::FragCoord),
     ("front_facing", BuiltIn::FrontFacing),
     ("sample_index", BuiltIn::SampleIndex),
+    ("sample_mask", BuiltIn::SampleMask),
+    ("primitive_index", BuiltIn::PrimitiveIndex),
 ];
 
 impl BuiltIn {
@@ -327,13 +331,15 @@ impl BuiltIn {
                 Self::FragCoord => "FragCoord",
                 Self::FrontFacing => "FrontFacing",
                 Self::SampleIndex => "SampleIndex",
+                Self::SampleMask => "SampleMask",
+                Self::PrimitiveIndex => "PrimitiveIndex",
             }
         )
     }
 }
 
 /// Types of textures that are read.
-const TEXTURES: [&str; 10] = [
+const TEXTURES: [&str; 11] = [
     "Texture1d",
     "Texture2d",
     "Texture2dArray",
@@ -344,6 +350,7 @@ const TEXTURES: [&str; 10] = [
     "DepthTexture2d",
     "DepthTexture2dArray",
     "DepthTextureCube",
+    "DepthTextureCubeArray",
 ];
 
 /// Those that may hold integers, `Texture2d<'_, u32>`.
@@ -449,7 +456,7 @@ impl Role {
 /// Variables of the generated code.
 const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
 
-const ROLES: &str = "uniform, push, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index";
+const ROLES: &str = "uniform, push, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index, sample_mask, primitive_index";
 
 impl Kernel {
     pub fn parse(args: TokenStream, mut item: ItemFn) -> syn::Result<Self> {
@@ -605,7 +612,12 @@ impl Kernel {
         for p in &self.params {
             let span = p.name.span();
             match (&p.role, &self.stage) {
-                (Role::Attribute(_), Stage::Vertex) | (Role::Varying(_), Stage::Fragment) => {}
+                (Role::Attribute(_), Stage::Vertex) => {}
+                (Role::Varying(passed), Stage::Fragment) => {
+                    if let Some(problem) = passed.problem() {
+                        return error(span, problem);
+                    }
+                }
                 (Role::Attribute(_), _) => {
                     return error(span, "only a vertex kernel has attributes");
                 }
@@ -641,6 +653,9 @@ impl Kernel {
                 }
                 _ => {}
             }
+        }
+        if compute.is_none() {
+            self.check_returned()?;
         }
         if let Some(second) = self.params.iter().filter(|p| p.push).nth(1) {
             return error(
@@ -742,7 +757,10 @@ impl Kernel {
         let unused = (self.form() == Form::Cooperative).then(|| quote!(#[allow(dead_code)]));
         quote! {
             #[inline(always)]
-            #[allow(clippy::too_many_arguments, reason = "the parameters of a kernel are what is bound to it")]
+            #[allow(
+                clippy::too_many_arguments, clippy::type_complexity,
+                reason = "the parameters of a kernel are what is bound to it, and it returns all that it makes"
+            )]
             #unused
             #item
 

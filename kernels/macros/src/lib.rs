@@ -50,7 +50,7 @@ use syn::parse_macro_input;
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
-/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube`; of integers: `Texture2d<'_, u32>`, `Texture2dArray<'_, i32>`, `Texture3d<'_, u32>` |
+/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube`, `DepthTextureCubeArray`; of integers: `Texture2d<'_, u32>`, `Texture2dArray<'_, i32>`, `Texture3d<'_, u32>` |
 /// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture2dArray`, `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
 /// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` for depths |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
@@ -60,15 +60,17 @@ use syn::parse_macro_input;
 /// | `#[subgroup_size]`, `#[subgroup_invocation_id]`, `#[subgroup_id]`, `#[subgroup_count] x: u32` | how many invocations the subgroup has, the invocation's number in it, its number in the workgroup, how many the workgroup has |
 /// | `#[shared] x: Shared<'_, T, N>` | memory of the workgroup; `SharedAtomics<'_, u32, N>` (or `i32`) for atomic operations |
 /// | `#[attribute] x: Vec3` | a vertex attribute |
-/// | `#[varying] x: Vec3` | an interpolated value; integers and `Flat<f32>` are that of one vertex |
+/// | `#[varying] x: Vec3` | an interpolated value; integers and `Flat<f32>` are that of one vertex. `Linear<T>`, `Centroid<T>`, `PerSample<T>` say how |
 /// | `#[vertex_index]`, `#[instance_index] x: u32` | the vertex's number, its instance's |
 /// | `#[frag_coord] x: Vec3` | the centre of the fragment's pixel in the target, and its depth |
 /// | `#[front_facing] x: bool` | whether the fragment's primitive faces the viewer |
 /// | `#[sample_index] x: u32` | the sample that the fragment is for |
+/// | `#[sample_mask] x: u32` | the samples of the pixel that the primitive covers, a bit for each |
+/// | `#[primitive_index] x: u32` | the primitive's number |
 ///
 /// A compute kernel returns what it computes, or a tuple of it; or nothing, if it writes to its
 /// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
-/// fragment kernel one colour or a tuple of them, among which may be a `Depth`. It may
+/// fragment kernel one colour or a tuple of them, among which may be a `Depth` and a `SampleMask`. It may
 /// `discard` the fragment, take derivatives (`dpdx`), and write memory behind the last of them.
 ///
 /// # Inputs

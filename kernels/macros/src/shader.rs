@@ -288,6 +288,8 @@ impl Kernel {
                 Role::BuiltIn(BuiltIn::FragCoord) => {
                     quote!(::hankel_dsl::glam::Vec4::truncate(#name))
                 }
+                // SPIR-V's mask is an array of such numbers.
+                Role::BuiltIn(BuiltIn::SampleMask) => quote!(#name[0]),
                 Role::BuiltIn(_) => quote!(#name),
             }
         });

@@ -2,42 +2,95 @@
 //! built-ins.
 
 use proc_macro2::{Ident, TokenStream};
-use quote::quote;
+use quote::{format_ident, quote};
 use syn::Type;
+use syn::spanned::Spanned as _;
 
 use crate::kernel::{BuiltIn, Kernel, Role, Stage, argument, last_segment};
 
 /// A type at a stage's interface.
 pub struct Passed {
-    /// The value's, without `Flat`.
+    /// The value's, without what says how it is interpolated.
     pub ty: Type,
-    /// It is a `Flat<T>`.
-    wrapped: bool,
+    /// What it is wrapped in, from the outside.
+    wrappers: Vec<Wrapper>,
+}
+
+/// The DSL's types that say how a value is interpolated.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Wrapper {
+    Flat,
+    Linear,
+    Centroid,
+    PerSample,
 }
 
 impl Passed {
     pub fn of(ty: &Type) -> Self {
-        match argument(ty, "Flat") {
-            Some(ty) => Self { ty, wrapped: true },
-            None => Self {
-                ty: ty.clone(),
-                wrapped: false,
-            },
+        let all = [
+            Wrapper::Flat,
+            Wrapper::Linear,
+            Wrapper::Centroid,
+            Wrapper::PerSample,
+        ];
+        let (mut ty, mut wrappers) = (ty.clone(), Vec::new());
+        while let Some((wrapper, inner)) = all
+            .iter()
+            .find_map(|it| Some((*it, argument(&ty, &format!("{it:?}"))?)))
+        {
+            wrappers.push(wrapper);
+            ty = inner;
         }
+        Self { ty, wrappers }
     }
 
-    /// Whether it is that of one vertex. Integers cannot be interpolated.
-    pub fn flat(&self) -> bool {
+    /// Integers cannot be interpolated.
+    fn is_integer(&self) -> bool {
         const INTEGERS: [&str; 8] = [
             "u32", "i32", "UVec2", "UVec3", "UVec4", "IVec2", "IVec3", "IVec4",
         ];
-        self.wrapped
-            || last_segment(&self.ty).is_some_and(|s| INTEGERS.iter().any(|name| s.ident == name))
+        last_segment(&self.ty).is_some_and(|s| INTEGERS.iter().any(|name| s.ident == name))
     }
 
-    /// The attribute of the entry point's parameter.
+    /// The variant of `describe::Interpolation`, if its wrappers go together.
+    fn interpolation(&self) -> Option<Ident> {
+        let name = match (&self.wrappers[..], self.is_integer()) {
+            ([] | [Wrapper::Flat], true) | ([Wrapper::Flat], false) => "Flat",
+            (_, true) => return None,
+            ([], false) => "Perspective",
+            ([Wrapper::Centroid], false) => "PerspectiveCentroid",
+            ([Wrapper::PerSample], false) => "PerspectiveSample",
+            ([Wrapper::Linear], false) => "Linear",
+            ([Wrapper::Linear, Wrapper::Centroid], false) => "LinearCentroid",
+            ([Wrapper::Linear, Wrapper::PerSample], false) => "LinearSample",
+            _ => return None,
+        };
+        Some(format_ident!("{name}"))
+    }
+
+    /// What is wrong with it.
+    pub fn problem(&self) -> Option<&'static str> {
+        match (self.interpolation(), self.is_integer()) {
+            (Some(_), _) => None,
+            (None, true) => Some("integers are not interpolated: take the integer itself"),
+            (None, false) => Some(
+                "it is interpolated in one way: `Flat<T>`, `Linear<T>`, `Centroid<T>`, `PerSample<T>`, `Linear<Centroid<T>>` or `Linear<PerSample<T>>`",
+            ),
+        }
+    }
+
+    /// `describe::Interpolation`.
+    pub fn describe(&self) -> TokenStream {
+        let interpolation = self
+            .interpolation()
+            .unwrap_or_else(|| format_ident!("Perspective"));
+        quote!(describe::Interpolation::#interpolation)
+    }
+
+    /// The attribute of the entry point's parameter. rust-gpu has none for the others: `codegen` adds them by the
+    /// description.
     pub fn decoration(&self) -> TokenStream {
-        if self.flat() {
+        if self.interpolation().is_some_and(|it| it == "Flat") {
             quote!(#[spirv(flat)])
         } else {
             TokenStream::new()
@@ -46,20 +99,20 @@ impl Passed {
 
     /// What the kernel takes, of the value.
     pub fn wrap(&self, value: &TokenStream) -> TokenStream {
-        if self.wrapped {
-            quote!(::hankel_dsl::Flat(#value))
-        } else {
-            value.clone()
-        }
+        self.wrappers
+            .iter()
+            .rev()
+            .fold(value.clone(), |value, wrapper| {
+                let wrapper = format_ident!("{wrapper:?}");
+                quote!(::hankel_dsl::#wrapper(#value))
+            })
     }
 
     /// The value, of what the kernel returns.
     pub fn unwrap(&self, value: &Ident) -> TokenStream {
-        if self.wrapped {
-            quote!(#value.0)
-        } else {
-            quote!(#value)
-        }
+        self.wrappers
+            .iter()
+            .fold(quote!(#value), |value, _| quote!(#value.0))
     }
 }
 
@@ -69,6 +122,7 @@ pub enum Returned {
     Varying { location: u32, passed: Passed },
     Target { location: u32, ty: Type },
     Depth,
+    SampleMask,
 }
 
 impl Kernel {
@@ -89,7 +143,8 @@ impl Kernel {
                     location: next(),
                     passed: Passed::of(ty),
                 },
-                (false, _) if is_depth(ty) => Returned::Depth,
+                (false, _) if is_named(ty, "Depth") => Returned::Depth,
+                (false, _) if is_named(ty, "SampleMask") => Returned::SampleMask,
                 (false, _) => Returned::Target {
                     location: next(),
                     ty: ty.clone(),
@@ -98,9 +153,35 @@ impl Kernel {
             .collect()
     }
 
+    /// What is wrong with what it returns; vertex and fragment kernels only.
+    pub fn check_returned(&self) -> syn::Result<()> {
+        let returned = self.returned();
+        let mut masks = 0;
+        for (it, ty) in returned.iter().zip(&self.outputs) {
+            let problem = match it {
+                Returned::Varying { passed, .. } => passed.problem(),
+                Returned::SampleMask => {
+                    masks += 1;
+                    (masks > 1).then_some("a fragment has one mask")
+                }
+                _ => None,
+            };
+            if let Some(problem) = problem {
+                return Err(syn::Error::new(ty.span(), problem));
+            }
+        }
+        if masks == returned.len() {
+            return Err(syn::Error::new(
+                self.name.span(),
+                "a mask says which samples of something are written: return a colour or a Depth beside it",
+            ));
+        }
+        Ok(())
+    }
+
     /// Whether it is a fragment kernel that returns a depth.
     pub fn returns_depth(&self) -> bool {
-        matches!(self.stage, Stage::Fragment) && self.outputs.iter().any(is_depth)
+        matches!(self.stage, Stage::Fragment) && self.outputs.iter().any(|ty| is_named(ty, "Depth"))
     }
 
     /// Parameters of the entry point for what it knows beside its inputs.
@@ -113,8 +194,8 @@ impl Kernel {
     }
 }
 
-fn is_depth(ty: &Type) -> bool {
-    last_segment(ty).is_some_and(|s| s.ident == "Depth")
+fn is_named(ty: &Type, name: &str) -> bool {
+    last_segment(ty).is_some_and(|s| s.ident == name)
 }
 
 impl Returned {
@@ -128,6 +209,7 @@ impl Returned {
             }
             Self::Target { ty, .. } => quote!(#ty),
             Self::Depth => quote!(f32),
+            Self::SampleMask => quote!([u32; 1]),
         }
     }
 
@@ -138,6 +220,7 @@ impl Returned {
             Self::Varying { passed, .. } => passed.decoration(),
             Self::Target { .. } => TokenStream::new(),
             Self::Depth => quote!(#[spirv(frag_depth)]),
+            Self::SampleMask => quote!(#[spirv(sample_mask)]),
         }
     }
 
@@ -147,13 +230,20 @@ impl Returned {
             Self::Varying { passed, .. } => passed.unwrap(value),
             Self::Position | Self::Target { .. } => quote!(#value),
             Self::Depth => quote!(#value.0),
+            Self::SampleMask => quote!([#value.0]),
         }
+    }
+
+    /// Whether the host has an array for it. A mask says whether the others are written.
+    pub fn is_stored_on_host(&self) -> bool {
+        !matches!(self, Self::SampleMask)
     }
 
     /// The same on the host, which clamps depths itself.
     pub fn stored_on_host(&self, value: &Ident) -> TokenStream {
         match self {
             Self::Depth => quote!(fragment::depth(#value)),
+            Self::SampleMask => quote!(fragment::mask(#value)),
             _ => self.stored(value),
         }
     }
@@ -164,11 +254,11 @@ impl Returned {
         match self {
             Self::Position => quote!(describe::Output::Position),
             Self::Varying { location, passed } => {
-                let flat = passed.flat();
+                let interpolation = passed.describe();
                 quote!(describe::Output::Varying {
                     location: #location,
                     ty: <#ty as layout::Element>::ty(),
-                    flat: #flat,
+                    interpolation: #interpolation,
                 })
             }
             Self::Target { location, .. } => quote!(describe::Output::Target {
@@ -176,6 +266,7 @@ impl Returned {
                 ty: <#ty as layout::Element>::ty(),
             }),
             Self::Depth => quote!(describe::Output::Depth),
+            Self::SampleMask => quote!(describe::Output::SampleMask),
         }
     }
 }
@@ -185,7 +276,14 @@ impl BuiltIn {
     pub fn foreign_to(self, stage: &Stage) -> Option<&'static str> {
         match (self, stage) {
             (Self::VertexIndex | Self::InstanceIndex, Stage::Vertex)
-            | (Self::FragCoord | Self::FrontFacing | Self::SampleIndex, Stage::Fragment)
+            | (
+                Self::FragCoord
+                | Self::FrontFacing
+                | Self::SampleIndex
+                | Self::SampleMask
+                | Self::PrimitiveIndex,
+                Stage::Fragment,
+            )
             | (
                 Self::LocalId
                 | Self::LocalIndex
@@ -201,9 +299,14 @@ impl BuiltIn {
             (Self::VertexIndex | Self::InstanceIndex, _) => {
                 Some("only a vertex kernel knows its vertex and instance")
             }
-            (Self::FragCoord | Self::FrontFacing | Self::SampleIndex, _) => {
-                Some("only a fragment kernel knows its fragment")
-            }
+            (
+                Self::FragCoord
+                | Self::FrontFacing
+                | Self::SampleIndex
+                | Self::SampleMask
+                | Self::PrimitiveIndex,
+                _,
+            ) => Some("only a fragment kernel knows its fragment"),
             _ => Some("workgroups and their memory belong to compute kernels"),
         }
     }
@@ -216,6 +319,8 @@ impl BuiltIn {
             Self::FragCoord => quote!(#[spirv(frag_coord)] #name: Vec4,),
             Self::FrontFacing => quote!(#[spirv(front_facing)] #name: bool,),
             Self::SampleIndex => quote!(#[spirv(sample_id, flat)] #name: u32,),
+            Self::SampleMask => quote!(#[spirv(sample_mask, flat)] #name: [u32; 1],),
+            Self::PrimitiveIndex => quote!(#[spirv(primitive_id, flat)] #name: u32,),
             _ => return None,
         })
     }
@@ -229,6 +334,8 @@ impl BuiltIn {
             Self::FragCoord => quote!(__fragment.coord),
             Self::FrontFacing => quote!(__fragment.front_facing),
             Self::SampleIndex => quote!(__fragment.sample_index),
+            Self::SampleMask => quote!(__fragment.sample_mask),
+            Self::PrimitiveIndex => quote!(__fragment.primitive_index),
             _ => TokenStream::new(),
         }
     }

@@ -14,7 +14,16 @@ pub(super) struct Variable {
 }
 
 /// Qualifiers that the stage before must repeat.
-const REPEATED: [&str; 6] = ["flat", "smooth", "centroid", "highp", "mediump", "lowp"];
+const REPEATED: [&str; 8] = [
+    "flat",
+    "smooth",
+    "noperspective",
+    "centroid",
+    "sample",
+    "highp",
+    "mediump",
+    "lowp",
+];
 
 /// The line with the version, which all stages of a program must share.
 pub(super) fn version(text: &str) -> &str {

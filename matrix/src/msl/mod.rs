@@ -533,6 +533,8 @@ impl Glue {
                 "position" => format!("msl_glue::vector<{of}>(msl->coord)"),
                 "front_facing" => "true".into(),
                 "sample_id" => "0u".into(),
+                "sample_mask" => "1u".into(),
+                "primitive_id" => format!("msl_glue::number<{of}>(msl->invocation)"),
                 _ => return Err(Failure::refused(format!("`{name}` in this stage"))),
             },
             Given::Position(name) => {
@@ -569,6 +571,18 @@ impl Glue {
             .filter(|&i| job.slots[i].role.is_written() && stream(&job.slots[i].role).is_some())
             .collect();
         for member in &structure.members {
+            if member.part == Part::Mask {
+                let _ = writeln!(
+                    self.after,
+                    "    if (!(msl_out.{} & 1u))\n        return;",
+                    member.name
+                );
+            }
+        }
+        for member in &structure.members {
+            if member.part == Part::Mask {
+                continue;
+            }
             let slot = own(job, member)?;
             left.retain(|&i| i != slot);
             let value = match member.part {

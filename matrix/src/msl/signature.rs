@@ -77,10 +77,12 @@ pub enum Part {
     Position,
     /// `[[depth(any)]]`.
     Depth,
+    /// `[[sample_mask]]`.
+    Mask,
 }
 
 /// Positions and indices that an invocation can ask for.
-const POSITIONS: [&str; 17] = [
+const POSITIONS: [&str; 19] = [
     "thread_position_in_grid",
     "thread_position_in_threadgroup",
     "thread_index_in_threadgroup",
@@ -98,6 +100,8 @@ const POSITIONS: [&str; 17] = [
     "position",
     "front_facing",
     "sample_id",
+    "sample_mask",
+    "primitive_id",
 ];
 
 /// How a value is interpolated: of no interest to whoever gives it ready.
@@ -277,6 +281,7 @@ fn parse_member(member: &[String]) -> Result<Member, String> {
             ),
             ("position", None) => Part::Position,
             ("depth", Some("any")) => Part::Depth,
+            ("sample_mask", None) => Part::Mask,
             (other, None) if INTERPOLATIONS.contains(&other) => continue,
             (other, _) => return Err(format!("attribute `{other}` is not known here")),
         };

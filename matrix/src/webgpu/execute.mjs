@@ -29,7 +29,10 @@ const TIER = "texture-formats-tier1";
 /** The feature of operations of subgroups. */
 const SUBGROUPS = "subgroups";
 
-const FEATURES = ["float32-filterable", TIER, SUBGROUPS];
+/** Of numbers of primitives. */
+const PRIMITIVES = "primitive-index";
+
+const FEATURES = ["float32-filterable", TIER, SUBGROUPS, PRIMITIVES];
 
 const FILTERS = ["validation", "out-of-memory", "internal"];
 
@@ -81,6 +84,9 @@ export async function execute(device, job, code, inputs) {
 async function run(device, job, code, inputs, held) {
     if (code.includes("\nenable subgroups;") && !device.features.has(SUBGROUPS)) {
         throw new Error(`the device lacks ${SUBGROUPS}`);
+    }
+    if (code.includes("\nenable primitive_index;") && !device.features.has(PRIMITIVES)) {
+        throw new Error(`the device lacks ${PRIMITIVES}`);
     }
     const maker = new Maker(device, job, code, inputs, held);
     const cases = [];

@@ -1,7 +1,11 @@
 //! Layers, cubes, and textures of one dimension. Levels are as in [`super::sampling`].
 
-use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::{Real, Sampler, Texture1d, Texture2dArray, TextureCube, TextureCubeArray, kernel};
+use hankel_dsl::format::Rgba8Unorm;
+use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
+use hankel_dsl::{
+    DepthTexture2dArray, Real, Sampler, StorageTexture2dArray, Texture1d, Texture2dArray,
+    TextureCube, TextureCubeArray, kernel,
+};
 
 /// Texels of all levels of all layers.
 #[kernel(compute, threads(8, 8), texture(rgba32float))]
@@ -107,4 +111,50 @@ pub fn ramp(
     #[sampler] sampler: Sampler,
 ) -> Vec4 {
     source.sample(sampler, at.x / 64.0)
+}
+
+/// How many layers and cubes there are.
+#[kernel(compute, threads(64))]
+pub fn counts(
+    #[element] x: u32,
+    #[texture]
+    #[layers(5)]
+    layers: Texture2dArray<'_>,
+    #[texture]
+    #[size(4, 4)]
+    #[layers(2)]
+    cubes: TextureCubeArray<'_>,
+    #[texture]
+    #[layers(4)]
+    whole: Texture2dArray<'_, u32>,
+    #[texture]
+    #[size(16, 8)]
+    depths: DepthTexture2dArray<'_>,
+) -> UVec4 {
+    UVec4::new(
+        layers.layers() + x,
+        cubes.cubes(),
+        whole.layers() * layers.size().x,
+        depths.layers(),
+    )
+}
+
+/// How many layers there are to write into.
+#[kernel(compute, threads(64))]
+pub fn written_counts(
+    #[index] i: u32,
+    #[element] x: u32,
+    #[texture]
+    #[layers(6)]
+    target: StorageTexture2dArray<'_, Rgba8Unorm>,
+) -> u32 {
+    let size = target.size();
+    if i < size.x {
+        target.store(
+            UVec2::new(i, 0),
+            i % target.layers(),
+            Vec4::new(0.0, 1.0, 0.25, 1.0),
+        );
+    }
+    x + target.layers()
 }

@@ -4,7 +4,7 @@
 //! beside each other the level of the first one.
 
 use hankel_dsl::glam::{UVec2, UVec3, Vec2, Vec3, Vec4};
-use hankel_dsl::{Element, Sampler, Texture2d, Texture3d, kernel};
+use hankel_dsl::{Element, Sampler, Texture2d, Texture2dArray, Texture3d, kernel};
 
 /// Texels of all levels, and how large their level is.
 #[kernel(compute, threads(8, 8), texture(rgba32float))]
@@ -210,4 +210,63 @@ pub fn receding(
     let near = source.sample(sampler, uv);
     let far = source.sample_bias(sampler, uv, 1.0);
     Vec4::new(near.x, near.y, far.x, far.y)
+}
+
+/// Texels beside others, in whichever unit of the level: a texture's at a level, a layer's by gradients, and four in a
+/// layer.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn neighbours_of_texels(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(64, 32)]
+    #[levels(3)]
+    source: Texture2d<'_>,
+    #[texture]
+    #[size(32, 16)]
+    #[layers(2)]
+    layers: Texture2dArray<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    #[mip_filter(nearest)]
+    #[address(repeat)]
+    sampler: Sampler,
+) -> Vec4 {
+    let level = at.y % 3;
+    let middle = Vec2::new(at.x as f32 + 0.5, at.y as f32 + 0.5);
+    let size = source.level_size(level);
+    let uv = middle / Vec2::new(size.x as f32, size.y as f32);
+    let beside = source
+        .shifted::<1, -2>()
+        .sample_level(sampler, uv, level as f32);
+    let whole = middle * Vec2::new(1.0 / 32.0, 1.0 / 16.0);
+    let step = 0.840_896_4 / 32.0;
+    let (dx, dy) = (Vec2::new(step, 0.0), Vec2::new(0.0, step));
+    let above = layers
+        .shifted::<0, -8>()
+        .sample_gradient(sampler, whole, at.x & 1, dx, dy);
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    let four = layers
+        .shifted::<7, 3>()
+        .gather::<1>(sampler, corner, at.y & 1);
+    Vec4::new(beside.x, above.y, four.x, four.y + four.z * 2.0)
+}
+
+/// A texture beside each fragment's place, at the fragment's level and one beyond.
+#[kernel(fragment)]
+pub fn blurred_sideways(
+    #[frag_coord] at: Vec3,
+    #[texture]
+    #[size(64, 32)]
+    #[levels(4)]
+    source: Texture2d<'_>,
+    #[sampler]
+    #[mip_filter(nearest)]
+    #[address(mirror_repeat)]
+    sampler: Sampler,
+) -> Vec4 {
+    let u = at.x * 1.681_792_8 / 64.0;
+    let uv = Vec2::new(u, at.y * 0.75 / 32.0);
+    let left = source.shifted::<-1, 0>().sample(sampler, uv);
+    let right = source.shifted::<1, 0>().sample_bias(sampler, uv, 1.0);
+    Vec4::new(left.x, left.y, right.x, right.y)
 }

@@ -2,7 +2,8 @@
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube, kernel,
+    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube,
+    DepthTextureCubeArray, kernel,
 };
 
 /// Which texels are behind the reference.
@@ -137,5 +138,71 @@ pub fn hidden(
         layers.compare(sampler, uv, 1, 0.5),
         0.0,
         1.0,
+    )
+}
+
+/// The same around each of several lights: which texels of its cube hide what lies in their direction.
+#[kernel(fragment)]
+pub fn cubes_lit(
+    #[frag_coord] at: Vec3,
+    #[texture]
+    #[size(8, 8)]
+    #[layers(2)]
+    lights: DepthTextureCubeArray<'_>,
+    #[sampler]
+    #[mip_filter(nearest)]
+    sampler: ComparisonSampler,
+) -> Vec4 {
+    let light = at.x as u32 % lights.cubes();
+    let to = Vec3::new(at.x - 31.75, (at.y - 8.0) * 0.25, 5.0);
+    Vec4::new(
+        lights.compare_level_zero(sampler, to, light, 0.5),
+        light as f32,
+        0.0,
+        1.0,
+    )
+}
+
+/// Percentage-closer filtering of four texels around a place, by offsets, and which texels of another corner are lit.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn four_by_offsets(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(32, 16)]
+    depths: DepthTexture2d<'_>,
+    #[texture]
+    #[size(32, 16)]
+    layers: DepthTexture2dArray<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    #[compare(less)]
+    #[address(repeat)]
+    sampler: ComparisonSampler,
+) -> Vec4 {
+    let uv = Vec2::new((at.x as f32 + 0.5) / 32.0, (at.y as f32 + 0.5) / 16.0);
+    let sum = depths
+        .shifted::<-1, -1>()
+        .compare_level_zero(sampler, uv, 0.5)
+        + depths
+            .shifted::<1, -1>()
+            .compare_level_zero(sampler, uv, 0.5)
+        + depths
+            .shifted::<-1, 1>()
+            .compare_level_zero(sampler, uv, 0.5)
+        + depths
+            .shifted::<1, 1>()
+            .compare_level_zero(sampler, uv, 0.5);
+    let layer = layers
+        .shifted::<2, 0>()
+        .compare_level_zero(sampler, uv, at.x % 3, 0.25);
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    let four = depths
+        .shifted::<3, -4>()
+        .gather_compare(sampler, corner, 0.75);
+    Vec4::new(
+        sum * 0.25,
+        layer,
+        four.x + four.y * 2.0,
+        four.z + four.w * 2.0,
     )
 }

@@ -3,8 +3,9 @@
 use hankel_dsl::format::Rgba32Float;
 use hankel_dsl::glam::{IVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    Atomics, Depth, Element, Flat, StorageMut, StorageTexture2d, discard, dpdx, dpdx_coarse,
-    dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth, fwidth_fine, kernel,
+    Atomics, Centroid, Depth, Element, Flat, Linear, PerSample, SampleMask, StorageMut,
+    StorageTexture2d, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth,
+    fwidth_fine, kernel,
 };
 
 /// Numbers of the vertex and of its instance, integers, and a float that is not interpolated.
@@ -117,6 +118,95 @@ pub fn grained_slopes(#[frag_coord] at: Vec3) -> (Vec4, Vec4) {
 #[kernel(fragment)]
 pub fn sample(#[varying] id: u32, #[sample_index] sample: u32) -> u32 {
     id ^ (sample + 1)
+}
+
+/// Where each value is interpolated in a pixel that an edge crosses, and in the perspective of which plane.
+#[kernel(vertex, parity(non_finite, why = "sums of absurd numbers overflow"))]
+pub fn interpolated(
+    #[attribute] position: Vec4,
+    #[attribute] uv: Vec2,
+    #[attribute] tint: Vec3,
+) -> (
+    Vec4,
+    Vec2,
+    Centroid<Vec2>,
+    Linear<Vec3>,
+    Linear<Centroid<f32>>,
+    PerSample<f32>,
+    Linear<PerSample<f32>>,
+) {
+    let (light, shade) = (tint.x + tint.y, tint.z * 0.5);
+    (
+        position,
+        uv,
+        Centroid(uv),
+        Linear(tint),
+        Linear(Centroid(light)),
+        PerSample(shade),
+        Linear(PerSample(tint.y)),
+    )
+}
+
+/// A value at the centre of the pixel, and at a place of it that the primitive covers.
+#[kernel(fragment)]
+pub fn covered_place(#[varying] uv: Vec2, #[varying] within: Centroid<Vec2>) -> Vec4 {
+    Vec4::new(uv.x, uv.y, within.0.x, within.0.y)
+}
+
+/// Values that are linear on the screen.
+#[kernel(fragment)]
+pub fn screen_linear(
+    #[varying] uv: Vec2,
+    #[varying] within: Centroid<Vec2>,
+    #[varying] tint: Linear<Vec3>,
+    #[varying] light: Linear<Centroid<f32>>,
+) -> (Vec4, Vec4) {
+    (
+        tint.0.extend(light.0.0),
+        Vec4::new(uv.x, uv.y, within.0.x, within.0.y),
+    )
+}
+
+/// Values at each sample, for each of which the kernel runs.
+#[kernel(
+    fragment,
+    parity(non_finite, why = "squares of absurd numbers overflow")
+)]
+pub fn at_samples(
+    #[varying] uv: Vec2,
+    #[varying] within: Centroid<Vec2>,
+    #[varying] tint: Linear<Vec3>,
+    #[varying] light: Linear<Centroid<f32>>,
+    #[varying] shade: PerSample<f32>,
+    #[varying] green: Linear<PerSample<f32>>,
+) -> (Vec4, Vec4) {
+    let (shade, green) = (shade.0, green.0.0);
+    (
+        Vec4::new(shade, shade * shade, green, green * green),
+        tint.0
+            .extend(if uv.x > within.0.x { light.0.0 } else { uv.y }),
+    )
+}
+
+/// The samples of the pixel that the primitive covers. Of an odd primitive those are drawn that the number's
+/// other bits name, of an even one all.
+#[kernel(fragment)]
+pub fn coverage(#[varying] id: u32, #[sample_mask] covered: u32) -> (Vec2, SampleMask) {
+    let mask = if id & 1 == 0 {
+        u32::MAX
+    } else {
+        covered & (id >> 1)
+    };
+    (
+        Vec2::new(covered as f32, (id & 0xffff) as f32),
+        SampleMask(mask),
+    )
+}
+
+/// The number of the primitive beside one from its vertices.
+#[kernel(fragment)]
+pub fn primitives(#[varying] id: u32, #[primitive_index] primitive: u32) -> UVec2 {
+    UVec2::new(primitive, id ^ (primitive * 5))
 }
 
 /// A fragment in its pixel's list.

@@ -164,7 +164,11 @@ fn to_msl((module, info): &(naga::Module, ModuleInfo)) -> String {
     written.unwrap_or_else(|e| panic!("{e}")).0
 }
 
-fn to_glsl((module, info): &(naga::Module, ModuleInfo)) -> String {
+fn to_glsl(read: &(naga::Module, ModuleInfo)) -> String {
+    glsl_of(read, naga::ShaderStage::Compute)
+}
+
+fn glsl_of((module, info): &(naga::Module, ModuleInfo), stage: naga::ShaderStage) -> String {
     let bound = |binding: u8| {
         let place = ResourceBinding {
             group: 0,
@@ -179,7 +183,7 @@ fn to_glsl((module, info): &(naga::Module, ModuleInfo)) -> String {
         zero_initialize_workgroup_memory: false,
     };
     let pipeline = glsl::PipelineOptions {
-        shader_stage: naga::ShaderStage::Compute,
+        shader_stage: stage,
         entry_point: "main".into(),
         multiview: None,
     };

@@ -156,6 +156,49 @@ fn naga_panics_at_a_fetch_from_an_array_of_textures() {
 }
 
 #[test]
+fn naga_refuses_masks_of_samples_and_numbers_of_layers() {
+    for (case, workaround) in [
+        (
+            "naga-sample-mask",
+            "codegen/src/translate/reading.rs, `with_number_masks`",
+        ),
+        ("naga-layers", "codegen/src/translate/cleanup/layers.rs"),
+    ] {
+        let options = naga::front::spv::Options::default();
+        let module = naga::front::spv::parse_u8_slice(&assembled(case), &options)
+            .unwrap_or_else(|e| panic!("{e}"));
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+        assert!(
+            validator.validate(&module).is_err(),
+            "mended: drop the workaround in {workaround}"
+        );
+    }
+}
+
+#[test]
+fn naga_writes_masks_and_layers_that_glsl_does_not_have() {
+    let glsl = glsl_of(&wgsl("naga-glsl-sample-mask"), naga::ShaderStage::Fragment);
+    assert!(
+        glsl.contains("gl_SampleMask =") && !glsl.contains("gl_SampleMaskIn["),
+        "mended: drop `with_mask_arrays` in codegen/src/translate/glsl.rs\n{glsl}"
+    );
+    let glsl = to_glsl(&wgsl("naga-glsl-storage-layers"));
+    assert!(
+        glsl.contains("imageSize(") && glsl.contains(", 0)"),
+        "mended: drop `plain_queries` in codegen/src/translate/glsl.rs\n{glsl}"
+    );
+}
+
+#[test]
+fn naga_leaves_level_zero_to_metal() {
+    let msl = to_msl(&wgsl("naga-msl-compare-level"));
+    assert!(
+        msl.contains(".sample_compare(") && !msl.contains("level("),
+        "mended: drop `compared_at_level_zero` in codegen/src/translate/msl.rs\n{msl}"
+    );
+}
+
+#[test]
 fn naga_panics_at_an_operation_of_a_subgroup_on_a_value_from_a_loop() {
     let spirv = assembled("naga-subgroup-operand");
     let read = std::panic::catch_unwind(|| {

@@ -32,6 +32,7 @@ fn wanted_features() -> wgpu::Features {
         | wgpu::Features::SHADER_INT64
         | wgpu::Features::SUBGROUP
         | wgpu::Features::IMMEDIATES
+        | wgpu::Features::PRIMITIVE_INDEX
         | wgpu::Features::FLOAT32_FILTERABLE
         | wgpu::Features::FLOAT32_BLENDABLE
         | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM

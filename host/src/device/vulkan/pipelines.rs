@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hankel_dsl::native::describe::{
-    Channels, Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage, TexelAccess, Type,
+    BuiltIn, Channels, Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage,
+    TexelAccess, Type,
 };
 
 use super::super::error::{DeviceError, Result};
@@ -143,6 +144,17 @@ impl VulkanDevice {
             && !self.device.features().contains(wgpu::Features::SUBGROUP)
         {
             return Err(self.missing("subgroups", kernel));
+        }
+        let numbered = Role::BuiltIn {
+            built_in: BuiltIn::PrimitiveIndex,
+        };
+        if kernel.params.iter().any(|param| param.role == numbered)
+            && !self
+                .device
+                .features()
+                .contains(wgpu::Features::PRIMITIVE_INDEX)
+        {
+            return Err(self.missing("numbers of primitives", kernel));
         }
         let constants = slots::constants(kernel, program.constants)?;
         let numbered: Vec<(u32, u32)> = kernel
@@ -985,23 +997,30 @@ impl VulkanDevice {
             return Err(wrong_stage(fragment, "fragment"));
         }
         for Param { name, role, .. } in &fragment.params {
-            let Role::Varying { location, ty, .. } = role else {
+            let Role::Varying {
+                location,
+                ty,
+                interpolation,
+            } = role
+            else {
                 continue;
             };
             let made = vertex.outputs.iter().find_map(|o| match o {
                 Output::Varying {
-                    location: l, ty, ..
-                } if l == location => Some(ty),
+                    location: l,
+                    ty,
+                    interpolation,
+                } if l == location => Some((ty, interpolation)),
                 _ => None,
             });
-            if made != Some(ty) {
+            if made != Some((ty, interpolation)) {
                 return Err(bad(format!(
                     "kernel `{}` reads varying `{name}` at location {location}, which kernel `{}` \
                      {}",
                     fragment.name,
                     vertex.name,
                     if made.is_some() {
-                        "makes with another type"
+                        "makes with another type or another interpolation"
                     } else {
                         "does not make"
                     }

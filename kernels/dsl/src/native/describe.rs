@@ -87,6 +87,13 @@ impl Kernel {
         }
     }
 
+    /// How many outputs are stored in a buffer or texture: a mask of samples is not.
+    #[must_use]
+    pub fn stored_outputs(&self) -> usize {
+        let mask = |output: &&Output| **output == Output::SampleMask;
+        self.outputs.len() - self.outputs.iter().filter(mask).count()
+    }
+
     /// Whether it is the fragment form of an image pass.
     #[must_use]
     pub fn is_fragment_form(&self) -> bool {
@@ -458,10 +465,74 @@ pub enum Role {
         location: u32,
         /// Its type.
         ty: Type,
-        /// That of one vertex, not interpolated. Integers always are.
-        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
-        flat: bool,
+        /// How.
+        #[serde(default, skip_serializing_if = "Interpolation::is_usual")]
+        interpolation: Interpolation,
     },
+}
+
+/// How a value is interpolated between vertices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Interpolation {
+    /// Along the primitive's surface, at the centre of the pixel.
+    #[default]
+    Perspective,
+    /// The same, where the primitive covers the pixel.
+    PerspectiveCentroid,
+    /// The same, at each sample.
+    PerspectiveSample,
+    /// Along the screen, at the centre of the pixel.
+    Linear,
+    /// The same, where the primitive covers the pixel.
+    LinearCentroid,
+    /// The same, at each sample.
+    LinearSample,
+    /// That of one vertex. Integers always are.
+    Flat,
+}
+
+impl Interpolation {
+    /// Whether it is what a language does if nothing is said.
+    #[must_use]
+    pub fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Without the perspective's division.
+    #[must_use]
+    pub const fn is_linear(self) -> bool {
+        matches!(
+            self,
+            Self::Linear | Self::LinearCentroid | Self::LinearSample
+        )
+    }
+
+    /// Where the primitive covers the pixel.
+    #[must_use]
+    pub const fn is_centroid(self) -> bool {
+        matches!(self, Self::PerspectiveCentroid | Self::LinearCentroid)
+    }
+
+    /// At each sample of the pixel, for each of which the kernel then runs.
+    #[must_use]
+    pub const fn is_per_sample(self) -> bool {
+        matches!(self, Self::PerspectiveSample | Self::LinearSample)
+    }
+
+    /// WGSL's words, as in `@interpolate(linear, centroid)`; none for what is usual.
+    #[must_use]
+    pub const fn words(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Perspective => return None,
+            Self::PerspectiveCentroid => "perspective, centroid",
+            Self::PerspectiveSample => "perspective, sample",
+            Self::Linear => "linear",
+            Self::LinearCentroid => "linear, centroid",
+            Self::LinearSample => "linear, sample",
+            Self::Flat => "flat",
+        })
+    }
 }
 
 /// How a storage texture is seen, in WebGPU's words: `2d`, `2d-array`, `3d`.
@@ -547,6 +618,10 @@ pub enum BuiltIn {
     FrontFacing,
     /// Which sample of its pixel the fragment is (fragment stage).
     SampleIndex,
+    /// Which samples of the pixel the primitive covers, a bit for each (fragment stage).
+    SampleMask,
+    /// The number of the fragment's primitive in its instance (fragment stage).
+    PrimitiveIndex,
 }
 
 /// Shape of a texture that is read.
@@ -573,6 +648,8 @@ pub enum TextureKind {
     DepthTexture2dArray,
     /// Such depths on the faces of a cube.
     DepthTextureCube,
+    /// Such cubes in an array.
+    DepthTextureCubeArray,
     /// Two dimensions of unsigned integers, not filtered.
     UintTexture2d,
     /// Layers of two dimensions of unsigned integers.
@@ -589,7 +666,7 @@ pub enum TextureKind {
 
 impl TextureKind {
     /// All of them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Texture1d,
         Self::Texture2d,
         Self::Texture2dArray,
@@ -600,6 +677,7 @@ impl TextureKind {
         Self::DepthTexture2d,
         Self::DepthTexture2dArray,
         Self::DepthTextureCube,
+        Self::DepthTextureCubeArray,
         Self::UintTexture2d,
         Self::UintTexture2dArray,
         Self::UintTexture3d,
@@ -622,6 +700,7 @@ impl TextureKind {
             Self::DepthTexture2d => "DepthTexture2d",
             Self::DepthTexture2dArray => "DepthTexture2dArray",
             Self::DepthTextureCube => "DepthTextureCube",
+            Self::DepthTextureCubeArray => "DepthTextureCubeArray",
             Self::UintTexture2d => "Texture2d<u32>",
             Self::UintTexture2dArray => "Texture2dArray<u32>",
             Self::UintTexture3d => "Texture3d<u32>",
@@ -647,7 +726,7 @@ impl TextureKind {
             | Self::SintTexture2dArray => "2d-array",
             Self::Texture3d | Self::UintTexture3d | Self::SintTexture3d => "3d",
             Self::TextureCube | Self::DepthTextureCube => "cube",
-            Self::TextureCubeArray => "cube-array",
+            Self::TextureCubeArray | Self::DepthTextureCubeArray => "cube-array",
         }
     }
 
@@ -669,6 +748,7 @@ impl TextureKind {
             Self::Texture2dArray
                 | Self::TextureCubeArray
                 | Self::DepthTexture2dArray
+                | Self::DepthTextureCubeArray
                 | Self::UintTexture2dArray
                 | Self::SintTexture2dArray
         )
@@ -689,7 +769,10 @@ impl TextureKind {
     pub const fn is_cube(self) -> bool {
         matches!(
             self,
-            Self::TextureCube | Self::TextureCubeArray | Self::DepthTextureCube
+            Self::TextureCube
+                | Self::TextureCubeArray
+                | Self::DepthTextureCube
+                | Self::DepthTextureCubeArray
         )
     }
 
@@ -698,7 +781,10 @@ impl TextureKind {
     pub const fn is_depth(self) -> bool {
         matches!(
             self,
-            Self::DepthTexture2d | Self::DepthTexture2dArray | Self::DepthTextureCube
+            Self::DepthTexture2d
+                | Self::DepthTexture2dArray
+                | Self::DepthTextureCube
+                | Self::DepthTextureCubeArray
         )
     }
 
@@ -763,12 +849,14 @@ pub enum Output {
         location: u32,
         /// Its type.
         ty: Type,
-        /// Not to be interpolated; see [`Role::Varying`].
-        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
-        flat: bool,
+        /// How it will be interpolated; see [`Role::Varying`].
+        #[serde(default, skip_serializing_if = "Interpolation::is_usual")]
+        interpolation: Interpolation,
     },
     /// The fragment's depth, in place of that of its primitive (fragment stage).
     Depth,
+    /// Which samples of the pixel are written (fragment stage).
+    SampleMask,
     /// A colour attachment (fragment stage).
     Target {
         /// Output location.

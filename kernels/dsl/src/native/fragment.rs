@@ -30,14 +30,20 @@ pub struct Fragment {
     pub front_facing: bool,
     /// Which sample of the pixel.
     pub sample_index: u32,
+    /// Which samples the primitive covers, a bit for each.
+    pub sample_mask: u32,
+    /// The number of the primitive, each of which covers one pixel.
+    pub primitive_index: u32,
 }
 
 impl Fragment {
-    fn at(x: u32, y: u32) -> Self {
+    fn at(x: u32, y: u32, primitive_index: u32) -> Self {
         Self {
             coord: Vec3::new(x as f32 + 0.5, y as f32 + 0.5, 0.0),
             front_facing: true,
             sample_index: 0,
+            sample_mask: 1,
+            primitive_index,
         }
     }
 }
@@ -212,7 +218,7 @@ fn one<T>(i: u32, call: &dyn Fn(&Fragment) -> T) -> Option<T> {
     let own = (x & 1 | (y & 1) << 1) as usize;
     let at = |lane: usize| {
         let lane = lane as u32;
-        Fragment::at(x & !1 | lane & 1, y & !1 | lane >> 1)
+        Fragment::at(x & !1 | lane & 1, y & !1 | lane >> 1, i)
     };
     QUAD.with_borrow_mut(|quad| quad.taken.clear());
     let call = |fragment: &Fragment| {
@@ -267,6 +273,13 @@ pub fn map_fragments<S: Slices>(
 #[must_use]
 pub fn depth(depth: crate::Depth) -> f32 {
     depth.0.clamp(0.0, 1.0)
+}
+
+/// Drops what a fragment returns unless its only sample is to be written.
+pub fn mask(mask: crate::SampleMask) {
+    if mask.0 & 1 == 0 {
+        crate::discard();
+    }
 }
 
 #[cfg(test)]

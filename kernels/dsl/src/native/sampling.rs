@@ -99,6 +99,8 @@ pub enum Place {
         dimensions: usize,
         /// The layer.
         layer: u32,
+        /// Texels further along x and y, of the level that is read.
+        shift: [i32; 2],
     },
     /// In a direction in the cube that begins at a layer.
     Cube {
@@ -163,16 +165,17 @@ impl<'a> Taps<'a> {
         level: u32,
         linear: bool,
     ) -> Self {
-        let (at, dimensions, cube, layer) = match place {
+        let (at, dimensions, cube, layer, shift) = match place {
             Place::Flat {
                 at,
                 dimensions,
                 layer,
-            } => (at.to_array(), dimensions, None, layer),
+                shift,
+            } => (at.to_array(), dimensions, None, layer, shift),
             Place::Cube { direction, first } => {
                 let (face, [s, t]) = face(direction);
                 let at = [s * 0.5 + 0.5, t * 0.5 + 0.5, 0.0];
-                (at, 2, Some((level, first, face)), first + face)
+                (at, 2, Some((level, first, face)), first + face, [0; 2])
             }
         };
         let own = Level::of(t, level, layer);
@@ -187,7 +190,7 @@ impl<'a> Taps<'a> {
                 n => x + f32::from(n) / 1024.0,
             };
             let floor = x.floor();
-            base[d] = floor as i64;
+            base[d] = (floor as i64).saturating_add(shift.get(d).copied().unwrap_or(0).into());
             weight[d] = if linear { x - floor } else { 0.0 };
         }
         let mut address = sampler.address;
@@ -417,6 +420,7 @@ mod tests {
             at: Vec3::new(x, y, 0.0),
             dimensions: 2,
             layer: 0,
+            shift: [0; 2],
         }
     }
 
