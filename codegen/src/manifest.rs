@@ -432,7 +432,7 @@ pub struct Interface {
     pub name: String,
     /// `attribute`, `varying`, `position`, `depth`, `sample_mask` or `target`.
     pub kind: String,
-    /// Location; the position and the depth have none.
+    /// Location; the position, the depth and the mask of samples have none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub location: Option<u32>,
     /// Type.

@@ -109,8 +109,14 @@ fn masks_and_numbers_of_primitives_are_said() {
         assert!(kernels["coverage"].unsupported[&language].contains("masks of samples"));
     }
     assert!(kernels["primitives"].unsupported[&Essl300].contains("primitive's number"));
-    let wgsl = &kernels["primitives"].languages[&Wgsl];
-    assert_eq!(wgsl.requires, ["primitive-index"]);
+    for (kernel, language, feature) in [
+        ("primitives", Wgsl, "primitive-index"),
+        ("primitives", Essl310, "GL_OES_geometry_shader"),
+        ("cubes_lit", Glsl, "GL_EXT_texture_shadow_lod"),
+    ] {
+        let requires = &kernels[kernel].languages[&language].requires;
+        assert!(requires.iter().any(|it| it == feature), "{requires:?}");
+    }
 }
 
 #[test]

@@ -104,7 +104,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                     Output::SampleMask => 20,
                     _ => 0,
                 };
-                if let Some(variable) = built_in(module, number) {
+                if let Some(variable) = built_in(module, StorageClass::Output, number) {
                     names.set(variable, &name);
                 }
             }
@@ -122,7 +122,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
         }
     }
     for (built_in_number, name) in INPUTS {
-        if let Some(variable) = built_in(module, built_in_number) {
+        if let Some(variable) = built_in(module, StorageClass::Input, built_in_number) {
             names.set(variable, name);
         }
     }
@@ -131,7 +131,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
 }
 
 /// Input variables that every stage names alike: SPIR-V's number, name.
-const INPUTS: [(u32, &str); 14] = [
+const INPUTS: [(u32, &str); 15] = [
     (28, "id"),
     (27, "local_id"),
     (26, "group_id"),
@@ -145,6 +145,7 @@ const INPUTS: [(u32, &str); 14] = [
     (15, "frag_coord"),
     (17, "front_facing"),
     (18, "sample_index"),
+    (20, "covered_samples"),
     (7, "primitive_index"),
 ];
 
@@ -271,18 +272,19 @@ fn array_length(module: &Module, variable: Word) -> Option<u32> {
     literal(global(module, id(array, 1)?)?, 0)
 }
 
-fn built_in(module: &Module, number: u32) -> Option<Word> {
-    module
-        .annotations
-        .iter()
-        .find_map(|note| match note.operands.as_slice() {
-            [
-                Operand::IdRef(target),
-                Operand::Decoration(Decoration::BuiltIn),
-                Operand::BuiltIn(which),
-            ] if *which as u32 == number => Some(*target),
-            _ => None,
+fn built_in(module: &Module, class: StorageClass, number: u32) -> Option<Word> {
+    in_class(module, class).find(|variable| {
+        module.annotations.iter().any(|note| {
+            matches!(
+                note.operands.as_slice(),
+                [
+                    Operand::IdRef(target),
+                    Operand::Decoration(Decoration::BuiltIn),
+                    Operand::BuiltIn(which),
+                ] if target == variable && *which as u32 == number
+            )
         })
+    })
 }
 
 fn variables(module: &Module) -> impl Iterator<Item = Word> + '_ {

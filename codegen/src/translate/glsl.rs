@@ -97,7 +97,16 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
             "(uint(gl_InstanceID) + naga_vs_first_instance)",
             "uint(gl_InstanceID)",
         );
-    let source = plain_queries(&with_mask_arrays(&source));
+    let source = if source.contains("gl_SampleMask") {
+        with_mask_arrays(&source)
+    } else {
+        source
+    };
+    let source = if source.contains("imageSize(") {
+        plain_queries(&source)
+    } else {
+        source
+    };
     let source = job.open_constants(source)?;
     let types = ["float", "double", "vec", "dvec", "mat", "dmat"];
     let mut source = if job.language == Language::Essl300 {
@@ -105,10 +114,8 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     } else {
         job.precise(source, &types)?
     };
-    let mut requires = Vec::new();
     if !job.kernel.subgroups.is_unused() {
-        requires = subgroup_extensions(&source);
-        let lines: String = requires
+        let lines: String = subgroup_extensions(&source)
             .iter()
             .map(|name| format!("#extension {name} : require\n"))
             .collect();
@@ -122,7 +129,6 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     }
     if job.language == Language::Essl310 && job.kernel.rounding != Rounding::Free {
         let lines = if job.kernel.rounding == Rounding::Exact {
-            requires.push(ES_PRECISE.to_owned());
             format!("\n#extension {ES_PRECISE} : require\n")
         } else {
             format!(
@@ -175,6 +181,7 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         }
         places.insert(it.binding, place);
     }
+    let requires = required_extensions(&source);
     Ok(Written::Text(Text {
         source,
         entry_point: "main".into(),
@@ -218,6 +225,20 @@ fn plain_queries(source: &str) -> String {
         };
     }
     text
+}
+
+/// The extensions that a text asks for. naga asks for two that 4.50 has by itself.
+fn required_extensions(source: &str) -> Vec<String> {
+    const OF_450: [&str; 2] = [
+        "GL_ARB_compute_shader",
+        "GL_ARB_shader_storage_buffer_object",
+    ];
+    source
+        .lines()
+        .filter_map(|line| line.strip_prefix("#extension ")?.strip_suffix(" : require"))
+        .filter(|name| !OF_450.contains(name))
+        .map(str::to_owned)
+        .collect()
 }
 
 /// The extensions of GLSL for the operations of subgroups that a text has.

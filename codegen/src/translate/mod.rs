@@ -717,27 +717,38 @@ impl Ir {
 
     /// Whether comparisons with the texels of a layer or of a cube are gathered.
     fn gathers_compared_layers(&self) -> bool {
-        let gathers = self.has(|expression| {
-            matches!(
-                expression,
-                Expression::ImageSample {
-                    gather: Some(_),
-                    depth_ref: Some(_),
-                    ..
-                }
-            )
-        });
-        let layered = self.globals().any(|(_, inner)| {
-            matches!(
-                inner,
-                TypeInner::Image {
-                    class: ImageClass::Depth { .. },
-                    dim,
-                    arrayed,
-                } if *arrayed || *dim == ImageDimension::Cube
-            )
-        });
-        gathers && layered
+        let globals = &self.module.global_variables;
+        let entries = self.module.entry_points.iter().map(|it| &it.function);
+        let mut all = entries.chain(self.module.functions.iter().map(|(_, it)| it));
+        all.any(|function| {
+            let is_layered = |image| {
+                let ty = match function.expressions[image] {
+                    Expression::GlobalVariable(variable) => globals[variable].ty,
+                    Expression::FunctionArgument(number) => function.arguments[number as usize].ty,
+                    _ => return true,
+                };
+                matches!(
+                    self.module.types[ty].inner,
+                    TypeInner::Image { arrayed: true, .. }
+                        | TypeInner::Image {
+                            dim: ImageDimension::Cube,
+                            ..
+                        }
+                )
+            };
+            function
+                .expressions
+                .iter()
+                .any(|(_, expression)| match expression {
+                    Expression::ImageSample {
+                        image,
+                        gather: Some(_),
+                        depth_ref: Some(_),
+                        ..
+                    } => is_layered(*image),
+                    _ => false,
+                })
+        })
     }
 
     /// Whether a texel of a depth texture is read as it is.

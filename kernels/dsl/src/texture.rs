@@ -301,6 +301,27 @@ textures_of! {
 #[derive(Clone, Copy)]
 pub struct Shifted<T, const X: i32, const Y: i32>(T);
 
+/// Whether every language has the offset.
+const fn is_offset(x: i32, y: i32) -> bool {
+    x >= -8 && x <= 7 && y >= -8 && y <= 7
+}
+
+macro_rules! shifts {
+    ($($name:ident)*) => { $(
+        impl $name<'_> {
+            /// The same texture, read `X` texels further to the right and `Y` further down: each from -8 to 7.
+            #[inline(always)]
+            #[must_use]
+            pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
+                const { assert!(is_offset(X, Y), "an offset is from -8 to 7 texels") };
+                Shifted(self)
+            }
+        }
+    )* };
+}
+
+shifts!(Texture2d Texture2dArray DepthTexture2d DepthTexture2dArray);
+
 /// How a texture is filtered between texels, between levels, and beyond the edge.
 #[derive(Clone, Copy)]
 pub struct Sampler(
@@ -541,12 +562,6 @@ mod spirv {
 
     macro_rules! shifted {
         ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
-            impl $name<'_> {
-                #[inline(always)]
-                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
-                    Shifted(self)
-                }
-            }
             impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
                 #[inline(always)]
                 pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
@@ -589,12 +604,6 @@ mod spirv {
 
     macro_rules! shifted_comparisons {
         ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
-            impl $name<'_> {
-                #[inline(always)]
-                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
-                    Shifted(self)
-                }
-            }
             impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
                 #[inline(always)]
                 pub fn compare(self, sampler: ComparisonSampler, $($arg: $ty,)* reference: f32) -> f32 {
@@ -682,6 +691,33 @@ mod host {
         }
     }
 
+    macro_rules! seen {
+        ($(($($of:tt)*) $name:ty: $($part:tt).+;)*) => { $(
+            impl $($of)* $name {
+                /// The texture that it reads.
+                const fn texture(&self) -> &TextureRef<'_> {
+                    &self.$($part).+
+                }
+            }
+        )* };
+    }
+    seen! {
+        (<T: Channel>) Texture2d<'_, T>: 0;
+        (<T: Channel>) Texture2dArray<'_, T>: 0;
+        (<T: Channel>) Texture3d<'_, T>: 0;
+        () TextureCube<'_>: 0;
+        () TextureCubeArray<'_>: 0;
+        () DepthTexture2d<'_>: 0;
+        () DepthTexture2dArray<'_>: 0;
+        () DepthTextureCube<'_>: 0;
+        () DepthTextureCubeArray<'_>: 0;
+        (<const X: i32, const Y: i32>) Shifted<Texture2d<'_>, X, Y>: 0.0;
+        (<const X: i32, const Y: i32>) Shifted<Texture2dArray<'_>, X, Y>: 0.0;
+        (<const X: i32, const Y: i32>) Shifted<DepthTexture2d<'_>, X, Y>: 0.0;
+        (<const X: i32, const Y: i32>) Shifted<DepthTexture2dArray<'_>, X, Y>: 0.0;
+    }
+
+    /// Like [`flat`], with an offset in texels.
     const fn shifted(uv: Vec2, layer: u32, shift: [i32; 2]) -> Place {
         Place::Flat {
             at: Vec3::new(uv.x, uv.y, 0.0),
@@ -817,8 +853,8 @@ mod host {
     }
 
     macro_rules! samples {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $gradient:ty, $place:expr, $extend:expr;)*) => { $(
-            impl $name<'_> {
+        ($(($($of:tt)*) $name:ty: ($($arg:ident: $ty:ty),*), $gradient:ty, $place:expr, $extend:expr;)*) => { $(
+            impl $($of)* $name {
                 /// A filtered value, at the level of detail that follows from how the coordinates
                 /// differ between neighbouring fragments: in fragment kernels only, and in control
                 /// flow that is the same for a quad. Coordinates in a layer begin at the first
@@ -829,23 +865,23 @@ mod host {
                 #[must_use]
                 #[track_caller]
                 pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
-                    let detail = detail(&self.0, $place, Location::caller());
-                    sampling::sample(&self.0, &sampler.0, $place, detail)
+                    let detail = detail(self.texture(), $place, Location::caller());
+                    sampling::sample(self.texture(), &sampler.0, $place, detail)
                 }
                 /// The same with `bias` added to the level of detail, from -16 to 15.99.
                 #[inline]
                 #[must_use]
                 #[track_caller]
                 pub fn sample_bias(self, sampler: Sampler, $($arg: $ty,)* bias: f32) -> Vec4 {
-                    let detail = detail(&self.0, $place, Location::caller());
-                    sampling::sample(&self.0, &sampler.0, $place, detail + bias)
+                    let detail = detail(self.texture(), $place, Location::caller());
+                    sampling::sample(self.texture(), &sampler.0, $place, detail + bias)
                 }
                 /// A filtered value at a level of detail: 0 is the largest level, and between two
                 /// levels the sampler says what is taken.
                 #[inline]
                 #[must_use]
                 pub fn sample_level(self, sampler: Sampler, $($arg: $ty,)* level: f32) -> Vec4 {
-                    sampling::sample(&self.0, &sampler.0, $place, level)
+                    sampling::sample(self.texture(), &sampler.0, $place, level)
                 }
                 /// A filtered value at the level of detail of given derivatives of the coordinates
                 /// along x and y of the target. An implementation may find a larger level of detail:
@@ -859,23 +895,25 @@ mod host {
                     dx: $gradient,
                     dy: $gradient,
                 ) -> Vec4 {
-                    let detail = sampling::detail(&self.0, $place, $extend(dx), $extend(dy));
-                    sampling::sample(&self.0, &sampler.0, $place, detail)
+                    let detail = sampling::detail(self.texture(), $place, $extend(dx), $extend(dy));
+                    sampling::sample(self.texture(), &sampler.0, $place, detail)
                 }
             }
         )* };
     }
     samples! {
-        Texture2d: (uv: Vec2), Vec2, flat(uv, 0), |d: Vec2| d.extend(0.0);
-        Texture2dArray: (uv: Vec2, layer: u32), Vec2, flat(uv, layer), |d: Vec2| d.extend(0.0);
-        Texture3d: (uvw: Vec3), Vec3, volume(uvw), |d| d;
-        TextureCube: (direction: Vec3), Vec3, cube(direction, 0), |d| d;
-        TextureCubeArray: (direction: Vec3, cube_index: u32), Vec3, cube(direction, cube_index), |d| d;
+        () Texture2d<'_>: (uv: Vec2), Vec2, flat(uv, 0), |d: Vec2| d.extend(0.0);
+        () Texture2dArray<'_>: (uv: Vec2, layer: u32), Vec2, flat(uv, layer), |d: Vec2| d.extend(0.0);
+        () Texture3d<'_>: (uvw: Vec3), Vec3, volume(uvw), |d| d;
+        () TextureCube<'_>: (direction: Vec3), Vec3, cube(direction, 0), |d| d;
+        () TextureCubeArray<'_>: (direction: Vec3, cube_index: u32), Vec3, cube(direction, cube_index), |d| d;
+        (<const X: i32, const Y: i32>) Shifted<Texture2d<'_>, X, Y>: (uv: Vec2), Vec2, shifted(uv, 0, [X, Y]), |d: Vec2| d.extend(0.0);
+        (<const X: i32, const Y: i32>) Shifted<Texture2dArray<'_>, X, Y>: (uv: Vec2, layer: u32), Vec2, shifted(uv, layer, [X, Y]), |d: Vec2| d.extend(0.0);
     }
 
     macro_rules! gathers {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
-            impl $name<'_> {
+        ($(($($of:tt)*) $name:ty: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $($of)* $name {
                 /// Channel `CHANNEL` (0 to 3) of the four texels of level 0 that a linear filter
                 /// reads: lower left, lower right, upper right, upper left, where the first row is
                 /// the upper one; of a cube, on the face that the direction hits. Which four they are is rounded to 8 bits on hardware: stay away
@@ -884,21 +922,23 @@ mod host {
                 #[must_use]
                 pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
                     const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
-                    sampling::gather(&self.0, &sampler.0, $place, CHANNEL as usize)
+                    sampling::gather(self.texture(), &sampler.0, $place, CHANNEL as usize)
                 }
             }
         )* };
     }
     gathers! {
-        Texture2d: (uv: Vec2), flat(uv, 0);
-        Texture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
-        TextureCube: (direction: Vec3), cube(direction, 0);
-        TextureCubeArray: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
+        () Texture2d<'_>: (uv: Vec2), flat(uv, 0);
+        () Texture2dArray<'_>: (uv: Vec2, layer: u32), flat(uv, layer);
+        () TextureCube<'_>: (direction: Vec3), cube(direction, 0);
+        () TextureCubeArray<'_>: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
+        (<const X: i32, const Y: i32>) Shifted<Texture2d<'_>, X, Y>: (uv: Vec2), shifted(uv, 0, [X, Y]);
+        (<const X: i32, const Y: i32>) Shifted<Texture2dArray<'_>, X, Y>: (uv: Vec2, layer: u32), shifted(uv, layer, [X, Y]);
     }
 
     macro_rules! comparisons {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
-            impl $name<'_> {
+        ($(($($of:tt)*) $name:ty: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $($of)* $name {
                 /// Compares `reference` with the texels that the sampler reads, reference first,
                 /// and filters how many hold: from 0 to 1. At the level of detail of the fragment,
                 /// see [`Texture2d::sample`].
@@ -911,8 +951,8 @@ mod host {
                     $($arg: $ty,)*
                     reference: f32,
                 ) -> f32 {
-                    let detail = detail(&self.0, $place, Location::caller());
-                    sampling::compare(&self.0, &sampler.0, $place, reference, detail)
+                    let detail = detail(self.texture(), $place, Location::caller());
+                    sampling::compare(self.texture(), &sampler.0, $place, reference, detail)
                 }
                 /// The same at level 0, in every stage. (No language compares at other levels that
                 /// all of them have.)
@@ -924,21 +964,23 @@ mod host {
                     $($arg: $ty,)*
                     reference: f32,
                 ) -> f32 {
-                    sampling::compare(&self.0, &sampler.0, $place, reference, 0.0)
+                    sampling::compare(self.texture(), &sampler.0, $place, reference, 0.0)
                 }
             }
         )* };
     }
     comparisons! {
-        DepthTexture2d: (uv: Vec2), flat(uv, 0);
-        DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
-        DepthTextureCube: (direction: Vec3), cube(direction, 0);
-        DepthTextureCubeArray: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
+        () DepthTexture2d<'_>: (uv: Vec2), flat(uv, 0);
+        () DepthTexture2dArray<'_>: (uv: Vec2, layer: u32), flat(uv, layer);
+        () DepthTextureCube<'_>: (direction: Vec3), cube(direction, 0);
+        () DepthTextureCubeArray<'_>: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
+        (<const X: i32, const Y: i32>) Shifted<DepthTexture2d<'_>, X, Y>: (uv: Vec2), shifted(uv, 0, [X, Y]);
+        (<const X: i32, const Y: i32>) Shifted<DepthTexture2dArray<'_>, X, Y>: (uv: Vec2, layer: u32), shifted(uv, layer, [X, Y]);
     }
 
     macro_rules! compared_gathers {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
-            impl $name<'_> {
+        ($(($($of:tt)*) $name:ty: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $($of)* $name {
                 /// Whether `reference` compares with each of the four texels of level 0 that a
                 /// linear filter reads, 1 or 0, in the order of [`Texture2d::gather`].
                 #[inline]
@@ -949,140 +991,18 @@ mod host {
                     $($arg: $ty,)*
                     reference: f32,
                 ) -> Vec4 {
-                    sampling::gather_compare(&self.0, &sampler.0, $place, reference)
+                    sampling::gather_compare(self.texture(), &sampler.0, $place, reference)
                 }
             }
         )* };
     }
     compared_gathers! {
-        DepthTexture2d: (uv: Vec2), flat(uv, 0);
-        DepthTexture2dArray: (uv: Vec2, layer: u32), flat(uv, layer);
-        DepthTextureCube: (direction: Vec3), cube(direction, 0);
-        DepthTextureCubeArray: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
-    }
-
-    /// What every language has.
-    const fn is_offset(x: i32, y: i32) -> bool {
-        x >= -8 && x <= 7 && y >= -8 && y <= 7
-    }
-
-    macro_rules! shifted {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $uv:ident, $layer:expr;)*) => { $(
-            impl $name<'_> {
-                /// The same texture, read `X` texels further to the right and `Y` further down: each from -8 to 7.
-                #[inline]
-                #[must_use]
-                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
-                    const { assert!(is_offset(X, Y), "an offset is from -8 to 7 texels") };
-                    Shifted(self)
-                }
-            }
-            impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
-                /// [`Texture2d::sample`] at the offset.
-                #[inline]
-                #[must_use]
-                #[track_caller]
-                pub fn sample(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
-                    let place = shifted($uv, $layer, [X, Y]);
-                    let detail = detail(&self.0.0, place, Location::caller());
-                    sampling::sample(&self.0.0, &sampler.0, place, detail)
-                }
-                /// [`Texture2d::sample_bias`] at the offset.
-                #[inline]
-                #[must_use]
-                #[track_caller]
-                pub fn sample_bias(self, sampler: Sampler, $($arg: $ty,)* bias: f32) -> Vec4 {
-                    let place = shifted($uv, $layer, [X, Y]);
-                    let detail = detail(&self.0.0, place, Location::caller());
-                    sampling::sample(&self.0.0, &sampler.0, place, detail + bias)
-                }
-                /// [`Texture2d::sample_level`] at the offset.
-                #[inline]
-                #[must_use]
-                pub fn sample_level(self, sampler: Sampler, $($arg: $ty,)* level: f32) -> Vec4 {
-                    sampling::sample(&self.0.0, &sampler.0, shifted($uv, $layer, [X, Y]), level)
-                }
-                /// [`Texture2d::sample_gradient`] at the offset.
-                #[inline]
-                #[must_use]
-                pub fn sample_gradient(
-                    self,
-                    sampler: Sampler,
-                    $($arg: $ty,)*
-                    dx: Vec2,
-                    dy: Vec2,
-                ) -> Vec4 {
-                    let place = shifted($uv, $layer, [X, Y]);
-                    let detail = sampling::detail(&self.0.0, place, dx.extend(0.0), dy.extend(0.0));
-                    sampling::sample(&self.0.0, &sampler.0, place, detail)
-                }
-                /// [`Texture2d::gather`] at the offset.
-                #[inline]
-                #[must_use]
-                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
-                    const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
-                    let place = shifted($uv, $layer, [X, Y]);
-                    sampling::gather(&self.0.0, &sampler.0, place, CHANNEL as usize)
-                }
-            }
-        )* };
-    }
-    shifted! {
-        Texture2d: (uv: Vec2), uv, 0;
-        Texture2dArray: (uv: Vec2, layer: u32), uv, layer;
-    }
-
-    macro_rules! shifted_comparisons {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $uv:ident, $layer:expr;)*) => { $(
-            impl $name<'_> {
-                /// The same texture, read `X` texels further to the right and `Y` further down: each from -8 to 7.
-                #[inline]
-                #[must_use]
-                pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
-                    const { assert!(is_offset(X, Y), "an offset is from -8 to 7 texels") };
-                    Shifted(self)
-                }
-            }
-            impl<const X: i32, const Y: i32> Shifted<$name<'_>, X, Y> {
-                /// [`DepthTexture2d::compare`] at the offset.
-                #[inline]
-                #[must_use]
-                #[track_caller]
-                pub fn compare(self, sampler: ComparisonSampler, $($arg: $ty,)* reference: f32) -> f32 {
-                    let place = shifted($uv, $layer, [X, Y]);
-                    let detail = detail(&self.0.0, place, Location::caller());
-                    sampling::compare(&self.0.0, &sampler.0, place, reference, detail)
-                }
-                /// [`DepthTexture2d::compare_level_zero`] at the offset.
-                #[inline]
-                #[must_use]
-                pub fn compare_level_zero(
-                    self,
-                    sampler: ComparisonSampler,
-                    $($arg: $ty,)*
-                    reference: f32,
-                ) -> f32 {
-                    let place = shifted($uv, $layer, [X, Y]);
-                    sampling::compare(&self.0.0, &sampler.0, place, reference, 0.0)
-                }
-                /// [`DepthTexture2d::gather_compare`] at the offset.
-                #[inline]
-                #[must_use]
-                pub fn gather_compare(
-                    self,
-                    sampler: ComparisonSampler,
-                    $($arg: $ty,)*
-                    reference: f32,
-                ) -> Vec4 {
-                    let place = shifted($uv, $layer, [X, Y]);
-                    sampling::gather_compare(&self.0.0, &sampler.0, place, reference)
-                }
-            }
-        )* };
-    }
-    shifted_comparisons! {
-        DepthTexture2d: (uv: Vec2), uv, 0;
-        DepthTexture2dArray: (uv: Vec2, layer: u32), uv, layer;
+        () DepthTexture2d<'_>: (uv: Vec2), flat(uv, 0);
+        () DepthTexture2dArray<'_>: (uv: Vec2, layer: u32), flat(uv, layer);
+        () DepthTextureCube<'_>: (direction: Vec3), cube(direction, 0);
+        () DepthTextureCubeArray<'_>: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
+        (<const X: i32, const Y: i32>) Shifted<DepthTexture2d<'_>, X, Y>: (uv: Vec2), shifted(uv, 0, [X, Y]);
+        (<const X: i32, const Y: i32>) Shifted<DepthTexture2dArray<'_>, X, Y>: (uv: Vec2, layer: u32), shifted(uv, layer, [X, Y]);
     }
 
     impl Texture1d<'_> {
