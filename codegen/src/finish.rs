@@ -13,7 +13,7 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, branches, canonical, exact, holders, interpolation, libm, names, narrow, offsets,
+    self, bounds, branches, canonical, exact, holders, interface, libm, names, narrow, offsets,
     order, parts, references, refused, split, tables, trim, undefined, uniform, widths,
 };
 use crate::translate::reading;
@@ -112,7 +112,7 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         exact::keep(&mut module);
     }
     undefined::fill(&mut module);
-    interpolation::apply(&mut module, kernel);
+    interface::apply(&mut module, kernel);
     trim::debug(&mut module);
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hankel_dsl::native::describe::{self, Kernel, Output, Role, Stage};
+use hankel_dsl::native::describe::{self, Kernel, Output, Role, SamplerKind, Stage};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -341,6 +341,8 @@ pub enum BindingKind {
     StorageTexture,
     /// A sampler.
     Sampler,
+    /// A sampler that takes the nearest texel of the nearest level: WebGPU's `non-filtering`.
+    NonFilteringSampler,
     /// A sampler that compares depths with a reference.
     ComparisonSampler,
 }
@@ -430,7 +432,7 @@ pub(crate) fn macro_name(kernel: &str, constant: &str) -> String {
 pub struct Interface {
     /// Its name.
     pub name: String,
-    /// `attribute`, `varying`, `position`, `depth`, `sample_mask` or `target`.
+    /// `attribute`, `varying`, `position`, `clip_distances`, `depth`, `sample_mask`, `target` or `second_source`.
     pub kind: String,
     /// Location; the position, the depth and the mask of samples have none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -703,6 +705,12 @@ fn interfaces(kernel: &Kernel, layouts: &Layouts) -> (Vec<Interface>, Vec<Interf
                 Output::Position => Some(made(&name, "position", None, "vec4<f32>".into())),
                 Output::Depth => Some(made(&name, "depth", None, "f32".into())),
                 Output::SampleMask => Some(made(&name, "sample_mask", None, "u32".into())),
+                Output::ClipDistances { ty } => {
+                    Some(made(&name, "clip_distances", None, layouts.spell(ty)))
+                }
+                Output::SecondSource { ty } => {
+                    Some(made(&name, "second_source", Some(0), layouts.spell(ty)))
+                }
                 Output::Varying {
                     location,
                     ty,
@@ -812,14 +820,11 @@ pub(crate) fn bindings(kernel: &Kernel, layouts: &Layouts) -> Vec<Binding> {
                 format: Some(format_name(*format)),
                 ..plain(*binding, name, BindingKind::StorageTexture)
             },
-            Role::Sampler {
-                binding,
-                comparison,
-            } => {
-                let kind = if *comparison {
-                    BindingKind::ComparisonSampler
-                } else {
-                    BindingKind::Sampler
+            Role::Sampler { binding, sampler } => {
+                let kind = match sampler {
+                    SamplerKind::Filtering => BindingKind::Sampler,
+                    SamplerKind::NonFiltering => BindingKind::NonFilteringSampler,
+                    SamplerKind::Comparison => BindingKind::ComparisonSampler,
                 };
                 plain(*binding, name, kind)
             }

@@ -233,7 +233,9 @@ impl Placement {
                 };
                 let is_sampler = matches!(
                     binding.kind,
-                    BindingKind::Sampler | BindingKind::ComparisonSampler
+                    BindingKind::Sampler
+                        | BindingKind::NonFilteringSampler
+                        | BindingKind::ComparisonSampler
                 );
                 if is_sampler && (places.glsl.is_some() || places.essl310.is_some()) {
                     return Err(fail(format!(

@@ -326,6 +326,10 @@ fn what_cannot_be_blended_is_refused() {
         Some(draw.single_depth([32; 2]).unwrap())
     };
     refused(
+        add(TexelFormat::Rgba16Unorm, Blend::Dual, &none),
+        &["pass `glass`", "`dual`", "second source"],
+    );
+    refused(
         add(TexelFormat::Rgba16Unorm, Blend::Alpha, &single),
         &["pass `glass`", "`before`", "with 1 samples", "with 4"],
     );

@@ -50,7 +50,7 @@ fn sampled(by_level: bool, texel: impl Fn(u32, u32, u32) -> [f32; 4]) -> Vec<[f3
     );
     let filtering = Role::Sampler {
         binding: 1,
-        comparison: false,
+        sampler: SamplerKind::Filtering,
     };
     let out = Output::Texture {
         binding: 2,

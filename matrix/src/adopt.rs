@@ -302,6 +302,9 @@ fn vulkan_format(name: &str) -> Option<ImageFormat> {
         "r16sint" => ImageFormat::R16i,
         "rg8sint" => ImageFormat::Rg8i,
         "r8sint" => ImageFormat::R8i,
+        "rgb10a2unorm" => ImageFormat::Rgb10A2,
+        "rgb10a2uint" => ImageFormat::Rgb10a2ui,
+        "rg11b10ufloat" => ImageFormat::R11fG11fB10f,
         _ => return None,
     })
 }

@@ -160,12 +160,22 @@ pub enum Role {
         /// Its type.
         value: Value,
     },
+    /// The clip distances that a vertex stage returns: 1 to 8 floats; written.
+    ClipDistances {
+        /// Their type.
+        value: Value,
+    },
     /// The depth that a fragment stage returns: one float from 0 to 1; written.
     Depth,
     /// A colour that a fragment stage returns; written.
     Target {
         /// Its location.
         location: u32,
+        /// Its type.
+        value: Value,
+    },
+    /// A second source of blending that a fragment stage returns; written.
+    SecondSource {
         /// Its type.
         value: Value,
     },
@@ -180,8 +190,10 @@ impl Role {
             | Self::Write
             | Self::Position
             | Self::Passed { .. }
+            | Self::ClipDistances { .. }
             | Self::Depth
-            | Self::Target { .. } => true,
+            | Self::Target { .. }
+            | Self::SecondSource { .. } => true,
             Self::StorageTexture { access, .. } => access != TexelAccess::Read.word(),
             _ => false,
         }

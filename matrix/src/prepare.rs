@@ -195,7 +195,7 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
         Use::Element(_) | Use::Storage(_) => Role::Read,
         Use::Atomic { .. } => Role::Atomic,
         Use::ElementMut(_) | Use::StorageMut { .. } | Use::Output(_) => Role::Write,
-        Use::Sampler { .. } => Role::Sampler,
+        Use::Sampler(_) => Role::Sampler,
         Use::Texture(kind) => Role::Texture {
             view: kind.view().into(),
             depth: kind.is_depth(),
@@ -229,6 +229,10 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
             match kernel.outputs.get(index) {
                 Some(Output::Position) => Role::Position,
                 Some(Output::Depth) => Role::Depth,
+                Some(Output::ClipDistances { ty }) => Role::ClipDistances {
+                    value: distances(ty),
+                },
+                Some(Output::SecondSource { ty }) => Role::SecondSource { value: value(ty)? },
                 Some(Output::Varying { location, ty, .. }) => Role::Passed {
                     location: *location,
                     value: value(ty)?,
@@ -241,6 +245,18 @@ fn role(kernel: &Kernel, slot: &slots::Slot<'_>) -> Result<Role, String> {
             }
         }
     })
+}
+
+/// Clip distances, an array of floats.
+fn distances(ty: &Type) -> Value {
+    let size = match ty {
+        Type::Array { length, .. } => *length,
+        _ => 1,
+    };
+    Value {
+        scalar: Scalar::F32,
+        size,
+    }
 }
 
 /// A type that passes between stages.

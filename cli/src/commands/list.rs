@@ -2,7 +2,7 @@ use hankel_codegen::Language;
 use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::describe::{
-    BuiltIn, Interpolation, Kernel, Output, Precision, Role, Rounding, Stage, Type,
+    BuiltIn, Interpolation, Kernel, Output, Precision, Role, Rounding, SamplerKind, Stage, Type,
 };
 
 use crate::args::{Format, List};
@@ -159,14 +159,14 @@ fn bindings(kernel: &Kernel) {
                     format.name()
                 )
             }
-            Role::Sampler {
-                binding,
-                comparison: false,
-            } => format!("binding {binding}: sampler"),
-            Role::Sampler {
-                binding,
-                comparison: true,
-            } => format!("binding {binding}: sampler that compares"),
+            Role::Sampler { binding, sampler } => {
+                let does = match sampler {
+                    SamplerKind::Filtering => "",
+                    SamplerKind::NonFiltering => " that does not filter",
+                    SamplerKind::Comparison => " that compares",
+                };
+                format!("binding {binding}: sampler{does}")
+            }
             Role::Constant { id, default } => format!("constant {id}, default {default}"),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
             Role::Varying {
@@ -219,6 +219,8 @@ fn bindings(kernel: &Kernel) {
             Output::Position => "clip-space position".into(),
             Output::Depth => "depth".into(),
             Output::SampleMask => "which samples are written".into(),
+            Output::ClipDistances { ty } => format!("clip distances: {}", spell(ty)),
+            Output::SecondSource { ty } => format!("second source of target 0: {}", spell(ty)),
             Output::Varying {
                 location,
                 ty,

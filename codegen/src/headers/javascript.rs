@@ -268,6 +268,7 @@ fn layout_entry(number: u32, binding: &Binding, stage: u32, filters: bool) -> se
             json!({ "access": binding.access(), "format": binding.format, "viewDimension": dimension }),
         ),
         BindingKind::Sampler => ("sampler", json!({ "type": "filtering" })),
+        BindingKind::NonFilteringSampler => ("sampler", json!({ "type": "non-filtering" })),
         BindingKind::ComparisonSampler => ("sampler", json!({ "type": "comparison" })),
     };
     entry[key] = value;

@@ -214,6 +214,9 @@ fn ty(binding: &Binding, filters: bool) -> String {
         BindingKind::Sampler => {
             "wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)".into()
         }
+        BindingKind::NonFilteringSampler => {
+            "wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering)".into()
+        }
         BindingKind::ComparisonSampler => {
             "wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)".into()
         }

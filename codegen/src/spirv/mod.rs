@@ -8,7 +8,7 @@ pub(crate) mod edit;
 pub mod exact;
 pub(crate) mod fingerprint;
 pub(crate) mod holders;
-pub mod interpolation;
+pub mod interface;
 pub mod libm;
 pub mod names;
 pub(crate) mod narrow;

@@ -98,10 +98,19 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                     names.set(variable, &name);
                 }
             }
-            Output::Position | Output::Depth | Output::SampleMask => {
+            Output::SecondSource { .. } => {
+                if let Some(variable) = second_source(module) {
+                    names.set(variable, &name);
+                }
+            }
+            Output::Position
+            | Output::Depth
+            | Output::SampleMask
+            | Output::ClipDistances { .. } => {
                 let number = match output {
                     Output::Depth => 22,
                     Output::SampleMask => 20,
+                    Output::ClipDistances { .. } => 3,
                     _ => 0,
                 };
                 if let Some(variable) = built_in(module, StorageClass::Output, number) {
@@ -157,6 +166,8 @@ pub fn output_name(kernel: &Kernel, index: usize) -> String {
         Output::Position => "position",
         Output::Depth => "depth",
         Output::SampleMask => "sample_mask",
+        Output::ClipDistances { .. } => "clip_distances",
+        Output::SecondSource { .. } => "second_color",
         Output::Varying { .. } => "varying",
         Output::Target { .. } => "color",
     };
@@ -251,11 +262,16 @@ pub(super) fn bound(module: &Module, binding: u32) -> Option<Word> {
 }
 
 pub(super) fn located(module: &Module, class: StorageClass, location: u32) -> Option<Word> {
-    variables(module).find(|variable| {
+    in_class(module, class).find(|variable| {
         decoration(module, *variable, Decoration::Location) == Some(location)
-            && global(module, *variable).and_then(|it| it.operands.first())
-                == Some(&Operand::StorageClass(class))
+            && decoration(module, *variable, Decoration::Index) != Some(1)
     })
+}
+
+/// The output that is the second source of blending.
+pub(super) fn second_source(module: &Module) -> Option<Word> {
+    in_class(module, StorageClass::Output)
+        .find(|variable| decoration(module, *variable, Decoration::Index) == Some(1))
 }
 
 fn in_class(module: &Module, class: StorageClass) -> impl Iterator<Item = Word> + '_ {
@@ -272,7 +288,7 @@ fn array_length(module: &Module, variable: Word) -> Option<u32> {
     literal(global(module, id(array, 1)?)?, 0)
 }
 
-fn built_in(module: &Module, class: StorageClass, number: u32) -> Option<Word> {
+pub(super) fn built_in(module: &Module, class: StorageClass, number: u32) -> Option<Word> {
     in_class(module, class).find(|variable| {
         module.annotations.iter().any(|note| {
             matches!(

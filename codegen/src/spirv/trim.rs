@@ -16,7 +16,11 @@ use super::{global, id, literal, op};
 /// Knows those that Hankel enables for a whole crate; others stay. spirv-val, which runs
 /// afterwards, would tell of one too few.
 pub fn capabilities(module: &mut Module) {
-    let used: HashSet<Capability> = module.all_inst_iter().filter_map(needs).collect();
+    let used: HashSet<Capability> = module
+        .all_inst_iter()
+        .flat_map(|it| [needs(it), format_needs(it)])
+        .flatten()
+        .collect();
     module
         .capabilities
         .retain(|instruction| match instruction.operands.first() {
@@ -28,7 +32,7 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 18] = [
+pub const ENABLED: [Capability; 20] = [
     // Of the number of a primitive.
     Capability::Geometry,
     // `narrow` leaves no such number.
@@ -41,7 +45,9 @@ pub const ENABLED: [Capability; 18] = [
     Capability::DerivativeControl,
     Capability::SampleRateShading,
     Capability::Sampled1D,
+    Capability::Image1D,
     Capability::SampledCubeArray,
+    Capability::ClipDistance,
     Capability::GroupNonUniform,
     Capability::GroupNonUniformVote,
     Capability::GroupNonUniformArithmetic,
@@ -62,15 +68,11 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
         | Op::ImageQuerySamples => Some(Capability::ImageQuery),
         Op::TypeImage => {
             let arrayed = literal(instruction, 3) == Some(1);
-            match (instruction.operands.get(1), instruction.operands.get(6)) {
-                // No kernel writes these, so that a format does not matter.
-                (Some(Operand::Dim(Dim::Dim1D)), _) => Some(Capability::Sampled1D),
-                (Some(Operand::Dim(Dim::DimCube)), _) if arrayed => {
-                    Some(Capability::SampledCubeArray)
-                }
-                (_, Some(Operand::ImageFormat(format))) if !is_core(*format) => {
-                    Some(Capability::StorageImageExtendedFormats)
-                }
+            let stored = literal(instruction, 5) == Some(2);
+            match instruction.operands.get(1) {
+                Some(Operand::Dim(Dim::Dim1D)) if stored => Some(Capability::Image1D),
+                Some(Operand::Dim(Dim::Dim1D)) => Some(Capability::Sampled1D),
+                Some(Operand::Dim(Dim::DimCube)) if arrayed => Some(Capability::SampledCubeArray),
                 _ => None,
             }
         }
@@ -87,6 +89,7 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
         }
         Op::Decorate => match instruction.operands.get(2) {
             Some(Operand::BuiltIn(BuiltIn::PrimitiveId)) => Some(Capability::Geometry),
+            Some(Operand::BuiltIn(BuiltIn::ClipDistance)) => Some(Capability::ClipDistance),
             Some(Operand::BuiltIn(BuiltIn::SampleId)) => Some(Capability::SampleRateShading),
             Some(Operand::BuiltIn(
                 BuiltIn::SubgroupSize
@@ -111,6 +114,17 @@ fn needs(instruction: &Instruction) -> Option<Capability> {
             Some(Capability::GroupNonUniformQuad)
         }
         other if is_arithmetic(other) => Some(Capability::GroupNonUniformArithmetic),
+        _ => None,
+    }
+}
+
+/// What the format of a storage image needs.
+fn format_needs(instruction: &Instruction) -> Option<Capability> {
+    let has_format = op(instruction) == Op::TypeImage;
+    match instruction.operands.get(6) {
+        Some(Operand::ImageFormat(format)) if has_format && !is_core(*format) => {
+            Some(Capability::StorageImageExtendedFormats)
+        }
         _ => None,
     }
 }

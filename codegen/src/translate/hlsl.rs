@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use hankel_dsl::native::describe::{Kernel, Output, Type};
 use naga::back::hlsl::{BindTarget, Options, PipelineOptions, ShaderModel, Writer};
 use naga::valid::ModuleInfo;
 use naga::{
@@ -107,6 +108,8 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     let source = text::suffixed(&source);
     let source = without_zero_arrays(&source);
     let source = without_repetitions(&source);
+    let source = with_clip_distances(&source, job.kernel);
+    let source = with_offsets_in_space(&source);
     let source = job.open_constants(source)?;
     let mut source = doubles.apply(job.precise(source, &["float", "double"])?);
     // fxc, which has models up to 5.1, does not know attributes of Vulkan.
@@ -275,6 +278,93 @@ fn without_repetitions(source: &str) -> String {
         dropping &= line.trim_end() != "}";
     }
     plain
+}
+
+/// Clip distances as HLSL has them: vectors, of which there are two. naga 30.0.1 declares one number, whatever their array
+/// holds (`tests/upstream/naga-hlsl-clip-distances`).
+fn with_clip_distances(source: &str, kernel: &Kernel) -> String {
+    let count = kernel.outputs.iter().find_map(|output| match output {
+        Output::ClipDistances {
+            ty: Type::Array { length, .. },
+        } => Some(*length),
+        _ => None,
+    });
+    let Some(count) = count else {
+        return source.to_owned();
+    };
+    let vector = |size: u32| match size {
+        1 => "float".to_owned(),
+        _ => format!("float{size}"),
+    };
+    let mut member = "";
+    let mut text = String::with_capacity(source.len());
+    for line in source.split_inclusive('\n') {
+        let declared = line
+            .trim()
+            .strip_prefix("float ")
+            .and_then(|rest| rest.strip_suffix(" : SV_ClipDistance;"));
+        match declared {
+            // The structure of the kernel's own outputs, with an array.
+            Some(array) if array.ends_with(']') => {
+                member = array.split('[').next().unwrap_or_default();
+                text.push_str(line);
+            }
+            Some(name) => {
+                let first = vector(count.min(4));
+                text.push_str(&format!("    {first} {name} : SV_ClipDistance0;\n"));
+                if count > 4 {
+                    let second = vector(count - 4);
+                    text.push_str(&format!("    {second} {name}_more : SV_ClipDistance1;\n"));
+                }
+            }
+            None if line.trim().starts_with("const VertexOutput_") => {
+                text.push_str(&with_vectors(line, member, count));
+            }
+            None => text.push_str(line),
+        }
+    }
+    text
+}
+
+/// The initialiser of what a vertex returns, with the distances one by one.
+fn with_vectors(line: &str, member: &str, count: u32) -> String {
+    let part = line
+        .split(['{', '}', ',', ';'])
+        .map(str::trim)
+        .find(|part| part.ends_with(&format!(".{member}")));
+    let Some(part) = part else {
+        return line.to_owned();
+    };
+    let of = |from: u32, to: u32| {
+        let all: Vec<String> = (from..to).map(|i| format!("{part}[{i}]")).collect();
+        match all.len() {
+            1 => all.concat(),
+            size => format!("float{size}({})", all.join(", ")),
+        }
+    };
+    let mut vectors = of(0, count.min(4));
+    if count > 4 {
+        vectors += &format!(", {}", of(4, count));
+    }
+    line.replace(part, &vectors)
+}
+
+/// Offsets in textures of three dimensions, which naga 30.0.1 puts into two (`tests/upstream/naga-hlsl-volume-offset`).
+fn with_offsets_in_space(source: &str) -> String {
+    const CUT: &str = ", int2(";
+    let mut text = String::with_capacity(source.len());
+    let mut rest = source;
+    while let Some(at) = rest.find(", int2(int3(") {
+        let call = &rest[at + CUT.len()..];
+        let Some(end) = text::closing(call) else {
+            break;
+        };
+        text.push_str(&rest[..at]);
+        text.push_str(", ");
+        text.push_str(&call[..end]);
+        rest = &call[end + 1..];
+    }
+    text + rest
 }
 
 /// Arrays of functions without the zeros that naga gives every variable, which glslang's HLSL refuses

@@ -308,6 +308,7 @@ impl Ir {
             let mut module = parse(&bytes, name)?;
             cleanup::restore_sampling(&mut module, &dropped.sampling);
             cleanup::restore_layers(&mut module);
+            cleanup::restore_depths(&mut module);
             Ok(module)
         };
         let mut module = guarded(read, name, Step::Parse)?;
@@ -407,12 +408,12 @@ impl Ir {
         let name = kernel.name.as_str();
         let step = || -> Result<_, Failure> {
             let mut module = self.module.clone();
+            cleanup::constant_indices(&mut module);
             let folded = cleanup::fold_entry_point(&mut module);
             cleanup::unwrap_blocks(&mut module);
             cleanup::matrix_types(&mut module);
             cleanup::plain_loops(&mut module);
             cleanup::turn_empty_ifs(&mut module);
-            cleanup::constant_indices(&mut module);
             cleanup::drop_last_return(&mut module);
             let members: Vec<String> = (0..kernel.outputs.len())
                 .map(|index| spirv::names::output_name(kernel, index))
@@ -524,10 +525,10 @@ impl Ir {
             ));
         }
         let glsl = es || language == Language::Glsl;
-        if glsl && self.loads_depths() {
+        if glsl && self.reads_and_compares_depths() {
             return Some(format!(
-                "naga's {language} writer reads a texel of a depth texture through a sampler that \
-                 compares, which {language} does not do: take a `Texture2d`"
+                "a depth texture of {language} is compared, or read as it is: bind what is read once more, as a \
+                 `Texture2d`"
             ));
         }
         if glsl && self.gathers_compared_layers() {
@@ -751,13 +752,28 @@ impl Ir {
         })
     }
 
-    /// Whether a texel of a depth texture is read as it is.
-    fn loads_depths(&self) -> bool {
+    /// Whether some depths are compared and others read as they are.
+    fn reads_and_compares_depths(&self) -> bool {
+        let compared = |it: &Expression| {
+            matches!(
+                it,
+                Expression::ImageSample {
+                    depth_ref: Some(_),
+                    ..
+                }
+            )
+        };
         let functions = self.module.functions.iter().map(|(_, function)| function);
-        let entries = self.module.entry_points.iter().map(|entry| &entry.function);
-        functions.chain(entries).any(|function| {
+        let mut all = functions.chain(self.module.entry_points.iter().map(|it| &it.function));
+        let read = all.any(|function| {
             function.expressions.iter().any(|(_, it)| {
-                let Expression::ImageLoad { image, .. } = *it else {
+                let (Expression::ImageLoad { image, .. }
+                | Expression::ImageSample {
+                    image,
+                    depth_ref: None,
+                    ..
+                }) = *it
+                else {
                     return false;
                 };
                 let Expression::GlobalVariable(image) = function.expressions[image] else {
@@ -772,7 +788,8 @@ impl Ir {
                     }
                 )
             })
-        })
+        });
+        read && self.has(compared)
     }
 
     /// Whether any expression of any function is like that.

@@ -105,6 +105,9 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
         .replace(&format!("struct {entry_point}Input {{\n}};\n"), "")
         .replace(" - 0 - ", " - ");
     let source = compared_at_level_zero(&fenced(&source));
+    let source = with_gradients(&source);
+    // As the Metal Shading Language specification writes it.
+    let source = source.replace(") index(", "), index(");
     let source = job.open_constants(source)?;
     let source = if job.kernel.rounding == Rounding::Exact {
         exact(&source).ok_or_else(|| Failure {
@@ -222,6 +225,50 @@ fn with_marked_comparisons(module: Cow<'_, Module>) -> Cow<'_, Module> {
         }
     }
     Cow::Owned(module)
+}
+
+/// Gradients in three dimensions and of cubes by their own names: naga 30.0.1 writes those of two dimensions for all
+/// (`tests/upstream/naga-msl-gradients`).
+fn with_gradients(source: &str) -> String {
+    const GRADIENT: &str = "metal::gradient2d(";
+    if !source.contains(GRADIENT) {
+        return source.to_owned();
+    }
+    let mut text = String::with_capacity(source.len());
+    let mut rest = source;
+    while let Some(at) = rest.find(".sample(") {
+        let (before, call) = rest.split_at(at + ".sample(".len());
+        let end = text::closing(call).unwrap_or(call.len());
+        let texture = text::name_at_end(&before[..at]);
+        let gradient = ["texture3d", "texturecube", "texturecube_array"]
+            .into_iter()
+            .find(|kind| is_declared(source, kind, texture))
+            .map(|kind| match kind {
+                "texture3d" => "metal::gradient3d(",
+                _ => "metal::gradientcube(",
+            });
+        text.push_str(before);
+        match gradient {
+            Some(gradient) => text.push_str(&call[..end].replace(GRADIENT, gradient)),
+            None => text.push_str(&call[..end]),
+        }
+        rest = &call[end..];
+    }
+    text + rest
+}
+
+/// Whether a parameter of this name is a texture of this kind.
+fn is_declared(source: &str, kind: &str, name: &str) -> bool {
+    source
+        .match_indices(&format!("metal::{kind}<"))
+        .any(|(at, _)| {
+            let declared = source[at..].split_once("> ").map(|(_, rest)| rest);
+            declared.is_some_and(|rest| {
+                rest.strip_prefix(name).is_some_and(|after| {
+                    !after.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+                })
+            })
+        })
 }
 
 /// Level 0 for the level of each comparison: those of a fragment's own level have none.

@@ -7,6 +7,7 @@
 //! | a type of two whole numbers for coordinates into arrays of textures | naga 30.0.1 panics | `naga-arrayed-fetch` |
 //! | a copy of what an operation of a subgroup takes from another block | naga 30.0.1 panics | `naga-subgroup-operand` |
 //! | a mask of samples as a number, which is an array in SPIR-V | naga 30.0.1 refuses it | `naga-sample-mask` |
+//! | depths that are never compared as floats in GLSL | a sampler that compares, which cannot read them | |
 //! | the remainder of signed numbers in GLSL | `%`, which GLSL leaves undefined below zero | `naga-glsl-remainder` |
 //! | exchanged bytes in HLSL | DXC 1.7 makes an intrinsic of them that Direct3D does not have | `dxc-byte-swap` |
 //!
@@ -113,10 +114,35 @@ fn samplings(module: &Module) -> BTreeMap<(bool, u32), Sampling> {
 /// Edits that a language needs. Says whether there were any.
 pub fn for_language(module: &mut Module, language: Language) -> bool {
     match language {
-        Language::Glsl | Language::Essl310 | Language::Essl300 => remainders(module),
+        Language::Glsl | Language::Essl310 | Language::Essl300 => {
+            plain_depths(module) | remainders(module)
+        }
         Language::Hlsl => swapped_bytes(module),
         Language::Spirv | Language::Wgsl | Language::Msl => false,
     }
+}
+
+/// Depths that nothing compares become floats: a sampler of GLSL compares always, or never.
+fn plain_depths(module: &mut Module) -> bool {
+    let compares = |it: &Instruction| {
+        matches!(
+            op(it),
+            Op::ImageSampleDrefImplicitLod | Op::ImageSampleDrefExplicitLod | Op::ImageDrefGather
+        )
+    };
+    let functions = || module.functions.iter().flat_map(|it| it.all_inst_iter());
+    if functions().any(compares) {
+        return false;
+    }
+    let mut any = false;
+    for it in &mut module.types_global_values {
+        let depth = Operand::LiteralBit32(1);
+        if op(it) == Op::TypeImage && it.operands.get(2) == Some(&depth) {
+            it.operands[2] = Operand::LiteralBit32(0);
+            any = true;
+        }
+    }
+    any
 }
 
 /// naga looks for the type of a coordinate without the layer, which nobody may have used. It is part

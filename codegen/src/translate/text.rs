@@ -47,6 +47,25 @@ pub fn without_underscores(text: &str, renamed: &HashMap<String, &str>) -> Strin
     all
 }
 
+/// The name that the text ends in.
+pub fn name_at_end(text: &str) -> &str {
+    &text[text.trim_end_matches(is_name).len()..]
+}
+
+/// Where the bracket is that closes the one before the text.
+pub fn closing(text: &str) -> Option<usize> {
+    let mut depth = 0_u32;
+    text.bytes().position(|byte| {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' if depth == 0 => return true,
+            b')' | b']' | b'}' => depth -= 1,
+            _ => {}
+        }
+        false
+    })
+}
+
 /// Replaces a name wherever it stands by itself.
 pub fn rename(text: &str, from: &str, to: &str) -> String {
     let mut all = String::with_capacity(text.len());

@@ -21,8 +21,12 @@ const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
 /// WebGPU's feature for operations of subgroups, and WGSL's extension.
 const SUBGROUPS: &str = "subgroups";
 
-/// WebGPU's feature for numbers of primitives.
-const PRIMITIVES: &str = "primitive-index";
+/// Extensions of WGSL that naga enables, each with WebGPU's feature.
+const EXTENSIONS: [(&str, &str); 3] = [
+    ("primitive_index", "primitive-index"),
+    ("clip_distances", "clip-distances"),
+    ("dual_source_blending", "dual-source-blending"),
+];
 
 /// WGSL's language feature for push constants.
 const IMMEDIATES: &str = "immediate_address_space";
@@ -96,8 +100,10 @@ pub(super) fn write(job: &Job<'_>) -> Result<Written, Failure> {
     if ir.globals().any(|(_, inner)| reads_storage(inner)) {
         requires.push(READ_STORAGE.to_owned());
     }
-    if source.contains("enable primitive_index;") {
-        requires.push(PRIMITIVES.to_owned());
+    for (extension, feature) in EXTENSIONS {
+        if source.contains(&format!("enable {extension};")) {
+            requires.push(feature.to_owned());
+        }
     }
     let entry_point = text::name_before(&source_after_stage(&source), "(")
         .unwrap_or_else(|| job.kernel.name.clone());

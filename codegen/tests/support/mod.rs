@@ -70,6 +70,7 @@ fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         subgroups: Subgroups::Unused,
         compensated: None,
         image_pass: None,
+        invariant: false,
     }
 }
 
@@ -185,7 +186,7 @@ pub fn resample() -> Kernel {
                 "linear",
                 Role::Sampler {
                     binding: 1,
-                    comparison: false,
+                    sampler: SamplerKind::Filtering,
                 },
             ),
             param("depth", texture(2, TextureKind::Texture2dMultisampled)),
@@ -293,7 +294,7 @@ pub fn tint() -> Kernel {
                 "linear",
                 Role::Sampler {
                     binding: 1,
-                    comparison: false,
+                    sampler: SamplerKind::Filtering,
                 },
             ),
             param(

@@ -476,6 +476,12 @@ impl Graph {
                 target.format.name()
             )));
         }
+        if blend.takes_second() {
+            return Err(refuse(format!(
+                "frames blend one colour, and `{}` takes a second source",
+                blend.name()
+            )));
+        }
         let Some(before) = before else {
             return Ok(());
         };
@@ -539,6 +545,13 @@ impl Graph {
     ) -> Result<()> {
         let vertex = &self.kernels[vertex.kernel].kernel;
         let fragment = &self.kernels[kernel].kernel;
+        let clips = |it: &Output| matches!(it, Output::ClipDistances { .. });
+        if vertex.outputs.iter().any(clips) {
+            return Err(place.kernel(&format!(
+                "frames clip at the view alone, and vertex kernel `{}` returns clip distances",
+                vertex.name
+            )));
+        }
         for param in &fragment.params {
             let Role::Varying {
                 location,

@@ -397,7 +397,7 @@ impl Samples {
             for (i, sees) in pixel {
                 for (sample, sees) in samples.iter_mut().zip(sees) {
                     if sees {
-                        *sample = through(self.blend.apply(colours[i], *sample));
+                        *sample = through(self.blend.apply(colours[i], Vec4::ONE, *sample));
                     }
                 }
             }

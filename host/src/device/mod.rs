@@ -448,6 +448,11 @@ pub enum Blend {
     Multiplicative,
     /// The smaller one of `source` and `destination`, channel by channel.
     Least,
+    /// `source + second destination`, where `second` is the [second source](Output::SecondSource) of the fragment
+    /// kernel: a colour, and what lets the light behind it through, for each channel.
+    Dual,
+    /// `second destination`: the same without the source.
+    Second,
 }
 
 impl Blend {
@@ -460,12 +465,20 @@ impl Blend {
             Self::Additive => "additive",
             Self::Multiplicative => "multiplicative",
             Self::Least => "least",
+            Self::Dual => "dual",
+            Self::Second => "second",
         }
     }
 
-    /// What is there afterwards, before it is stored.
+    /// Whether it takes a second source.
     #[must_use]
-    pub fn apply(self, source: Vec4, destination: Vec4) -> Vec4 {
+    pub const fn takes_second(self) -> bool {
+        matches!(self, Self::Dual | Self::Second)
+    }
+
+    /// What is there afterwards, before it is stored, of one source or two.
+    #[must_use]
+    pub fn apply(self, source: Vec4, second: Vec4, destination: Vec4) -> Vec4 {
         match self {
             Self::Off => source,
             Self::Alpha => {
@@ -478,6 +491,8 @@ impl Blend {
             Self::Additive => source + destination,
             Self::Multiplicative => source * destination,
             Self::Least => source.min(destination),
+            Self::Dual => source + second * destination,
+            Self::Second => second * destination,
         }
     }
 }

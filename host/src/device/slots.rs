@@ -5,7 +5,8 @@ use std::fmt;
 
 use hankel_dsl::native::Sampler;
 use hankel_dsl::native::describe::{
-    Channels, Kernel, Layout, Output, Role, Scalar, TexelAccess, TexelFormat, TextureKind, Type,
+    Channels, Kernel, Layout, Output, Role, SamplerKind, Scalar, TexelAccess, TexelFormat,
+    TextureKind, Type,
 };
 
 use super::error::{DeviceError, Result};
@@ -39,10 +40,7 @@ pub enum Use<'a> {
     /// A texture that is read.
     Texture(TextureKind),
     /// A sampler.
-    Sampler {
-        /// It compares depths with a reference.
-        comparison: bool,
-    },
+    Sampler(SamplerKind),
     /// One value for each vertex.
     Attribute(u32, &'a Type),
     /// One value for each fragment; an argument on the native device only.
@@ -113,7 +111,7 @@ impl Use<'_> {
             Self::StorageMut { layout, .. } | Self::Output(layout) => layout.size as usize,
             Self::Atomic { .. } => 4,
             Self::Attribute(_, ty) | Self::Varying(_, ty) | Self::Interface(ty) => type_bytes(ty),
-            Self::Texture(_) | Self::Sampler { .. } | Self::StorageTexture { .. } => return None,
+            Self::Texture(_) | Self::Sampler(_) | Self::StorageTexture { .. } => return None,
         })
     }
 
@@ -121,8 +119,7 @@ impl Use<'_> {
     const fn wanted(&self) -> &'static str {
         match self {
             Self::Texture(_) => "a texture",
-            Self::Sampler { comparison: false } => "a sampler that does not compare",
-            Self::Sampler { comparison: true } => "a sampler that compares",
+            Self::Sampler(kind) => kind.wanted(),
             Self::StorageTexture { access, .. } => {
                 if access.writes() {
                     "a texture to write"
@@ -223,15 +220,7 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
                     access: *access,
                 },
             ),
-            Role::Sampler {
-                binding,
-                comparison,
-            } => (
-                Some(*binding),
-                Use::Sampler {
-                    comparison: *comparison,
-                },
-            ),
+            Role::Sampler { binding, sampler } => (Some(*binding), Use::Sampler(*sampler)),
             Role::Attribute { location, ty } => (None, Use::Attribute(*location, ty)),
             Role::Varying { location, ty, .. } => (None, Use::Varying(*location, ty)),
             Role::Constant { .. } | Role::Index | Role::BuiltIn { .. } | Role::Shared { .. } => {
@@ -265,7 +254,10 @@ pub fn slots(kernel: &Kernel) -> Vec<Slot<'_>> {
             Output::Depth => (None, Use::Interface(&DEPTH)),
             // What it leaves of the others is compared.
             Output::SampleMask => continue,
-            Output::Varying { ty, .. } | Output::Target { ty, .. } => (None, Use::Interface(ty)),
+            Output::ClipDistances { ty }
+            | Output::Varying { ty, .. }
+            | Output::Target { ty, .. }
+            | Output::SecondSource { ty } => (None, Use::Interface(ty)),
         };
         let name = if kernel.outputs.len() == 1 {
             "output".into()
@@ -441,11 +433,7 @@ fn check_one(slot: &Slot<'_>, given: &Given<'_>) -> std::result::Result<(), Stri
         return Ok(());
     }
     match (slot.role, given) {
-        (Use::Sampler { comparison }, Given::Sampler(sampler))
-            if sampler.compare.is_some() == comparison =>
-        {
-            Ok(())
-        }
+        (Use::Sampler(kind), Given::Sampler(sampler)) if kind.fits(sampler) => Ok(()),
         (Use::Texture(kind), Given::Texture { shape, .. }) => check_texture(kind, shape),
         (
             Use::StorageTexture {

@@ -16,8 +16,8 @@ use std::fmt;
 use fastrand::Rng;
 use hankel_dsl::native::channel::Stored;
 use hankel_dsl::native::describe::{
-    Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, Scalar, Stage,
-    TexelFormat, TextureKind,
+    Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, SamplerKind,
+    Scalar, Stage, TexelFormat, TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
 use hankel_dsl::native::{Address, Compare, Filter, Sampler, fragment};
@@ -673,14 +673,12 @@ fn own_arg(slot: &Slot<'_>, value: &Value) -> Result<Input, String> {
                     wanted.name()
                 ));
             }
-            if dimensions == 2 && size[2] != 1 {
-                return Err("it has two dimensions".into());
+            if size[dimensions as usize..].iter().any(|n| *n != 1) {
+                return Err(format!("it has more than {dimensions} dimensions"));
             }
             texels_of_shape(shape, bytes)
         }
-        (Value::Sampler(sampler), Use::Sampler { comparison })
-            if sampler.compare.is_some() == comparison =>
-        {
+        (Value::Sampler(sampler), Use::Sampler(kind)) if kind.fits(sampler) => {
             Ok(Input::Sampler(*sampler))
         }
         _ => Err("it is of another kind".into()),
@@ -956,11 +954,15 @@ fn input(
             access,
         } => {
             let [width, height, _] = extents.size;
-            let shape = if dimensions == 3 {
-                TextureShape::d3(extents.volume, format)
-            } else {
-                let layers = said.layers.unwrap_or(LAYERS);
-                TextureShape::d2(width, height, format).with_layers(if array { layers } else { 1 })
+            let layers = said.layers.unwrap_or(LAYERS);
+            let shape = match dimensions {
+                1 => TextureShape::d1(width, format),
+                3 => TextureShape::d3(extents.volume, format),
+                _ => TextureShape::d2(width, height, format).with_layers(if array {
+                    layers
+                } else {
+                    1
+                }),
             };
             let bytes = if access.reads() {
                 values.texels(said, &shape)?
@@ -989,28 +991,36 @@ fn input(
                 samples: if kind.is_multisampled() { 4 } else { 1 },
                 format: if kind.is_depth() {
                     Format::Depth32
-                } else if kind.is_multisampled() {
-                    Format::Texel(TexelFormat::R32Float)
                 } else {
-                    Format::Texel(match kind.channels() {
-                        Channels::Float => TexelFormat::Rgba32Float,
-                        Channels::Uint => TexelFormat::Rgba32Uint,
-                        Channels::Sint => TexelFormat::Rgba32Sint,
+                    // No device has wide formats with several samples.
+                    Format::Texel(match (kind.channels(), kind.is_multisampled()) {
+                        (Channels::Float, false) => TexelFormat::Rgba32Float,
+                        (Channels::Uint, false) => TexelFormat::Rgba32Uint,
+                        (Channels::Sint, false) => TexelFormat::Rgba32Sint,
+                        (Channels::Float, true) => TexelFormat::R32Float,
+                        (Channels::Uint, true) => TexelFormat::Rg16Uint,
+                        (Channels::Sint, true) => TexelFormat::Rg16Sint,
                     })
                 },
             };
             let bytes = values.texels(said, &shape)?;
             Input::Texture { shape, bytes }
         }
-        Use::Sampler { comparison } => {
-            let filter = said.filter.unwrap_or(Filter::Linear);
+        Use::Sampler(kind) => {
+            let usual = match kind {
+                SamplerKind::NonFiltering => Filter::Nearest,
+                SamplerKind::Filtering | SamplerKind::Comparison => Filter::Linear,
+            };
+            let filter = said.filter.unwrap_or(usual);
             let address = said.address.unwrap_or(match values.class {
                 Class::Edge => Address::Repeat,
                 Class::Ordinary | Class::Hostile => Address::ClampToEdge,
             });
             Input::Sampler(Sampler {
-                mip: said.mip_filter.unwrap_or(Filter::Linear),
-                compare: comparison.then(|| said.compare.unwrap_or(Compare::LessEqual)),
+                mip: said.mip_filter.unwrap_or(usual),
+                compare: kind
+                    .is_comparison()
+                    .then(|| said.compare.unwrap_or(Compare::LessEqual)),
                 ..Sampler::new(filter, address)
             })
         }

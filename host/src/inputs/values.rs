@@ -313,7 +313,7 @@ impl Values {
 
 /// Numbers that a format's channels can hold, and that a domain has.
 fn held(format: TexelFormat, domain: Option<Domain>) -> Domain {
-    let bits = 8 * format.channel_bytes() as i32;
+    let bits = format.channel_bits()[0] as i32;
     let (least, most) = match format.numbers() {
         Channels::Sint => (-(2.0_f64.powi(bits - 1)), 2.0_f64.powi(bits - 1) - 1.0),
         _ => (0.0, 2.0_f64.powi(bits) - 1.0),

@@ -11,16 +11,21 @@ use rspirv::spirv::{BuiltIn, Decoration, ExecutionModel, FunctionControl, Op, St
 pub struct Captured {
     /// Its words.
     pub words: Vec<u32>,
-    /// Where the position comes out.
+    /// Where the position comes out; behind it the clip distances, each at a location of its own.
     pub location: u32,
 }
 
 /// Rewrites `words` so that vertex `i` of its entry point `name` lands in pixel
-/// `(i % width, i / width)` of a target of `width` x `height`.
+/// `(i % width, i / width)` of a target of `width` x `height`, and is not clipped by any of its `clips` distances.
 ///
 /// # Errors
 /// In words: what is not as a vertex stage should be.
-pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Captured, String> {
+pub fn capture(
+    words: &[u32],
+    name: &str,
+    [width, height]: [u32; 2],
+    clips: u32,
+) -> Result<Captured, String> {
     let module = dr::load_words(words).map_err(|e| format!("its SPIR-V cannot be read: {e}"))?;
     let entry = module
         .entry_points
@@ -49,6 +54,10 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
         .max()
         .unwrap_or(0);
     let existing_index = decorated(&module, BuiltIn::VertexIndex);
+    let distances = (clips > 0).then(|| Distances::of(&module, &interface));
+    let distances = distances
+        .map(|it| it.ok_or("it writes no clip distances"))
+        .transpose()?;
 
     let mut b = Builder::new_from_module(module);
     let error = |e: dr::Error| format!("its SPIR-V cannot be extended: {e}");
@@ -67,6 +76,18 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
         Decoration::Location,
         [Operand::LiteralBit32(location)],
     );
+    let passed_distances: Vec<Word> = (0..clips)
+        .map(|i| {
+            let distance = b.variable(out_float, None, StorageClass::Output, None);
+            b.decorate(
+                distance,
+                Decoration::Location,
+                [Operand::LiteralBit32(location + 1 + i)],
+            );
+            distance
+        })
+        .collect();
+    let numbers: Vec<Word> = (0..clips).map(|i| b.constant_bit32(uint, i)).collect();
     // A block that holds the position holds the size too.
     let new_size = matches!(position, Position::Variable(_)).then(|| {
         let size = b.variable(out_float, None, StorageClass::Output, None);
@@ -143,17 +164,30 @@ pub fn capture(words: &[u32], name: &str, width: u32, height: u32) -> Result<Cap
     b.store(passed, own, None, []).map_err(error)?;
     b.store(position, at, None, []).map_err(error)?;
     b.store(size, one, None, []).map_err(error)?;
+    for (passed, number) in passed_distances.iter().zip(numbers) {
+        let (base, indices) = match distances {
+            Some(Distances::Member(block, member)) => {
+                (block, vec![b.constant_bit32(uint, member), number])
+            }
+            Some(Distances::Variable(variable)) => (variable, vec![number]),
+            None => break,
+        };
+        let distance = b
+            .access_chain(out_float, None, base, indices)
+            .map_err(error)?;
+        let own = b.load(float, None, distance, None, []).map_err(error)?;
+        b.store(*passed, own, None, []).map_err(error)?;
+        b.store(distance, one, None, []).map_err(error)?;
+    }
     b.ret().map_err(error)?;
     b.end_function().map_err(error)?;
 
     let point = &mut b.module_mut().entry_points[entry];
     point.operands[1] = Operand::IdRef(outer);
-    point.operands.extend(
-        [Some(passed), new_size]
-            .into_iter()
-            .flatten()
-            .map(Operand::IdRef),
-    );
+    let added = [Some(passed), new_size].into_iter().flatten();
+    point
+        .operands
+        .extend(added.chain(passed_distances).map(Operand::IdRef));
     if !interface.contains(&index) {
         point.operands.push(Operand::IdRef(index));
     }
@@ -177,29 +211,50 @@ impl Position {
         if let Some(id) = decorated(module, BuiltIn::Position) {
             return interface.contains(&id).then_some(Self::Variable(id));
         }
-        let member = |built_in: BuiltIn| {
-            module
-                .annotations
-                .iter()
-                .find_map(|i| match &i.operands[..] {
-                    [
-                        Operand::IdRef(structure),
-                        Operand::LiteralBit32(n),
-                        Operand::Decoration(Decoration::BuiltIn),
-                        Operand::BuiltIn(b),
-                    ] if i.class.opcode == Op::MemberDecorate && *b == built_in => {
-                        Some((*structure, *n))
-                    }
-                    _ => None,
-                })
-        };
-        let (structure, position) = member(BuiltIn::Position)?;
-        let (_, size) = member(BuiltIn::PointSize).filter(|(s, _)| *s == structure)?;
+        let (structure, position) = member(module, BuiltIn::Position)?;
+        let (_, size) = member(module, BuiltIn::PointSize).filter(|(s, _)| *s == structure)?;
         let block = interface
             .iter()
             .find(|&&id| pointee(module, id) == Some(structure))?;
         Some(Self::Member(*block, [position, size]))
     }
+}
+
+/// Where a vertex stage writes its clip distances.
+enum Distances {
+    /// A variable, an array.
+    Variable(Word),
+    /// A variable that is a block, and its member that is the array.
+    Member(Word, u32),
+}
+
+impl Distances {
+    fn of(module: &dr::Module, interface: &[Word]) -> Option<Self> {
+        if let Some(id) = decorated(module, BuiltIn::ClipDistance) {
+            return interface.contains(&id).then_some(Self::Variable(id));
+        }
+        let (structure, number) = member(module, BuiltIn::ClipDistance)?;
+        let block = interface
+            .iter()
+            .find(|&&id| pointee(module, id) == Some(structure))?;
+        Some(Self::Member(*block, number))
+    }
+}
+
+/// The structure with a member that is a built-in, and the member's number.
+fn member(module: &dr::Module, built_in: BuiltIn) -> Option<(Word, u32)> {
+    module
+        .annotations
+        .iter()
+        .find_map(|i| match &i.operands[..] {
+            [
+                Operand::IdRef(structure),
+                Operand::LiteralBit32(n),
+                Operand::Decoration(Decoration::BuiltIn),
+                Operand::BuiltIn(b),
+            ] if i.class.opcode == Op::MemberDecorate && *b == built_in => Some((*structure, *n)),
+            _ => None,
+        })
 }
 
 /// The variable decorated as a built-in.

@@ -72,6 +72,8 @@ pub enum Kind {
     Normalised(TexelFormat),
     /// A channel of 8 or 16 bits of this format.
     Integer(TexelFormat),
+    /// All channels of this format, which share a word.
+    Packed(TexelFormat),
 }
 
 impl Kind {
@@ -82,6 +84,7 @@ impl Kind {
             Self::Scalar(it) => !matches!(it, Scalar::F32 | Scalar::F64),
             Self::Integer(_) => true,
             Self::Half | Self::Normalised(_) => false,
+            Self::Packed(format) => format.is_integer(),
         };
         match is_integer {
             true => format!("{x:.0}"),
@@ -99,6 +102,7 @@ impl Kind {
             (Stored::Integer { bits: 32 }, Channels::Sint) => Self::Scalar(Scalar::I32),
             (Stored::Integer { bits: 32 }, _) => Self::Scalar(Scalar::U32),
             (Stored::Integer { .. }, _) => Self::Integer(format),
+            (Stored::Packed, _) => Self::Packed(format),
         }
     }
 
@@ -108,7 +112,9 @@ impl Kind {
         match self {
             Self::Scalar(s) => crate::device::slots::scalar_bytes(s),
             Self::Half => 2,
-            Self::Normalised(format) | Self::Integer(format) => format.channel_bytes(),
+            Self::Normalised(format) | Self::Integer(format) | Self::Packed(format) => {
+                format.channel_bytes()
+            }
         }
     }
 
@@ -128,7 +134,7 @@ impl Kind {
                     _ => Ordering::Equal,
                 }
             }
-            Self::Half | Self::Normalised(_) | Self::Integer(_) => {
+            Self::Half | Self::Normalised(_) | Self::Integer(_) | Self::Packed(_) => {
                 a[..self.bytes()].cmp(&b[..self.bytes()])
             }
         }
@@ -188,8 +194,27 @@ impl Kind {
                 let (a, b) = (read(a), read(b));
                 Distance::new(a.abs_diff(b).into(), a.into(), b.into())
             }
+            Self::Packed(format) => farthest(format, a, b),
         }
     }
+}
+
+/// The distance of the channels that differ most, in steps: floats without a sign are in the order of their bits.
+fn farthest(format: TexelFormat, a: &[u8], b: &[u8]) -> Distance {
+    let (values_a, values_b) = (format.load(a), format.load(b));
+    let (steps_a, steps_b) = (format.load_integer(a), format.load_integer(b));
+    let channels = (0..format.channels()).map(|i| {
+        let (x, y) = (values_a[i], values_b[i]);
+        let steps = match (x.is_nan(), y.is_nan()) {
+            (true, true) => 0,
+            (false, false) => steps_a[i].abs_diff(steps_b[i]).into(),
+            _ => u64::MAX,
+        };
+        Distance::new(steps, x.into(), y.into())
+    });
+    channels
+        .max_by_key(|distance| distance.ulp)
+        .unwrap_or_else(|| Distance::new(0, 0.0, 0.0))
 }
 
 /// The number of the step that a normalised channel is at, and its value.

@@ -231,6 +231,7 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
         subgroups: Subgroups::Unused,
         compensated: None,
         image_pass: None,
+        invariant: false,
     }
 }
 
@@ -351,10 +352,10 @@ fn fragment(
     );
     let points = helper("hankel_points", Stage::Vertex, params, outputs);
     let mut targets = Vec::new();
-    let (mut colours, mut depth) = (Vec::new(), None);
+    let (mut colours, mut depth, mut second) = (Vec::new(), None, None);
     for output in &kernel.outputs {
         let ty = match output {
-            Output::Target { ty, .. } => ty,
+            Output::Target { ty, .. } | Output::SecondSource { ty } => ty,
             Output::Depth => {
                 let id = device.texture("depth", &TextureShape::depth(WIDTH, height))?;
                 held.textures.push(id);
@@ -390,12 +391,32 @@ fn fragment(
         let id = device.texture("target", &TextureShape::d2(WIDTH, height, format))?;
         held.textures.push(id);
         targets.push((id, format));
+        if matches!(output, Output::SecondSource { .. }) {
+            // It is seen by blending alone.
+            second = Some([Colour {
+                texture: id,
+                resolve: None,
+                clear: Some([1.0; 4]),
+                blend: Blend::Second,
+            }]);
+            continue;
+        }
         colours.push(Colour {
             texture: id,
             resolve: None,
             clear: Some([0.0; 4]),
             blend: Blend::Off,
         });
+    }
+    if second.is_some()
+        && slots
+            .iter()
+            .any(|it| it.binding.is_some() && it.role.is_written())
+    {
+        return Err(bad(
+            kernel,
+            "a second source is drawn once more to be read, and the kernel writes memory",
+        ));
     }
     let draw = Draw {
         vertex: Program {
@@ -415,6 +436,9 @@ fn fragment(
         topology: Topology::Points,
         cull: Cull::None,
     };
+    if let Some(second) = second {
+        device.draw(&pass(&second, depth, std::slice::from_ref(&draw)))?;
+    }
     device.draw(&pass(&colours, depth, &[draw]))?;
     // Parameters come before what is returned, which has no binding.
     let bound = slots.iter().zip(&all).filter(|(s, _)| s.binding.is_some());
@@ -439,7 +463,11 @@ fn vertex(
     let Some(Shader::SpirvPassthrough(words)) = program.shader else {
         return Err(bad(kernel, "it has no shader"));
     };
-    let captured = capture::capture(words, &kernel.name, WIDTH, height)
+    let clips = kernel.outputs.iter().find_map(|it| match it {
+        Output::ClipDistances { ty } => Some(slots::type_bytes(ty) as u32 / 4),
+        _ => None,
+    });
+    let captured = capture::capture(words, &kernel.name, [WIDTH, height], clips.unwrap_or(0))
         .map_err(|problem| bad(kernel, problem))?;
     let slots = slots::slots(kernel);
     let binds = upload(device, &slots, &case.args, held)?;
@@ -449,25 +477,31 @@ fn vertex(
         .filter(|(s, _)| !matches!(s.role, Use::Interface(_)))
         .map(|(_, b)| *b)
         .collect();
-    let mut captured_kernel = kernel.clone();
-    captured_kernel.outputs = kernel
+    // Each fragment is a point, over which nothing is interpolated.
+    let varying = |location: u32, ty: &Type| Output::Varying {
+        location,
+        ty: ty.clone(),
+        interpolation: Interpolation::Flat,
+    };
+    // What is read of each output.
+    let read: Vec<Vec<Output>> = kernel
         .outputs
         .iter()
-        .map(|o| match o {
-            Output::Position => Output::Varying {
-                location: captured.location,
-                ty: slots::POSITION,
-                interpolation: Interpolation::Flat,
-            },
-            // Each fragment is a point, over which nothing is interpolated.
-            Output::Varying { location, ty, .. } => Output::Varying {
-                location: *location,
-                ty: ty.clone(),
-                interpolation: Interpolation::Flat,
-            },
-            other => other.clone(),
+        .map(|output| match output {
+            Output::Position => vec![varying(captured.location, &slots::POSITION)],
+            Output::Varying { location, ty, .. } => vec![varying(*location, ty)],
+            Output::ClipDistances { .. } => {
+                let distance = Type::Scalar {
+                    scalar: Scalar::F32,
+                };
+                let places = (captured.location + 1..).take(clips.unwrap_or(0) as usize);
+                places.map(|at| varying(at, &distance)).collect()
+            }
+            other => vec![other.clone()],
         })
         .collect();
+    let mut captured_kernel = kernel.clone();
+    captured_kernel.outputs = read.concat();
     let target = device.texture(
         "f32",
         &TextureShape::d2(WIDTH, height, TexelFormat::Rgba32Float),
@@ -568,5 +602,25 @@ fn vertex(
             case.invocations,
         ));
     }
-    Ok(written)
+    let mut written = written.into_iter();
+    Ok(read
+        .iter()
+        .map(|parts| {
+            joined(
+                written.by_ref().take(parts.len()).collect(),
+                case.invocations,
+            )
+        })
+        .collect())
+}
+
+/// The bytes of so many values of each part, value after value.
+fn joined(parts: Vec<Vec<u8>>, count: usize) -> Vec<u8> {
+    let of = |part: &Vec<u8>, i: usize| {
+        let bytes = part.len() / count.max(1);
+        part[i * bytes..(i + 1) * bytes].to_vec()
+    };
+    (0..count)
+        .flat_map(|i| parts.iter().flat_map(move |part| of(part, i)))
+        .collect()
 }

@@ -279,12 +279,18 @@ fn outputs(kernel: &Kernel) -> Vec<Out> {
             Use::Atomic { scalar, .. } => flat::type_leaves(&Type::Scalar { scalar }),
             Use::StorageTexture { format, .. } => {
                 let kind = Kind::of(format);
-                let values = ["r", "g", "b", "a"]
-                    .into_iter()
-                    .take(format.channels())
-                    .enumerate()
-                    .map(|(i, c)| (format!("{}.{c}", slot.name), kind, i * kind.bytes()))
-                    .collect();
+                let channels = &["r", "g", "b", "a"][..format.channels()];
+                let values = match kind {
+                    // All of them are one value.
+                    Kind::Packed(_) => {
+                        vec![(format!("{}.{}", slot.name, channels.concat()), kind, 0)]
+                    }
+                    _ => channels
+                        .iter()
+                        .enumerate()
+                        .map(|(i, c)| (format!("{}.{c}", slot.name), kind, i * kind.bytes()))
+                        .collect(),
+                };
                 all.push(Out {
                     stride: format.bytes(),
                     values,

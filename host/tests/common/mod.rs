@@ -73,6 +73,7 @@ pub fn kernel(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>
         subgroups: Subgroups::Unused,
         compensated: None,
         image_pass: None,
+        invariant: false,
     }
 }
 
@@ -463,7 +464,7 @@ pub fn image() -> Sample {
                 "nearest",
                 Role::Sampler {
                     binding: 2,
-                    comparison: false,
+                    sampler: SamplerKind::Filtering,
                 },
             ),
             param("index", Role::Index),

@@ -3,8 +3,8 @@
 /// Calls a macro with the table: of each format its name here and in WebGPU, rust-gpu's for `Image!`, the value of a texel in
 /// a shader, how many channels it has, and how a channel is stored (`native::channel`).
 ///
-/// These are the formats of WebGPU's storage textures, but for those whose channels differ in size: `rgb10a2unorm`,
-/// `rgb10a2uint` and `rg11b10ufloat`. A format's number is its place: new ones follow the others.
+/// These are the formats of WebGPU's storage textures, but for `bgra8unorm`, which SPIR-V does not have. A format's number
+/// is its place: new ones follow the others.
 macro_rules! texel_formats {
     ($then:ident) => {
         $then! {
@@ -80,6 +80,12 @@ macro_rules! texel_formats {
             Rg8Sint "rg8sint" rg8i IVec2 2 Sint8;
             /// One 8-bit signed integer. What does not fit must not be written.
             R8Sint "r8sint" r8i i32 1 Sint8;
+            /// Three 10-bit numbers from 0 to 1, and one of 2 bits.
+            Rgb10A2Unorm "rgb10a2unorm" rgb10_a2 Vec4 4 Unorm10And2;
+            /// Three 10-bit unsigned integers, and one of 2 bits. What does not fit must not be written.
+            Rgb10A2Uint "rgb10a2uint" rgb10_a2ui UVec4 4 Uint10And2;
+            /// Two 11-bit and one 10-bit float without a sign, which end in 6 and 5 binary digits. What is negative becomes 0.
+            Rg11B10Ufloat "rg11b10ufloat" r11f_g11f_b10f Vec3 3 Float11And10;
         }
     };
 }

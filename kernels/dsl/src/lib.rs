@@ -161,13 +161,14 @@ pub use real::{Mask, Real, to_i32};
 #[doc(hidden)]
 pub use spirv_std;
 pub use stage::{
-    Centroid, Depth, Derivative, Flat, Linear, PerSample, SampleMask, discard, dpdx, dpdx_coarse,
-    dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth, fwidth_coarse, fwidth_fine,
+    Centroid, ClipDistances, Depth, Derivative, Flat, Linear, PerSample, SampleMask, SecondSource,
+    discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth, fwidth_coarse,
+    fwidth_fine,
 };
 pub use storage::{StorageMut, Stored};
 pub use storage_texture::{
-    Access, Format, Readable, StorageTexture2d, StorageTexture2dArray, StorageTexture3d, Writable,
-    access, format,
+    Access, Format, Readable, StorageTexture1d, StorageTexture2d, StorageTexture2dArray,
+    StorageTexture3d, Writable, access, format,
 };
 pub use subgroup::{
     SubgroupInteger, SubgroupNumber, SubgroupValue, quad_broadcast, quad_swap_diagonal,
@@ -178,9 +179,10 @@ pub use subgroup::{
     subgroup_shuffle_up, subgroup_shuffle_xor, subgroup_xor,
 };
 pub use texture::{
-    Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube,
-    DepthTextureCubeArray, Sampler, Shifted, Texel, Texture1d, Texture2d, Texture2dArray,
-    Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray,
+    Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTexture2dMultisampled,
+    DepthTextureCube, DepthTextureCubeArray, NonFilteringSampler, Sampler, Shifted, Texel,
+    Texture1d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
+    TextureCubeArray,
 };
 pub use workgroup::{Shared, SharedAtomics, barrier, storage_barrier};
 

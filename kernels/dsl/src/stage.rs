@@ -48,6 +48,18 @@ pub struct PerSample<T>(pub T);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleMask(pub u32);
 
+/// How far inside of up to 8 planes a vertex lies. What of a primitive lies outside of a plane, where the interpolated
+/// distance is below 0, is clipped. A vertex kernel returns it beside the position: `-> (Vec4, ClipDistances<2>)`.
+/// MSL and GLSL have it everywhere, WebGPU and GLSL ES where the manifest's `requires` can be met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClipDistances<const PLANES: usize>(pub [f32; PLANES]);
+
+/// A second colour for the first target, which blending may take as a factor ("dual-source blending"): a transmittance of
+/// each channel, for example. A fragment kernel with one target returns it beside its colour and of the same type:
+/// `-> (Vec4, SecondSource<Vec4>)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SecondSource<T>(pub T);
+
 /// Drops the fragment: nothing of it is written, no colour and no depth.
 ///
 /// In a fragment kernel only. What is computed after it does not run; take derivatives before,

@@ -15,7 +15,7 @@ use crate::texture::image;
 
 /// Formats of storage textures, as types.
 pub mod format {
-    use glam::{IVec2, IVec4, UVec2, UVec4, Vec2, Vec4};
+    use glam::{IVec2, IVec4, UVec2, UVec4, Vec2, Vec3, Vec4};
     #[cfg(target_arch = "spirv")]
     use spirv_std::Image;
 
@@ -30,11 +30,18 @@ pub mod format {
             impl Format for $name {
                 type Value = $value;
                 #[cfg(target_arch = "spirv")]
+                type Line = Image!(1D, format = $spirv, sampled = false);
+                #[cfg(target_arch = "spirv")]
                 type Flat = Image!(2D, format = $spirv, sampled = false);
                 #[cfg(target_arch = "spirv")]
                 type Layers = Image!(2D, format = $spirv, sampled = false, arrayed);
                 #[cfg(target_arch = "spirv")]
                 type Volume = Image!(3D, format = $spirv, sampled = false);
+                #[cfg(target_arch = "spirv")]
+                #[inline(always)]
+                fn line_size(image: &Self::Line) -> u32 {
+                    image.query_size()
+                }
                 #[cfg(target_arch = "spirv")]
                 #[inline(always)]
                 fn flat_size(image: &Self::Flat) -> glam::UVec2 {
@@ -116,6 +123,9 @@ pub trait Format: Copy {
     type Value: Texel;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
+    type Line;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
     type Flat;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
@@ -123,6 +133,9 @@ pub trait Format: Copy {
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
     type Volume;
+    #[cfg(target_arch = "spirv")]
+    #[doc(hidden)]
+    fn line_size(image: &Self::Line) -> u32;
     #[cfg(target_arch = "spirv")]
     #[doc(hidden)]
     fn flat_size(image: &Self::Flat) -> UVec2;
@@ -246,6 +259,9 @@ textures! {
     /// Layers of two dimensions: `store(at, layer, value)`.
     StorageTexture2dArray, Layers, layers_size, UVec2,
         (at: UVec2, layer: u32), at.extend(layer), at.extend(layer), |size| size.truncate();
+    /// A texture of one dimension.
+    StorageTexture1d, Line, line_size, u32,
+        (at: u32), at, UVec3::new(at, 0, 0), |size| size.x;
     /// A texture of three dimensions.
     StorageTexture3d, Volume, volume_size, UVec3,
         (at: UVec3), at, at, |size| size;

@@ -65,22 +65,25 @@ pub mod image {
     }
 
     /// Functions that sample at a constant offset in texels, which spirv-std does not have. `$operands` are the image
-    /// operands, the offset last among them. It is made of two constants, of which `codegen` makes one.
+    /// operands, the offset last among them. It is made of constants, of which `codegen` makes one.
     macro_rules! shifted {
-        ($($(#[doc = $doc:literal])* $name:ident($($arg:ident: $ty:ty),*) -> $result:ty = $op:literal, $operands:literal;)*) => { $(
+        (
+            @one ($vector:ident $($axis:ident $word:ident)*) $construct:literal
+            $(#[doc = $doc:literal])* $name:ident($($arg:ident: $ty:ty),*) -> $result:ty = $op:literal, $operands:literal
+        ) => {
             $(#[doc = $doc])*
             ///
             /// # Safety
             /// The types fit the image.
             #[inline(always)]
-            pub unsafe fn $name<I, C, const X: i32, const Y: i32>(
+            pub unsafe fn $name<I, C, $(const $axis: i32),*>(
                 image: &I,
                 sampler: spirv_std::Sampler,
                 at: C,
                 $($arg: $ty,)*
             ) -> $result {
                 let mut result = <$result>::default();
-                let offset = glam::IVec2::ZERO;
+                let offset = glam::$vector::ZERO;
                 // SAFETY: the caller's.
                 unsafe {
                     asm!(
@@ -88,21 +91,28 @@ pub mod image {
                         "%sampler = OpLoad _ {sampler}",
                         "%at = OpLoad _ {at}",
                         $(concat!("%", stringify!($arg), " = OpLoad _ {", stringify!($arg), "}"),)*
-                        "%offset = OpCompositeConstruct typeof*{offset} {x} {y}",
+                        $construct,
                         "%sampled = OpSampledImage _ %image %sampler",
                         concat!("%result = ", $op, " typeof*{result} %sampled %at ", $operands, " %offset"),
                         "OpStore {result} %result",
                         image = in(reg) image, sampler = in(reg) &sampler, at = in(reg) &at,
                         $($arg = in(reg) &$arg,)*
-                        offset = in(reg) &offset, x = in(reg) X, y = in(reg) Y,
+                        offset = in(reg) &offset, $($word = in(reg) $axis,)*
                         result = in(reg) &mut result,
                     );
                 }
                 result
             }
+        };
+        (
+            $axes:tt $construct:literal;
+            $($(#[doc = $doc:literal])* $name:ident $args:tt -> $result:ty = $op:literal, $operands:literal;)*
+        ) => { $(
+            shifted! { @one $axes $construct $(#[doc = $doc])* $name $args -> $result = $op, $operands }
         )* };
     }
     shifted! {
+        (IVec2 X x Y y) "%offset = OpCompositeConstruct typeof*{offset} {x} {y}";
         /// At the fragment's level.
         sample_shifted() -> glam::Vec4 = "OpImageSampleImplicitLod", "ConstOffset";
         /// The same with a bias.
@@ -122,6 +132,18 @@ pub mod image {
         /// Comparisons of four texels.
         gather_compare_shifted(reference: f32) -> glam::Vec4 = "OpImageDrefGather", "%reference ConstOffset";
     }
+    shifted! {
+        (IVec3 X x Y y Z z) "%offset = OpCompositeConstruct typeof*{offset} {x} {y} {z}";
+        /// At the fragment's level, in three dimensions.
+        sample_shifted_3d() -> glam::Vec4 = "OpImageSampleImplicitLod", "ConstOffset";
+        /// The same with a bias.
+        sample_bias_shifted_3d(bias: f32) -> glam::Vec4 = "OpImageSampleImplicitLod", "Bias|ConstOffset %bias";
+        /// At a level, in three dimensions.
+        sample_level_shifted_3d(level: f32) -> glam::Vec4 = "OpImageSampleExplicitLod", "Lod|ConstOffset %level";
+        /// At the level of derivatives, in three dimensions.
+        sample_gradient_shifted_3d(dx: glam::Vec3, dy: glam::Vec3) -> glam::Vec4
+            = "OpImageSampleExplicitLod", "Grad|ConstOffset %dx %dy";
+    }
 
     pub type Texture1d = Image!(1D, type=f32, sampled);
     pub type Texture2d = Image!(2D, type=f32, sampled);
@@ -134,12 +156,21 @@ pub mod image {
     pub type DepthTexture2dArray = Image!(2D, type=f32, sampled, arrayed, depth);
     pub type DepthTextureCube = Image!(cube, type=f32, sampled, depth);
     pub type DepthTextureCubeArray = Image!(cube, type=f32, sampled, arrayed, depth);
+    pub type DepthTexture2dMultisampled = Image!(2D, type=f32, sampled, multisampled, depth);
+    pub type UintTexture1d = Image!(1D, type=u32, sampled);
     pub type UintTexture2d = Image!(2D, type=u32, sampled);
     pub type UintTexture2dArray = Image!(2D, type=u32, sampled, arrayed);
+    pub type UintTexture2dMultisampled = Image!(2D, type=u32, sampled, multisampled);
     pub type UintTexture3d = Image!(3D, type=u32, sampled);
+    pub type UintTextureCube = Image!(cube, type=u32, sampled);
+    pub type UintTextureCubeArray = Image!(cube, type=u32, sampled, arrayed);
+    pub type SintTexture1d = Image!(1D, type=i32, sampled);
     pub type SintTexture2d = Image!(2D, type=i32, sampled);
     pub type SintTexture2dArray = Image!(2D, type=i32, sampled, arrayed);
+    pub type SintTexture2dMultisampled = Image!(2D, type=i32, sampled, multisampled);
     pub type SintTexture3d = Image!(3D, type=i32, sampled);
+    pub type SintTextureCube = Image!(cube, type=i32, sampled);
+    pub type SintTextureCubeArray = Image!(cube, type=i32, sampled, arrayed);
 
     /// Reads all four channels, whatever the format keeps of them.
     ///
@@ -189,16 +220,11 @@ macro_rules! textures {
 }
 
 textures! {
-    /// A filterable texture of one dimension; it has one level.
-    Texture1d;
-    /// A texture of two dimensions with several samples in each texel.
-    Texture2dMultisampled;
-    /// Six filterable textures of two dimensions on the faces of a cube, sampled by a direction.
-    TextureCube;
-    /// Cubes in an array.
-    TextureCubeArray;
-    /// Depths in two dimensions, which a [`ComparisonSampler`] compares with a reference.
+    /// Depths in two dimensions, which a [`ComparisonSampler`] compares with a reference. A [`NonFilteringSampler`] reads
+    /// them as they are.
     DepthTexture2d;
+    /// Depths in two dimensions with several samples in each texel.
+    DepthTexture2dMultisampled;
     /// Layers of such depths.
     DepthTexture2dArray;
     /// Such depths on the faces of a cube.
@@ -207,34 +233,41 @@ textures! {
     DepthTextureCubeArray;
 }
 
-/// What the channels of a texture are: `f32`, `u32` or `i32`.
-pub trait Channel: Copy {
-    /// All four channels of a texel.
-    type Texel: Copy;
-    #[cfg(target_arch = "spirv")]
-    #[doc(hidden)]
-    type Texture2d;
-    #[cfg(target_arch = "spirv")]
-    #[doc(hidden)]
-    type Texture2dArray;
-    #[cfg(target_arch = "spirv")]
-    #[doc(hidden)]
-    type Texture3d;
-    #[cfg(not(target_arch = "spirv"))]
-    #[doc(hidden)]
-    fn load(texture: &native::TextureRef<'_>, at: [u32; 3], layer: u32, level: u32) -> Self::Texel;
+/// Declares [`Channel`], with the images of all textures that may hold any numbers.
+macro_rules! channels {
+    ($($image:ident)*) => {
+        /// What the channels of a texture are: `f32`, `u32` or `i32`.
+        pub trait Channel: Copy {
+            /// All four channels of a texel.
+            type Texel: Copy;
+            $(
+                #[cfg(target_arch = "spirv")]
+                #[doc(hidden)]
+                type $image;
+            )*
+            #[cfg(not(target_arch = "spirv"))]
+            #[doc(hidden)]
+            fn load(
+                texture: &native::TextureRef<'_>,
+                at: [u32; 3],
+                layer: u32,
+                level: u32,
+                sample: u32,
+            ) -> Self::Texel;
+        }
+    };
 }
 
-macro_rules! channels {
-    ($($number:ty: $texel:ty, $flat:ident, $array:ident, $volume:ident, $load:expr;)*) => { $(
+channels!(Texture1d Texture2d Texture2dArray Texture2dMultisampled Texture3d TextureCube TextureCubeArray);
+
+macro_rules! channel {
+    ($number:ty: $texel:ty, $load:expr; $($image:ident = $of_numbers:ident)*) => {
         impl Channel for $number {
             type Texel = $texel;
-            #[cfg(target_arch = "spirv")]
-            type Texture2d = image::$flat;
-            #[cfg(target_arch = "spirv")]
-            type Texture2dArray = image::$array;
-            #[cfg(target_arch = "spirv")]
-            type Texture3d = image::$volume;
+            $(
+                #[cfg(target_arch = "spirv")]
+                type $image = image::$of_numbers;
+            )*
             #[cfg(not(target_arch = "spirv"))]
             #[inline]
             fn load(
@@ -242,19 +275,45 @@ macro_rules! channels {
                 at: [u32; 3],
                 layer: u32,
                 level: u32,
+                sample: u32,
             ) -> $texel {
-                $load(texture, at, layer, level)
+                $load(texture, at, layer, level, sample)
             }
         }
-    )* };
+    };
 }
 
-channels! {
-    f32: Vec4, Texture2d, Texture2dArray, Texture3d,
-        |t, at, layer, level| native::sampling::load(t, at, layer, level, 0);
-    u32: UVec4, UintTexture2d, UintTexture2dArray, UintTexture3d, native::sampling::load_integer;
-    i32: IVec4, SintTexture2d, SintTexture2dArray, SintTexture3d,
-        |t, at, layer, level| native::sampling::load_integer(t, at, layer, level).as_ivec4();
+channel! {
+    f32: Vec4, native::sampling::load;
+    Texture1d = Texture1d
+    Texture2d = Texture2d
+    Texture2dArray = Texture2dArray
+    Texture2dMultisampled = Texture2dMultisampled
+    Texture3d = Texture3d
+    TextureCube = TextureCube
+    TextureCubeArray = TextureCubeArray
+}
+channel! {
+    u32: UVec4, native::sampling::load_integer;
+    Texture1d = UintTexture1d
+    Texture2d = UintTexture2d
+    Texture2dArray = UintTexture2dArray
+    Texture2dMultisampled = UintTexture2dMultisampled
+    Texture3d = UintTexture3d
+    TextureCube = UintTextureCube
+    TextureCubeArray = UintTextureCubeArray
+}
+channel! {
+    i32: IVec4, |t, at, layer, level, sample| {
+        native::sampling::load_integer(t, at, layer, level, sample).as_ivec4()
+    };
+    Texture1d = SintTexture1d
+    Texture2d = SintTexture2d
+    Texture2dArray = SintTexture2dArray
+    Texture2dMultisampled = SintTexture2dMultisampled
+    Texture3d = SintTexture3d
+    TextureCube = SintTextureCube
+    TextureCubeArray = SintTextureCubeArray
 }
 
 /// Declares textures of any numbers.
@@ -293,17 +352,26 @@ textures_of! {
     Texture2dArray;
     /// A texture of three dimensions, of floats or integers.
     Texture3d;
+    /// A texture of one dimension; it has one level.
+    Texture1d;
+    /// A texture of two dimensions with several samples in each texel.
+    Texture2dMultisampled;
+    /// Six textures of two dimensions on the faces of a cube, sampled by a direction. One of integers can only be
+    /// gathered from.
+    TextureCube;
+    /// Cubes in an array.
+    TextureCubeArray;
 }
 
 /// A texture of two dimensions, or an array of them, that is read `X` texels further to the right and `Y` further down
-/// than the coordinates say, at whichever level: [`Texture2d::shifted`] makes it. What lies beyond the edge follows from the
-/// sampler, as ever.
+/// than the coordinates say, at whichever level: [`Texture2d::shifted`] makes it. One of three dimensions is read `Z` texels
+/// further in, too. What lies beyond the edge follows from the sampler, as ever.
 #[derive(Clone, Copy)]
-pub struct Shifted<T, const X: i32, const Y: i32>(T);
+pub struct Shifted<T, const X: i32, const Y: i32, const Z: i32 = 0>(T);
 
 /// Whether every language has the offset.
-const fn is_offset(x: i32, y: i32) -> bool {
-    x >= -8 && x <= 7 && y >= -8 && y <= 7
+const fn is_offset(texels: i32) -> bool {
+    texels >= -8 && texels <= 7
 }
 
 macro_rules! shifts {
@@ -313,7 +381,7 @@ macro_rules! shifts {
             #[inline(always)]
             #[must_use]
             pub fn shifted<const X: i32, const Y: i32>(self) -> Shifted<Self, X, Y> {
-                const { assert!(is_offset(X, Y), "an offset is from -8 to 7 texels") };
+                const { assert!(is_offset(X) && is_offset(Y), "an offset is from -8 to 7 texels") };
                 Shifted(self)
             }
         }
@@ -322,9 +390,32 @@ macro_rules! shifts {
 
 shifts!(Texture2d Texture2dArray DepthTexture2d DepthTexture2dArray);
 
+impl Texture3d<'_> {
+    /// The same texture, read `X`, `Y` and `Z` texels further along its axes: each from -8 to 7.
+    #[inline(always)]
+    #[must_use]
+    pub fn shifted<const X: i32, const Y: i32, const Z: i32>(self) -> Shifted<Self, X, Y, Z> {
+        const {
+            assert!(
+                is_offset(X) && is_offset(Y) && is_offset(Z),
+                "an offset is from -8 to 7 texels"
+            );
+        };
+        Shifted(self)
+    }
+}
+
 /// How a texture is filtered between texels, between levels, and beyond the edge.
 #[derive(Clone, Copy)]
 pub struct Sampler(
+    #[cfg(target_arch = "spirv")] spirv_std::Sampler,
+    #[cfg(not(target_arch = "spirv"))] native::Sampler,
+);
+
+/// A sampler that takes the nearest texel of the nearest level: what depths that are not compared, and integers, are sampled
+/// with. WebGPU tells it apart from others by the layout of its bind group.
+#[derive(Clone, Copy)]
+pub struct NonFilteringSampler(
     #[cfg(target_arch = "spirv")] spirv_std::Sampler,
     #[cfg(not(target_arch = "spirv"))] native::Sampler,
 );
@@ -356,7 +447,7 @@ macro_rules! samplers {
     )* };
 }
 
-samplers!(Sampler ComparisonSampler);
+samplers!(Sampler NonFilteringSampler ComparisonSampler);
 
 #[cfg(target_arch = "spirv")]
 #[allow(missing_docs, reason = "documented on the host's side")]
@@ -396,7 +487,11 @@ mod spirv {
         Texture3d<'_, u32>: UVec3, UVec3, |size| size;
         Texture3d<'_, i32>: UVec3, UVec3, |size| size;
         TextureCube<'_>: UVec2, UVec2, |size| size;
+        TextureCube<'_, u32>: UVec2, UVec2, |size| size;
+        TextureCube<'_, i32>: UVec2, UVec2, |size| size;
         TextureCubeArray<'_>: UVec2, UVec3, UVec3::truncate;
+        TextureCubeArray<'_, u32>: UVec2, UVec3, UVec3::truncate;
+        TextureCubeArray<'_, i32>: UVec2, UVec3, UVec3::truncate;
         DepthTexture2d<'_>: UVec2, UVec2, |size| size;
         DepthTexture2dArray<'_>: UVec2, UVec3, UVec3::truncate;
         DepthTextureCube<'_>: UVec2, UVec2, |size| size;
@@ -420,6 +515,8 @@ mod spirv {
         Texture2dArray<'_, i32>: layers;
         DepthTexture2dArray<'_>: layers;
         TextureCubeArray<'_>: cubes;
+        TextureCubeArray<'_, u32>: cubes;
+        TextureCubeArray<'_, i32>: cubes;
         DepthTextureCubeArray<'_>: cubes;
     }
 
@@ -489,20 +586,53 @@ mod spirv {
     }
 
     macro_rules! gathers {
-        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
-            impl $name<'_> {
+        ($($name:ty, $sampler:ty: ($($arg:ident: $ty:ty),*), $at:expr => $value:ty;)*) => { $(
+            impl $name {
                 #[inline(always)]
-                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                pub fn gather<const CHANNEL: u32>(self, sampler: $sampler, $($arg: $ty),*) -> $value {
                     self.0.gather(sampler.0, $at, CHANNEL)
                 }
             }
         )* };
     }
     gathers! {
-        Texture2d: (uv: Vec2), uv;
-        Texture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
-        TextureCube: (direction: Vec3), direction;
-        TextureCubeArray: (direction: Vec3, cube: u32), direction.extend(cube as f32);
+        Texture2d<'_>, Sampler: (uv: Vec2), uv => Vec4;
+        Texture2d<'_, u32>, NonFilteringSampler: (uv: Vec2), uv => UVec4;
+        Texture2d<'_, i32>, NonFilteringSampler: (uv: Vec2), uv => IVec4;
+        Texture2dArray<'_>, Sampler: (uv: Vec2, layer: u32), uv.extend(layer as f32) => Vec4;
+        Texture2dArray<'_, u32>, NonFilteringSampler: (uv: Vec2, layer: u32), uv.extend(layer as f32) => UVec4;
+        Texture2dArray<'_, i32>, NonFilteringSampler: (uv: Vec2, layer: u32), uv.extend(layer as f32) => IVec4;
+        TextureCube<'_>, Sampler: (direction: Vec3), direction => Vec4;
+        TextureCube<'_, u32>, NonFilteringSampler: (direction: Vec3), direction => UVec4;
+        TextureCube<'_, i32>, NonFilteringSampler: (direction: Vec3), direction => IVec4;
+        TextureCubeArray<'_>, Sampler: (direction: Vec3, cube: u32), direction.extend(cube as f32) => Vec4;
+        TextureCubeArray<'_, u32>, NonFilteringSampler: (direction: Vec3, cube: u32), direction.extend(cube as f32) => UVec4;
+        TextureCubeArray<'_, i32>, NonFilteringSampler: (direction: Vec3, cube: u32), direction.extend(cube as f32) => IVec4;
+    }
+
+    macro_rules! depths {
+        ($($name:ident: ($($arg:ident: $ty:ty),*), $at:expr;)*) => { $(
+            impl $name<'_> {
+                #[inline(always)]
+                pub fn sample(self, sampler: NonFilteringSampler, $($arg: $ty),*) -> f32 {
+                    self.0.sample(sampler.0, $at).x
+                }
+                #[inline(always)]
+                pub fn sample_level(self, sampler: NonFilteringSampler, $($arg: $ty,)* level: u32) -> f32 {
+                    self.0.sample_by_lod(sampler.0, $at, level as f32).x
+                }
+                #[inline(always)]
+                pub fn gather(self, sampler: NonFilteringSampler, $($arg: $ty),*) -> Vec4 {
+                    self.0.gather(sampler.0, $at, 0)
+                }
+            }
+        )* };
+    }
+    depths! {
+        DepthTexture2d: (uv: Vec2), uv;
+        DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
+        DepthTextureCube: (direction: Vec3), direction;
+        DepthTextureCubeArray: (direction: Vec3, cube: u32), direction.extend(cube as f32);
     }
 
     macro_rules! comparisons {
@@ -638,45 +768,97 @@ mod spirv {
         DepthTexture2dArray: (uv: Vec2, layer: u32), uv.extend(layer as f32);
     }
 
+    impl<const X: i32, const Y: i32, const Z: i32> Shifted<Texture3d<'_>, X, Y, Z> {
+        #[inline(always)]
+        pub fn sample(self, sampler: Sampler, uvw: Vec3) -> Vec4 {
+            // SAFETY: the types fit, here and below.
+            unsafe { image::sample_shifted_3d::<_, _, X, Y, Z>(self.0.0, sampler.0, uvw) }
+        }
+        #[inline(always)]
+        pub fn sample_bias(self, sampler: Sampler, uvw: Vec3, bias: f32) -> Vec4 {
+            // SAFETY: as above.
+            unsafe {
+                image::sample_bias_shifted_3d::<_, _, X, Y, Z>(self.0.0, sampler.0, uvw, bias)
+            }
+        }
+        #[inline(always)]
+        pub fn sample_level(self, sampler: Sampler, uvw: Vec3, level: f32) -> Vec4 {
+            // SAFETY: as above.
+            unsafe {
+                image::sample_level_shifted_3d::<_, _, X, Y, Z>(self.0.0, sampler.0, uvw, level)
+            }
+        }
+        #[inline(always)]
+        pub fn sample_gradient(self, sampler: Sampler, uvw: Vec3, dx: Vec3, dy: Vec3) -> Vec4 {
+            // SAFETY: as above.
+            unsafe {
+                image::sample_gradient_shifted_3d::<_, _, X, Y, Z>(self.0.0, sampler.0, uvw, dx, dy)
+            }
+        }
+    }
+
+    macro_rules! lines {
+        ($($name:ty: $texel:ty;)*) => { $(
+            impl $name {
+                #[inline(always)]
+                pub fn size(self) -> u32 {
+                    self.0.query_size_lod(0)
+                }
+                #[inline(always)]
+                pub fn load(self, at: u32) -> $texel {
+                    self.0.fetch_with_lod(at, 0)
+                }
+            }
+        )* };
+    }
+    lines! {
+        Texture1d<'_>: Vec4;
+        Texture1d<'_, u32>: UVec4;
+        Texture1d<'_, i32>: IVec4;
+    }
+
     impl Texture1d<'_> {
-        #[inline(always)]
-        pub fn size(self) -> u32 {
-            self.0.query_size_lod(0)
-        }
-        #[inline(always)]
-        pub fn load(self, at: u32) -> Vec4 {
-            self.0.fetch_with_lod(at, 0)
-        }
         #[inline(always)]
         pub fn sample(self, sampler: Sampler, u: f32) -> Vec4 {
             self.0.sample(sampler.0, u)
         }
     }
 
-    impl Texture2dMultisampled<'_> {
-        #[inline(always)]
-        pub fn size(self) -> UVec2 {
-            self.0.query_size()
-        }
-        #[inline(always)]
-        pub fn samples(self) -> u32 {
-            self.0.query_samples()
-        }
-        #[inline(always)]
-        pub fn load(self, at: UVec2, sample: u32) -> Vec4 {
-            self.0
-                .fetch_with(at, sample_with::sample_index(sample as i32))
-        }
+    macro_rules! multisampled {
+        ($($name:ty: $texel:ty => $value:ty, $take:expr;)*) => { $(
+            impl $name {
+                #[inline(always)]
+                pub fn size(self) -> UVec2 {
+                    self.0.query_size()
+                }
+                #[inline(always)]
+                pub fn samples(self) -> u32 {
+                    self.0.query_samples()
+                }
+                #[inline(always)]
+                pub fn load(self, at: UVec2, sample: u32) -> $value {
+                    let texel: $texel = self.0.fetch_with(at, sample_with::sample_index(sample as i32));
+                    $take(texel)
+                }
+            }
+        )* };
+    }
+    multisampled! {
+        Texture2dMultisampled<'_>: Vec4 => Vec4, |texel| texel;
+        Texture2dMultisampled<'_, u32>: UVec4 => UVec4, |texel| texel;
+        Texture2dMultisampled<'_, i32>: IVec4 => IVec4, |texel| texel;
+        DepthTexture2dMultisampled<'_>: Vec4 => f32, |texel: Vec4| texel.x;
     }
 }
 
 #[cfg(not(target_arch = "spirv"))]
 mod host {
     use super::{
-        Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube,
-        DepthTextureCubeArray, Sampler, Shifted, Texture1d, Texture2d, Texture2dArray,
-        Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray, UVec2, UVec3, Vec2, Vec3,
-        Vec4,
+        Channel, ComparisonSampler, DepthTexture2d, DepthTexture2dArray,
+        DepthTexture2dMultisampled, DepthTextureCube, DepthTextureCubeArray, IVec4,
+        NonFilteringSampler, Sampler, Shifted, Texture1d, Texture2d, Texture2dArray,
+        Texture2dMultisampled, Texture3d, TextureCube, TextureCubeArray, UVec2, UVec3, UVec4, Vec2,
+        Vec3, Vec4,
     };
     use crate::native::sampling::{self, Place};
     use crate::native::{TextureRef, fragment, level_size, sanitize};
@@ -687,7 +869,7 @@ mod host {
             at: Vec3::new(uv.x, uv.y, 0.0),
             dimensions: 2,
             layer,
-            shift: [0; 2],
+            shift: [0; 3],
         }
     }
 
@@ -705,8 +887,8 @@ mod host {
         (<T: Channel>) Texture2d<'_, T>: 0;
         (<T: Channel>) Texture2dArray<'_, T>: 0;
         (<T: Channel>) Texture3d<'_, T>: 0;
-        () TextureCube<'_>: 0;
-        () TextureCubeArray<'_>: 0;
+        (<T: Channel>) TextureCube<'_, T>: 0;
+        (<T: Channel>) TextureCubeArray<'_, T>: 0;
         () DepthTexture2d<'_>: 0;
         () DepthTexture2dArray<'_>: 0;
         () DepthTextureCube<'_>: 0;
@@ -715,24 +897,25 @@ mod host {
         (<const X: i32, const Y: i32>) Shifted<Texture2dArray<'_>, X, Y>: 0.0;
         (<const X: i32, const Y: i32>) Shifted<DepthTexture2d<'_>, X, Y>: 0.0;
         (<const X: i32, const Y: i32>) Shifted<DepthTexture2dArray<'_>, X, Y>: 0.0;
+        (<const X: i32, const Y: i32, const Z: i32>) Shifted<Texture3d<'_>, X, Y, Z>: 0.0;
     }
 
     /// Like [`flat`], with an offset in texels.
-    const fn shifted(uv: Vec2, layer: u32, shift: [i32; 2]) -> Place {
+    const fn shifted(uv: Vec2, layer: u32, [x, y]: [i32; 2]) -> Place {
         Place::Flat {
             at: Vec3::new(uv.x, uv.y, 0.0),
             dimensions: 2,
             layer,
-            shift,
+            shift: [x, y, 0],
         }
     }
 
-    const fn volume(at: Vec3) -> Place {
+    const fn volume(at: Vec3, shift: [i32; 3]) -> Place {
         Place::Flat {
             at,
             dimensions: 3,
             layer: 0,
-            shift: [0; 2],
+            shift,
         }
     }
 
@@ -786,8 +969,8 @@ mod host {
         (<T: Channel>) Texture2d<'_, T>: UVec2, UVec3::truncate;
         (<T: Channel>) Texture2dArray<'_, T>: UVec2, UVec3::truncate;
         (<T: Channel>) Texture3d<'_, T>: UVec3, |size| size;
-        () TextureCube<'_>: UVec2, UVec3::truncate;
-        () TextureCubeArray<'_>: UVec2, UVec3::truncate;
+        (<T: Channel>) TextureCube<'_, T>: UVec2, UVec3::truncate;
+        (<T: Channel>) TextureCubeArray<'_, T>: UVec2, UVec3::truncate;
         () DepthTexture2d<'_>: UVec2, UVec3::truncate;
         () DepthTexture2dArray<'_>: UVec2, UVec3::truncate;
         () DepthTextureCube<'_>: UVec2, UVec3::truncate;
@@ -812,7 +995,7 @@ mod host {
         /// Layers, 1 or more.
         () DepthTexture2dArray<'_>: layers, 1;
         /// Cubes, 1 or more.
-        () TextureCubeArray<'_>: cubes, 6;
+        (<T: Channel>) TextureCubeArray<'_, T>: cubes, 6;
         /// Cubes, 1 or more.
         () DepthTextureCubeArray<'_>: cubes, 6;
     }
@@ -834,7 +1017,7 @@ mod host {
                 #[track_caller]
                 pub fn load_level(self, $($arg: $ty,)* level: u32) -> $value {
                     sanitize::look_for_texel(&self.0, $at, $layer, level, 0, Location::caller());
-                    $take(&self.0, $at, $layer, level)
+                    $take(&self.0, $at, $layer, level, 0)
                 }
             }
         )* };
@@ -848,8 +1031,8 @@ mod host {
     }
 
     /// The depth in a texel.
-    fn depth(texture: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32) -> f32 {
-        sampling::load(texture, at, layer, level, 0).x
+    fn depth(texture: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32, sample: u32) -> f32 {
+        sampling::load(texture, at, layer, level, sample).x
     }
 
     macro_rules! samples {
@@ -904,7 +1087,8 @@ mod host {
     samples! {
         () Texture2d<'_>: (uv: Vec2), Vec2, flat(uv, 0), |d: Vec2| d.extend(0.0);
         () Texture2dArray<'_>: (uv: Vec2, layer: u32), Vec2, flat(uv, layer), |d: Vec2| d.extend(0.0);
-        () Texture3d<'_>: (uvw: Vec3), Vec3, volume(uvw), |d| d;
+        () Texture3d<'_>: (uvw: Vec3), Vec3, volume(uvw, [0; 3]), |d| d;
+        (<const X: i32, const Y: i32, const Z: i32>) Shifted<Texture3d<'_>, X, Y, Z>: (uvw: Vec3), Vec3, volume(uvw, [X, Y, Z]), |d| d;
         () TextureCube<'_>: (direction: Vec3), Vec3, cube(direction, 0), |d| d;
         () TextureCubeArray<'_>: (direction: Vec3, cube_index: u32), Vec3, cube(direction, cube_index), |d| d;
         (<const X: i32, const Y: i32>) Shifted<Texture2d<'_>, X, Y>: (uv: Vec2), Vec2, shifted(uv, 0, [X, Y]), |d: Vec2| d.extend(0.0);
@@ -912,7 +1096,7 @@ mod host {
     }
 
     macro_rules! gathers {
-        ($(($($of:tt)*) $name:ty: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+        ($(($($of:tt)*) $name:ty, $sampler:ty: ($($arg:ident: $ty:ty),*), $place:expr => $value:ty, $gather:expr;)*) => { $(
             impl $($of)* $name {
                 /// Channel `CHANNEL` (0 to 3) of the four texels of level 0 that a linear filter
                 /// reads: lower left, lower right, upper right, upper left, where the first row is
@@ -920,20 +1104,73 @@ mod host {
                 /// from the middle of texels.
                 #[inline]
                 #[must_use]
-                pub fn gather<const CHANNEL: u32>(self, sampler: Sampler, $($arg: $ty),*) -> Vec4 {
+                pub fn gather<const CHANNEL: u32>(self, sampler: $sampler, $($arg: $ty),*) -> $value {
                     const { assert!(CHANNEL < 4, "a texel has channels 0 to 3") };
-                    sampling::gather(self.texture(), &sampler.0, $place, CHANNEL as usize)
+                    $gather(self.texture(), &sampler.0, $place, CHANNEL as usize)
                 }
             }
         )* };
     }
     gathers! {
-        () Texture2d<'_>: (uv: Vec2), flat(uv, 0);
-        () Texture2dArray<'_>: (uv: Vec2, layer: u32), flat(uv, layer);
-        () TextureCube<'_>: (direction: Vec3), cube(direction, 0);
-        () TextureCubeArray<'_>: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
-        (<const X: i32, const Y: i32>) Shifted<Texture2d<'_>, X, Y>: (uv: Vec2), shifted(uv, 0, [X, Y]);
-        (<const X: i32, const Y: i32>) Shifted<Texture2dArray<'_>, X, Y>: (uv: Vec2, layer: u32), shifted(uv, layer, [X, Y]);
+        () Texture2d<'_>, Sampler: (uv: Vec2), flat(uv, 0) => Vec4, sampling::gather;
+        () Texture2d<'_, u32>, NonFilteringSampler: (uv: Vec2), flat(uv, 0) => UVec4, sampling::gather_integers;
+        () Texture2d<'_, i32>, NonFilteringSampler: (uv: Vec2), flat(uv, 0) => IVec4, gather_signed;
+        () Texture2dArray<'_>, Sampler: (uv: Vec2, layer: u32), flat(uv, layer) => Vec4, sampling::gather;
+        () Texture2dArray<'_, u32>, NonFilteringSampler: (uv: Vec2, layer: u32), flat(uv, layer) => UVec4, sampling::gather_integers;
+        () Texture2dArray<'_, i32>, NonFilteringSampler: (uv: Vec2, layer: u32), flat(uv, layer) => IVec4, gather_signed;
+        () TextureCube<'_>, Sampler: (direction: Vec3), cube(direction, 0) => Vec4, sampling::gather;
+        () TextureCube<'_, u32>, NonFilteringSampler: (direction: Vec3), cube(direction, 0) => UVec4, sampling::gather_integers;
+        () TextureCube<'_, i32>, NonFilteringSampler: (direction: Vec3), cube(direction, 0) => IVec4, gather_signed;
+        () TextureCubeArray<'_>, Sampler: (direction: Vec3, cube_index: u32), cube(direction, cube_index) => Vec4, sampling::gather;
+        () TextureCubeArray<'_, u32>, NonFilteringSampler: (direction: Vec3, cube_index: u32), cube(direction, cube_index) => UVec4, sampling::gather_integers;
+        () TextureCubeArray<'_, i32>, NonFilteringSampler: (direction: Vec3, cube_index: u32), cube(direction, cube_index) => IVec4, gather_signed;
+        (<const X: i32, const Y: i32>) Shifted<Texture2d<'_>, X, Y>, Sampler: (uv: Vec2), shifted(uv, 0, [X, Y]) => Vec4, sampling::gather;
+        (<const X: i32, const Y: i32>) Shifted<Texture2dArray<'_>, X, Y>, Sampler: (uv: Vec2, layer: u32), shifted(uv, layer, [X, Y]) => Vec4, sampling::gather;
+    }
+
+    /// A channel of four texels of signed integers.
+    fn gather_signed(
+        texture: &TextureRef<'_>,
+        sampler: &crate::native::Sampler,
+        place: Place,
+        channel: usize,
+    ) -> IVec4 {
+        sampling::gather_integers(texture, sampler, place, channel).as_ivec4()
+    }
+
+    macro_rules! depths {
+        ($($name:ty: ($($arg:ident: $ty:ty),*), $place:expr;)*) => { $(
+            impl $name {
+                /// The depth of the nearest texel, at the level of detail of the fragment: see
+                /// [`Texture2d::sample`].
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn sample(self, sampler: NonFilteringSampler, $($arg: $ty),*) -> f32 {
+                    let detail = detail(self.texture(), $place, Location::caller());
+                    sampling::sample(self.texture(), &sampler.0, $place, detail).x
+                }
+                /// The same of a level.
+                #[inline]
+                #[must_use]
+                pub fn sample_level(self, sampler: NonFilteringSampler, $($arg: $ty,)* level: u32) -> f32 {
+                    sampling::sample(self.texture(), &sampler.0, $place, level as f32).x
+                }
+                /// The depths of the four texels of level 0 that a linear filter would read, in the order of
+                /// [`Texture2d::gather`].
+                #[inline]
+                #[must_use]
+                pub fn gather(self, sampler: NonFilteringSampler, $($arg: $ty),*) -> Vec4 {
+                    sampling::gather(self.texture(), &sampler.0, $place, 0)
+                }
+            }
+        )* };
+    }
+    depths! {
+        DepthTexture2d<'_>: (uv: Vec2), flat(uv, 0);
+        DepthTexture2dArray<'_>: (uv: Vec2, layer: u32), flat(uv, layer);
+        DepthTextureCube<'_>: (direction: Vec3), cube(direction, 0);
+        DepthTextureCubeArray<'_>: (direction: Vec3, cube_index: u32), cube(direction, cube_index);
     }
 
     macro_rules! comparisons {
@@ -1005,7 +1242,7 @@ mod host {
         (<const X: i32, const Y: i32>) Shifted<DepthTexture2dArray<'_>, X, Y>: (uv: Vec2, layer: u32), shifted(uv, layer, [X, Y]);
     }
 
-    impl Texture1d<'_> {
+    impl<T: Channel> Texture1d<'_, T> {
         /// Texels.
         #[inline]
         #[must_use]
@@ -1016,10 +1253,13 @@ mod host {
         #[inline]
         #[must_use]
         #[track_caller]
-        pub fn load(self, at: u32) -> Vec4 {
+        pub fn load(self, at: u32) -> T::Texel {
             sanitize::look_for_texel(&self.0, [at, 0, 0], 0, 0, 0, Location::caller());
-            sampling::load(&self.0, [at, 0, 0], 0, 0, 0)
+            T::load(&self.0, [at, 0, 0], 0, 0, 0)
         }
+    }
+
+    impl Texture1d<'_> {
         /// A filtered value; see [`Texture2d::sample`]. In fragment kernels only: not every language
         /// samples a texture of one dimension at a level.
         #[inline]
@@ -1030,34 +1270,42 @@ mod host {
                 at: Vec3::new(u, 0.0, 0.0),
                 dimensions: 1,
                 layer: 0,
-                shift: [0; 2],
+                shift: [0; 3],
             };
             let detail = detail(&self.0, place, Location::caller());
             sampling::sample(&self.0, &sampler.0, place, detail)
         }
     }
 
-    impl Texture2dMultisampled<'_> {
-        /// Width and height in texels.
-        #[inline]
-        #[must_use]
-        pub fn size(self) -> UVec2 {
-            UVec3::from_array(self.0.size).truncate()
-        }
-        /// Samples of a texel.
-        #[inline]
-        #[must_use]
-        pub fn samples(self) -> u32 {
-            self.0.samples
-        }
-        /// One sample of the texel at `at`; both must exist.
-        #[inline]
-        #[must_use]
-        #[track_caller]
-        pub fn load(self, at: UVec2, sample: u32) -> Vec4 {
-            sanitize::look_for_texel(&self.0, [at.x, at.y, 0], 0, 0, sample, Location::caller());
-            sampling::load(&self.0, [at.x, at.y, 0], 0, 0, sample)
-        }
+    macro_rules! multisampled {
+        ($(($($of:tt)*) $name:ty: $value:ty, $load:expr;)*) => { $(
+            impl $($of)* $name {
+                /// Width and height in texels.
+                #[inline]
+                #[must_use]
+                pub fn size(self) -> UVec2 {
+                    UVec3::from_array(self.0.size).truncate()
+                }
+                /// Samples of a texel.
+                #[inline]
+                #[must_use]
+                pub fn samples(self) -> u32 {
+                    self.0.samples
+                }
+                /// One sample of the texel at `at`; both must exist.
+                #[inline]
+                #[must_use]
+                #[track_caller]
+                pub fn load(self, at: UVec2, sample: u32) -> $value {
+                    sanitize::look_for_texel(&self.0, [at.x, at.y, 0], 0, 0, sample, Location::caller());
+                    $load(&self.0, [at.x, at.y, 0], 0, 0, sample)
+                }
+            }
+        )* };
+    }
+    multisampled! {
+        (<T: Channel>) Texture2dMultisampled<'_, T>: T::Texel, T::load;
+        () DepthTexture2dMultisampled<'_>: f32, depth;
     }
 }
 
@@ -1091,6 +1339,7 @@ macro_rules! texels {
 texels! {
     f32, Vec4: |x| Vec4::new(x, 0.0, 0.0, 1.0), |v| v.x;
     Vec2, Vec4: |v| Vec4::new(v.x, v.y, 0.0, 1.0), |v| Vec2::new(v.x, v.y);
+    Vec3, Vec4: |v| v.extend(1.0), |v| v.truncate();
     Vec4, Vec4: |v| v, |v| v;
     u32, UVec4: |x| UVec4::new(x, 0, 0, 1), |v| v.x;
     UVec2, UVec4: |v| UVec4::new(v.x, v.y, 0, 1), |v| UVec2::new(v.x, v.y);

@@ -9,7 +9,7 @@ use crate::kernel::{
     BuiltIn, Compute, FragmentForm, Kernel, Role, Stage, StorageKind, Variant, text_of,
     texture_type,
 };
-use crate::shader::{output_name, sampler_type};
+use crate::shader::output_name;
 use crate::stage::{Passed, Returned};
 use crate::twin;
 
@@ -213,6 +213,7 @@ impl Kernel {
         let tolerance = self.tolerance.of(variant);
         let (ulp, absolute, why) = (tolerance.ulp, tolerance.absolute, &tolerance.why);
         let non_finite = tolerance.non_finite;
+        let invariant = self.invariant;
         let rounding = format_ident!("{}", self.rounding.variant());
         let subgroups = self.uses_subgroups();
         let sized = self.sized_by_subgroups;
@@ -246,6 +247,7 @@ impl Kernel {
                 subgroups: describe::Subgroups::of(#subgroups, #sized),
                 compensated: #compensated,
                 image_pass: #image_pass,
+                invariant: #invariant,
             }
         }
     }
@@ -308,8 +310,9 @@ impl Kernel {
                             access: <#access as ::hankel_dsl::Access>::ACCESS,
                         })
                     }
-                    Role::Sampler { comparison } => {
-                        quote!(Sampler { binding: #b, comparison: #comparison })
+                    Role::Sampler(kind) => {
+                        let kind = kind.variant();
+                        quote!(Sampler { binding: #b, sampler: #kind })
                     }
                     Role::Constant { id, default } => {
                         quote!(Constant { id: #id, default: #default })
@@ -454,8 +457,9 @@ impl Kernel {
                         );
                     }
                 }
-                Role::Sampler { comparison } => {
-                    quote!(let #name = args.sampler(#text, #comparison)?;)
+                Role::Sampler(kind) => {
+                    let kind = kind.variant();
+                    quote!(let #name = args.sampler(#text, #kind)?;)
                 }
                 Role::Constant { .. } => quote!(let #name = args.constant();),
                 Role::Index | Role::BuiltIn(_) | Role::Shared { .. } => TokenStream::new(),
@@ -518,8 +522,8 @@ impl Kernel {
                     let ty = texture_type(kind);
                     quote!(#ty::new(#name))
                 }
-                Role::Sampler { comparison } => {
-                    let ty = sampler_type(*comparison);
+                Role::Sampler(kind) => {
+                    let ty = kind.ty();
                     quote!(#ty::new(#name))
                 }
                 Role::Index => match form {

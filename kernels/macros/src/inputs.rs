@@ -9,7 +9,7 @@ use syn::punctuated::Punctuated;
 use syn::spanned::Spanned;
 use syn::{Attribute, BinOp, Expr, ExprLit, Lit, LitInt, LitStr, Meta, RangeLimits, Token};
 
-use crate::kernel::text_of;
+use crate::kernel::{SamplerKind, text_of};
 
 /// The attributes' names.
 const WORDS: [&str; 17] = [
@@ -114,10 +114,7 @@ pub enum Holder {
         array: bool,
     },
     /// A sampler.
-    Sampler {
-        /// It compares.
-        comparison: bool,
-    },
+    Sampler(SamplerKind),
     /// Any other parameter with numbers.
     Value,
     /// A specialisation constant.
@@ -313,10 +310,7 @@ impl Inputs {
             match domain {
                 _ if matches!(
                     holder,
-                    Holder::Nothing
-                        | Holder::Counters
-                        | Holder::Texels { .. }
-                        | Holder::Sampler { .. }
+                    Holder::Nothing | Holder::Counters | Holder::Texels { .. } | Holder::Sampler(_)
                 ) =>
                 {
                     return error(
@@ -347,7 +341,7 @@ impl Inputs {
             | Holder::Counters
             | Holder::Texture { .. }
             | Holder::Texels { .. }
-            | Holder::Sampler { .. }
+            | Holder::Sampler(_)
             | Holder::Nothing,
         ) = (&self.default, holder)
         {
@@ -372,6 +366,13 @@ impl Inputs {
                 return error(*span, &format!("this has no {wanted} to choose"));
             }
         }
+        let filters = [&self.filter, &self.mip_filter]
+            .into_iter()
+            .flatten()
+            .next();
+        if let (Holder::Sampler(SamplerKind::NonFiltering), Some((_, span))) = (holder, filters) {
+            return error(*span, "a `NonFilteringSampler` takes the nearest texel");
+        }
         for (said, compares) in [
             (&self.filter, false),
             (&self.mip_filter, false),
@@ -379,7 +380,7 @@ impl Inputs {
             (&self.compare, true),
         ] {
             let has = match holder {
-                Holder::Sampler { comparison } => comparison || !compares,
+                Holder::Sampler(kind) => kind == SamplerKind::Comparison || !compares,
                 _ => false,
             };
             if let (Some((_, span)), false) = (said, has) {

@@ -46,6 +46,8 @@ pub struct Kernel {
     pub helpers: Vec<Ident>,
     /// Its result depends on the size of subgroups.
     pub sized_by_subgroups: bool,
+    /// Its position is invariant.
+    pub invariant: bool,
 }
 
 /// A variant of `describe::Rounding`.
@@ -133,7 +135,7 @@ impl Format {
 
 /// All of them: the table is `texel_formats` of hankel-dsl, which has a test of this.
 #[rustfmt::skip]
-const FORMATS: [&str; 36] = [
+const FORMATS: [&str; 39] = [
     "r32float", "r32uint", "r32sint",
     "rg32uint", "rg32sint", "rg32float",
     "rgba32float", "rgba32uint", "rgba32sint",
@@ -143,6 +145,7 @@ const FORMATS: [&str; 36] = [
     "r8unorm", "r8snorm", "r8uint", "r8sint",
     "rg8unorm", "rg8snorm", "rg8uint", "rg8sint",
     "rgba8unorm", "rgba8uint", "rgba8sint", "rgba8snorm",
+    "rgb10a2unorm", "rgb10a2uint", "rg11b10ufloat",
 ];
 
 #[derive(Clone)]
@@ -210,9 +213,7 @@ pub enum Role {
         /// None if it says nothing.
         access: Option<Type>,
     },
-    Sampler {
-        comparison: bool,
-    },
+    Sampler(SamplerKind),
     Constant {
         id: u32,
         default: u32,
@@ -228,9 +229,35 @@ pub enum Role {
     Varying(Passed),
 }
 
+/// What a sampler does. The names are those of `describe::SamplerKind`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SamplerKind {
+    Filtering,
+    NonFiltering,
+    Comparison,
+}
+
+impl SamplerKind {
+    /// The DSL's type, in full.
+    pub fn ty(self) -> TokenStream {
+        match self {
+            Self::Filtering => quote!(::hankel_dsl::Sampler),
+            Self::NonFiltering => quote!(::hankel_dsl::NonFilteringSampler),
+            Self::Comparison => quote!(::hankel_dsl::ComparisonSampler),
+        }
+    }
+
+    /// `describe::SamplerKind`.
+    pub fn variant(self) -> TokenStream {
+        let name = format_ident!("{self:?}");
+        quote!(describe::SamplerKind::#name)
+    }
+}
+
 /// How the texels of a storage texture lie. The names are those of a format's images in the DSL.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum StorageKind {
+    Line,
     Flat,
     Layers,
     Volume,
@@ -240,6 +267,7 @@ impl StorageKind {
     /// The DSL's type.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Line => "StorageTexture1d",
             Self::Flat => "StorageTexture2d",
             Self::Layers => "StorageTexture2dArray",
             Self::Volume => "StorageTexture3d",
@@ -258,7 +286,11 @@ impl StorageKind {
     }
 
     pub fn dimensions(self) -> u32 {
-        if self == Self::Volume { 3 } else { 2 }
+        match self {
+            Self::Line => 1,
+            Self::Flat | Self::Layers => 2,
+            Self::Volume => 3,
+        }
     }
 }
 
@@ -339,7 +371,7 @@ impl BuiltIn {
 }
 
 /// Types of textures that are read.
-const TEXTURES: [&str; 11] = [
+const TEXTURES: [&str; 12] = [
     "Texture1d",
     "Texture2d",
     "Texture2dArray",
@@ -349,12 +381,21 @@ const TEXTURES: [&str; 11] = [
     "TextureCubeArray",
     "DepthTexture2d",
     "DepthTexture2dArray",
+    "DepthTexture2dMultisampled",
     "DepthTextureCube",
     "DepthTextureCubeArray",
 ];
 
 /// Those that may hold integers, `Texture2d<'_, u32>`.
-const TEXTURES_OF: [&str; 3] = ["Texture2d", "Texture2dArray", "Texture3d"];
+const TEXTURES_OF: [&str; 7] = [
+    "Texture1d",
+    "Texture2d",
+    "Texture2dArray",
+    "Texture2dMultisampled",
+    "Texture3d",
+    "TextureCube",
+    "TextureCubeArray",
+];
 
 /// The kind of a texture: its type's name, which begins with what its integers are.
 fn texture_kind(ty: &Type) -> Option<Ident> {
@@ -414,19 +455,21 @@ impl Role {
             Self::Element(_) | Self::ElementMut(_) | Self::Storage(_) | Self::StorageMut { .. } => {
                 Holder::Buffer
             }
-            Self::Texture(kind) => Holder::Texture {
-                dimensions: match kind.to_string().as_str() {
-                    "Texture1d" => 1,
-                    "Texture3d" | "UintTexture3d" | "SintTexture3d" => 3,
-                    _ => 2,
-                },
-                levels: kind != "Texture1d" && kind != "Texture2dMultisampled",
-                array: kind.to_string().ends_with("Array"),
-                cube: kind.to_string().contains("Cube"),
-            },
-            Self::Sampler { comparison } => Holder::Sampler {
-                comparison: *comparison,
-            },
+            Self::Texture(kind) => {
+                let kind = kind.to_string();
+                let dimensions = match () {
+                    () if kind.ends_with("1d") => 1,
+                    () if kind.ends_with("3d") => 3,
+                    () => 2,
+                };
+                Holder::Texture {
+                    dimensions,
+                    levels: dimensions != 1 && !kind.ends_with("Multisampled"),
+                    array: kind.ends_with("Array"),
+                    cube: kind.contains("Cube"),
+                }
+            }
+            Self::Sampler(kind) => Holder::Sampler(*kind),
             Self::Constant { .. } => Holder::Constant,
             Self::Atomic { .. } => Holder::Counters,
             Self::StorageTexture { kind, .. } => Holder::Texels {
@@ -448,7 +491,7 @@ impl Role {
                 | Self::Atomic { .. }
                 | Self::Texture(_)
                 | Self::StorageTexture { .. }
-                | Self::Sampler { .. }
+                | Self::Sampler(_)
         )
     }
 }
@@ -490,6 +533,7 @@ impl Kernel {
         let output_formats = args.output_formats(&outputs)?;
         let compensated = args.compensated.clone();
         let scalar = args.scalar;
+        let invariant = args.invariant.clone();
         let rounding = args.rounding.unwrap_or(Rounding::Free);
         let inputs = args.inputs.as_ref().map(from_inside);
         let helpers = args.cooperative.clone();
@@ -523,7 +567,14 @@ impl Kernel {
             scalar,
             helpers,
             sized_by_subgroups: depends.is_some(),
+            invariant: invariant.is_some(),
         };
+        if let Some(word) = invariant.filter(|_| !matches!(kernel.stage, Stage::Vertex)) {
+            return Err(syn::Error::new(
+                word.span(),
+                "only the position of a vertex kernel is invariant",
+            ));
+        }
         if let Some(word) = depends.filter(|_| kernel.form() != Form::Cooperative) {
             return Err(syn::Error::new(
                 word.span(),
@@ -935,19 +986,20 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 return Err(syn::Error::new(
                     ty.span(),
                     format!(
-                        "a texture is one of {}; one that is written is `StorageTexture2d<'_, FORMAT>`, `StorageTexture2dArray<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
+                        "a texture is one of {}; one that is written is `StorageTexture1d<'_, FORMAT>`, `StorageTexture2d<'_, FORMAT>`, `StorageTexture2dArray<'_, FORMAT>` or `StorageTexture3d<'_, FORMAT>`",
                         names.join(", ")
                     ),
                 ));
             }
         },
         "sampler" => match last_segment(ty).map(|s| s.ident.to_string()).as_deref() {
-            Some("Sampler") => Role::Sampler { comparison: false },
-            Some("ComparisonSampler") => Role::Sampler { comparison: true },
+            Some("Sampler") => Role::Sampler(SamplerKind::Filtering),
+            Some("NonFilteringSampler") => Role::Sampler(SamplerKind::NonFiltering),
+            Some("ComparisonSampler") => Role::Sampler(SamplerKind::Comparison),
             _ => {
                 return Err(syn::Error::new(
                     ty.span(),
-                    "a sampler is `Sampler`, or `ComparisonSampler` for depths",
+                    "a sampler is `Sampler`, `NonFilteringSampler`, or `ComparisonSampler` for depths",
                 ));
             }
         },
@@ -1035,7 +1087,12 @@ fn arguments(ty: &Type, name: &str) -> Vec<Type> {
 
 /// The role of `NAME<'_, FORMAT, ACCESS>`, if it is a storage texture.
 fn storage_texture(ty: &Type) -> Option<Role> {
-    let kinds = [StorageKind::Flat, StorageKind::Layers, StorageKind::Volume];
+    let kinds = [
+        StorageKind::Line,
+        StorageKind::Flat,
+        StorageKind::Layers,
+        StorageKind::Volume,
+    ];
     kinds.into_iter().find_map(|kind| {
         let mut arguments = arguments(ty, kind.name()).into_iter();
         Some(Role::StorageTexture {
@@ -1103,6 +1160,7 @@ struct Args {
     inputs: Option<syn::Path>,
     compensated: Option<Ident>,
     scalar: bool,
+    invariant: Option<Ident>,
     forms: Option<(Span, FragmentForm)>,
 }
 
@@ -1128,6 +1186,7 @@ impl Parse for Args {
                         ));
                     }
                 }
+                "invariant" => args.invariant = Some(word),
                 "threads" => {
                     let threads = numbers(input)?;
                     let product: u64 = threads.iter().map(|t| u64::from(*t)).product();

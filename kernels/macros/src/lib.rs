@@ -50,9 +50,9 @@ use syn::parse_macro_input;
 /// | `#[storage] x: Buffer<'_, T>` | a read-only buffer, readable anywhere |
 /// | `#[storage] x: StorageMut<'_, T>` | a buffer, readable and writable anywhere. `#[storage(unordered)]`: which element lies where depends on who comes first; parity then compares what is in it, in no order |
 /// | `#[atomic] x: Atomics<'_>` | integers with atomic operations, `u32` or `Atomics<'_, i32>`; `#[atomic(unordered)]` as above |
-/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTextureCube`, `DepthTextureCubeArray`; of integers: `Texture2d<'_, u32>`, `Texture2dArray<'_, i32>`, `Texture3d<'_, u32>` |
-/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture2dArray`, `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
-/// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` for depths |
+/// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTexture2dMultisampled`, `DepthTextureCube`, `DepthTextureCubeArray`; all but those of depths may hold integers: `Texture2d<'_, u32>`, `TextureCube<'_, i32>` |
+/// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture1d`, `StorageTexture2dArray`, `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
+/// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` compares depths, `NonFilteringSampler` reads depths and integers as they are |
 /// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
 /// | `#[local_id]`, `#[group_id]`, `#[group_count]` | the invocation's place in its workgroup, its workgroup, how many workgroups the range needs: types as of the index |
@@ -70,7 +70,8 @@ use syn::parse_macro_input;
 ///
 /// A compute kernel returns what it computes, or a tuple of it; or nothing, if it writes to its
 /// parameters. A vertex kernel returns the clip-space position, or a tuple of it and the varyings; a
-/// fragment kernel one colour or a tuple of them, among which may be a `Depth` and a `SampleMask`. It may
+/// fragment kernel one colour or a tuple of them, among which may be a `Depth`, a `SampleMask` and a `SecondSource`. Beside the position of a
+/// vertex may be `ClipDistances`. It may
 /// `discard` the fragment, take derivatives (`dpdx`), and write memory behind the last of them.
 ///
 /// # Inputs

@@ -171,7 +171,7 @@ impl Kernel {
                         #name: &<#format as ::hankel_dsl::Format>::#shape,
                     }
                 }
-                Role::Sampler { .. } => {
+                Role::Sampler(_) => {
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::spirv_std::Sampler,)
                 }
                 Role::Constant { id, default } => {
@@ -267,8 +267,8 @@ impl Kernel {
                     let ty = kind.ty();
                     quote!(#ty::new(#name))
                 }
-                Role::Sampler { comparison } => {
-                    let ty = sampler_type(*comparison);
+                Role::Sampler(kind) => {
+                    let ty = kind.ty();
                     quote!(#ty::new(#name))
                 }
                 Role::Index => self.of_dimensions(&quote!(invocation)),
@@ -358,14 +358,5 @@ pub fn output_name(stage: &Stage, i: usize) -> Ident {
         Stage::Vertex if i == 0 => format_ident!("position_out"),
         Stage::Vertex => format_ident!("varying{}", i - 1),
         _ => format_ident!("target{i}"),
-    }
-}
-
-/// The DSL's type of a sampler.
-pub fn sampler_type(comparison: bool) -> TokenStream {
-    if comparison {
-        quote!(::hankel_dsl::ComparisonSampler)
-    } else {
-        quote!(::hankel_dsl::Sampler)
     }
 }

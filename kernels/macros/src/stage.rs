@@ -121,8 +121,10 @@ pub enum Returned {
     Position,
     Varying { location: u32, passed: Passed },
     Target { location: u32, ty: Type },
+    SecondSource { ty: Type },
     Depth,
     SampleMask,
+    ClipDistances { count: TokenStream },
 }
 
 impl Kernel {
@@ -139,12 +141,18 @@ impl Kernel {
             .enumerate()
             .map(|(i, ty)| match (vertex, i) {
                 (true, 0) => Returned::Position,
+                (true, _) if is_named(ty, "ClipDistances") => Returned::ClipDistances {
+                    count: const_argument(ty).unwrap_or_else(|| quote!(1)),
+                },
                 (true, _) => Returned::Varying {
                     location: next(),
                     passed: Passed::of(ty),
                 },
                 (false, _) if is_named(ty, "Depth") => Returned::Depth,
                 (false, _) if is_named(ty, "SampleMask") => Returned::SampleMask,
+                (false, _) if is_named(ty, "SecondSource") => Returned::SecondSource {
+                    ty: argument(ty, "SecondSource").unwrap_or_else(|| ty.clone()),
+                },
                 (false, _) => Returned::Target {
                     location: next(),
                     ty: ty.clone(),
@@ -156,13 +164,31 @@ impl Kernel {
     /// What is wrong with what it returns; vertex and fragment kernels only.
     pub fn check_returned(&self) -> syn::Result<()> {
         let returned = self.returned();
-        let mut masks = 0;
+        let (mut masks, mut clips, mut seconds) = (0, 0, 0);
+        let targets: Vec<String> = returned
+            .iter()
+            .filter_map(|it| match it {
+                Returned::Target { ty, .. } => Some(quote!(#ty).to_string()),
+                _ => None,
+            })
+            .collect();
         for (it, ty) in returned.iter().zip(&self.outputs) {
             let problem = match it {
                 Returned::Varying { passed, .. } => passed.problem(),
                 Returned::SampleMask => {
                     masks += 1;
                     (masks > 1).then_some("a fragment has one mask")
+                }
+                Returned::ClipDistances { .. } => {
+                    clips += 1;
+                    (clips > 1 || const_argument(ty).is_none())
+                        .then_some("a vertex has one array of distances: `ClipDistances<2>`")
+                }
+                Returned::SecondSource { ty } => {
+                    seconds += 1;
+                    (seconds > 1 || targets != [quote!(#ty).to_string()]).then_some(
+                        "a second source goes with one target, and is of its type: `-> (Vec4, SecondSource<Vec4>)`",
+                    )
                 }
                 _ => None,
             };
@@ -194,6 +220,15 @@ impl Kernel {
     }
 }
 
+/// `N` of `Name<N>`.
+fn const_argument(ty: &Type) -> Option<TokenStream> {
+    let syn::PathArguments::AngleBracketed(arguments) = &last_segment(ty)?.arguments else {
+        return None;
+    };
+    let only = arguments.args.first()?;
+    (arguments.args.len() == 1).then(|| quote!(#only))
+}
+
 fn is_named(ty: &Type, name: &str) -> bool {
     last_segment(ty).is_some_and(|s| s.ident == name)
 }
@@ -208,8 +243,10 @@ impl Returned {
                 quote!(#ty)
             }
             Self::Target { ty, .. } => quote!(#ty),
+            Self::SecondSource { ty } => quote!(#ty),
             Self::Depth => quote!(f32),
             Self::SampleMask => quote!([u32; 1]),
+            Self::ClipDistances { count } => quote!([f32; #count]),
         }
     }
 
@@ -218,7 +255,9 @@ impl Returned {
         match self {
             Self::Position => quote!(#[spirv(position)]),
             Self::Varying { passed, .. } => passed.decoration(),
-            Self::Target { .. } => TokenStream::new(),
+            // `codegen` makes a second source of the target behind the first.
+            Self::Target { .. } | Self::SecondSource { .. } => TokenStream::new(),
+            Self::ClipDistances { .. } => quote!(#[spirv(clip_distance)]),
             Self::Depth => quote!(#[spirv(frag_depth)]),
             Self::SampleMask => quote!(#[spirv(sample_mask)]),
         }
@@ -229,7 +268,9 @@ impl Returned {
         match self {
             Self::Varying { passed, .. } => passed.unwrap(value),
             Self::Position | Self::Target { .. } => quote!(#value),
-            Self::Depth => quote!(#value.0),
+            Self::Depth | Self::SecondSource { .. } | Self::ClipDistances { .. } => {
+                quote!(#value.0)
+            }
             Self::SampleMask => quote!([#value.0]),
         }
     }
@@ -267,6 +308,12 @@ impl Returned {
             }),
             Self::Depth => quote!(describe::Output::Depth),
             Self::SampleMask => quote!(describe::Output::SampleMask),
+            Self::ClipDistances { .. } => quote!(describe::Output::ClipDistances {
+                ty: <#ty as layout::Element>::ty(),
+            }),
+            Self::SecondSource { .. } => quote!(describe::Output::SecondSource {
+                ty: <#ty as layout::Element>::ty(),
+            }),
         }
     }
 }

@@ -44,7 +44,7 @@ pub(crate) trait Samples: Copy {
 impl Samples for Texture2dMultisampled<'_> {
     #[inline(always)]
     fn size(self) -> UVec2 {
-        Texture2dMultisampled::size(self)
+        <Texture2dMultisampled<'_>>::size(self)
     }
 
     #[inline(always)]

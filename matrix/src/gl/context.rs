@@ -930,6 +930,22 @@ impl Context {
         self.wait()
     }
 
+    /// Whether what is drawn is left out, and what is there multiplied by the second source.
+    pub(super) fn blend_second(&mut self, does: bool) -> Result<(), String> {
+        if does {
+            gl!(self, enable(glow::BLEND));
+            gl!(
+                self,
+                blend_func_separate(glow::ZERO, glow::SRC1_COLOR, glow::ZERO, glow::SRC1_ALPHA)
+            );
+        } else {
+            gl!(self, disable(glow::BLEND));
+            // Mesa looks at it with several targets, whether or not anything is blended.
+            gl!(self, blend_func(glow::ONE, glow::ZERO));
+        }
+        self.check("blending")
+    }
+
     /// Runs the vertex stage of the program in use for so many points; gives what it captures of
     /// each, `bytes` bytes a point.
     pub(super) fn capture(

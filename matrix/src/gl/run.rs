@@ -111,6 +111,10 @@ fn pipeline(context: &mut Context, job: &Job, code: &str) -> Result<Pipeline, St
                         names.push("gl_Position");
                         captured.push((i, 4));
                     }
+                    Role::ClipDistances { value } => {
+                        names.push("gl_ClipDistance");
+                        captured.push((i, value.size));
+                    }
                     Role::Passed { location, value } => {
                         let out = find(&outs, location)
                             .ok_or_else(|| format!("no output has location {location}"))?;
@@ -328,6 +332,8 @@ impl<'a> Run<'a> {
                 | Role::Varying { .. }
                 | Role::Position
                 | Role::Passed { .. }
+                | Role::ClipDistances { .. }
+                | Role::SecondSource { .. }
                 | Role::Depth
                 | Role::Target { .. },
                 _,
@@ -524,25 +530,46 @@ impl<'a> Run<'a> {
         let mut depth = None;
         // llvmpipe compiles a fragment shader twice where no depth is tested: once more for tiles that are covered wholly.
         let attached = self.context.depth([width, height])?;
+        let mut second = None;
+        let size = [width, height, 1];
         for (i, slot) in self.job.slots.iter().enumerate() {
-            if let Role::Target { location, value } = slot.role {
-                let texel = Texel::named(match value.scalar {
-                    Scalar::F32 => "rgba32float",
-                    Scalar::U32 => "rgba32uint",
-                    Scalar::I32 => "rgba32sint",
-                })?;
-                // What is discarded stays as it is.
-                let zeros = vec![0; (width * height * 16) as usize];
-                let size = [width, height, 1];
-                let target = self
-                    .context
-                    .texture(texel, &Shape::flat(size), Some(&zeros))?;
-                targets.push((location, target));
-                slots.push((i, value.size as usize * 4));
+            match slot.role {
+                Role::Target { location, value } => {
+                    let texel = Texel::named(match value.scalar {
+                        Scalar::F32 => "rgba32float",
+                        Scalar::U32 => "rgba32uint",
+                        Scalar::I32 => "rgba32sint",
+                    })?;
+                    // What is discarded stays as it is.
+                    let zeros = vec![0; (width * height * 16) as usize];
+                    let target = self
+                        .context
+                        .texture(texel, &Shape::flat(size), Some(&zeros))?;
+                    targets.push((location, target));
+                    slots.push((i, value.size as usize * 4));
+                }
+                Role::SecondSource { value } => {
+                    let ones = 1.0_f32.to_le_bytes().repeat((width * height * 4) as usize);
+                    let texel = Texel::named("rgba32float")?;
+                    let target = self
+                        .context
+                        .texture(texel, &Shape::flat(size), Some(&ones))?;
+                    second = Some((i, target, value.size as usize * 4));
+                }
+                Role::Depth => depth = Some(i),
+                _ => {}
             }
-            if matches!(slot.role, Role::Depth) {
-                depth = Some(i);
+        }
+        if let Some((slot, target, bytes)) = second {
+            self.context
+                .draw_into(&[(0, target)], Some(attached), [width, height])?;
+            if count > 0 {
+                self.context.blend_second(true)?;
+                let drawn = self.context.draw(glow::POINTS, count, &attributes);
+                self.context.blend_second(false)?;
+                drawn?;
             }
+            written[slot] = Some(Written::Bytes(self.points(target, count, bytes)?));
         }
         self.context
             .draw_into(&targets, Some(attached), [width, height])?;
@@ -556,14 +583,16 @@ impl<'a> Run<'a> {
             written[slot] = Some(Written::Bytes(values));
         }
         for ((_, target), (slot, bytes)) in targets.into_iter().zip(slots) {
-            let pixels = self.context.read_texture(target)?;
-            let values = pixels
-                .chunks_exact(16)
-                .take(count as usize)
-                .flat_map(|it| &it[..bytes]);
-            written[slot] = Some(Written::Bytes(values.copied().collect()));
+            written[slot] = Some(Written::Bytes(self.points(target, count, bytes)?));
         }
         Ok(())
+    }
+
+    /// The first bytes of each of so many pixels.
+    fn points(&mut self, target: Texture, count: u32, bytes: usize) -> Result<Vec<u8>, String> {
+        let pixels = self.context.read_texture(target)?;
+        let pixels = pixels.chunks_exact(16).take(count as usize);
+        Ok(pixels.flat_map(|it| &it[..bytes]).copied().collect())
     }
 }
 

@@ -244,6 +244,8 @@ fn stream(role: &Role) -> Option<Value> {
         Role::Attribute { value, .. }
         | Role::Varying { value, .. }
         | Role::Passed { value, .. }
+        | Role::ClipDistances { value }
+        | Role::SecondSource { value }
         | Role::Target { value, .. } => Some(value),
         Role::Depth => Some(Value {
             scalar: Scalar::F32,
@@ -288,7 +290,12 @@ fn plan(job: &Job) -> Result<String, Failure> {
             Role::Texture { .. } | Role::StorageTexture { .. } => "texture",
             Role::Sampler => "sampler",
             Role::Attribute { .. } | Role::Varying { .. } => "in",
-            Role::Position | Role::Passed { .. } | Role::Depth | Role::Target { .. } => "out",
+            Role::Position
+            | Role::Passed { .. }
+            | Role::ClipDistances { .. }
+            | Role::Depth
+            | Role::Target { .. }
+            | Role::SecondSource { .. } => "out",
         };
         let name: String = slot
             .name
@@ -387,7 +394,15 @@ fn plan_arg(plan: &mut String, slot: &Slot, arg: &Arg) -> Result<(), Failure> {
                 "{format} {x} {y} {z} {levels} {layers} {samples} {offset} {length}"
             )
         }
-        (Role::Position | Role::Passed { .. } | Role::Depth | Role::Target { .. }, _) => {
+        (
+            Role::Position
+            | Role::Passed { .. }
+            | Role::ClipDistances { .. }
+            | Role::Depth
+            | Role::Target { .. }
+            | Role::SecondSource { .. },
+            _,
+        ) => {
             writeln!(plan, "{}", stride.unwrap_or_default())
         }
         (Role::Attribute { .. } | Role::Varying { .. }, Arg::Bytes { offset, length }) => {
@@ -632,6 +647,8 @@ fn own(job: &Job, member: &Member) -> Result<usize, Failure> {
         }
         Role::Target { location, .. } => member.part == Part::Colour(location),
         Role::Position => member.part == Part::Position,
+        Role::ClipDistances { .. } => member.part == Part::ClipDistances,
+        Role::SecondSource { .. } => member.part == Part::SecondSource,
         Role::Depth => member.part == Part::Depth,
         _ => false,
     });

@@ -154,8 +154,10 @@ namespace {
 struct Format {
     Kind kind;
     unsigned channels;
-    // Of a channel.
+    // Of a channel; 0 where all channels share a word.
     unsigned bytes;
+    // Of channels that share a word.
+    unsigned bits[4] = {};
 };
 
 // By its name in WebGPU: `rg16float`.
@@ -164,6 +166,12 @@ Format format_named(const char *name) {
         const char *word;
         Kind kind;
     } kinds[] = {{"float", floats}, {"unorm", unorms}, {"snorm", snorms}, {"uint", uints}, {"sint", sints}};
+    if (strcmp(name, "rgb10a2unorm") == 0)
+        return {unorms, 4, 0, {10, 10, 10, 2}};
+    if (strcmp(name, "rgb10a2uint") == 0)
+        return {uints, 4, 0, {10, 10, 10, 2}};
+    if (strcmp(name, "rg11b10ufloat") == 0)
+        return {floats, 3, 0, {11, 11, 10, 0}};
     char letters[5], word[6];
     unsigned bits = 0;
     int read = 0;
@@ -224,6 +232,66 @@ unsigned whole_at(const unsigned char *bytes, unsigned size, bool is_signed) {
     return is_signed ? unsigned(int(n << shift) >> shift) : n;
 }
 
+// Bits of a channel in the word of a texel, of which the first channel has the lowest.
+unsigned below(const Format &f, unsigned channel) {
+    unsigned all = 0;
+    for (unsigned i = 0; i < channel; i++)
+        all += f.bits[i];
+    return all;
+}
+unsigned packed_at(const unsigned char *texel, const Format &f, unsigned channel) {
+    unsigned word;
+    memcpy(&word, texel, 4);
+    return word >> below(f, channel) & ((1u << f.bits[channel]) - 1);
+}
+void put_packed(unsigned char *texel, const Format &f, unsigned channel, unsigned n) {
+    unsigned word, most = (1u << f.bits[channel]) - 1, from = below(f, channel);
+    memcpy(&word, texel, 4);
+    word = (word & ~(most << from)) | (n & most) << from;
+    memcpy(texel, &word, 4);
+}
+
+// A float without a sign, of which five bits are the exponent.
+float unsigned_float(unsigned n, unsigned digits) {
+    unsigned exponent = n >> digits, mantissa = n & ((1u << digits) - 1);
+    float share = float(mantissa) / float(1u << digits);
+    if (exponent == 31)
+        return mantissa != 0 ? NAN : INFINITY;
+    return exponent == 0 ? ldexpf(share, -14) : ldexpf(1 + share, int(exponent) - 15);
+}
+unsigned to_unsigned_float(float x, unsigned digits) {
+    unsigned infinity = 31u << digits;
+    if (!(x == x))
+        return infinity + 1;
+    if (x == INFINITY)
+        return infinity;
+    if (x <= 0)
+        return 0;
+    unsigned n;
+    if (x < ldexpf(1, -14)) {
+        n = unsigned(rintf(ldexpf(x, 14 + int(digits))));
+    } else {
+        unsigned wide, shift = 23 - digits;
+        memcpy(&wide, &x, 4);
+        wide -= 112u << 23;
+        n = (wide + (1u << (shift - 1)) - 1 + (wide >> shift & 1)) >> shift;
+    }
+    return n < infinity ? n : infinity - 1;
+}
+
+float packed_channel_at(const unsigned char *texel, const Format &f, unsigned channel) {
+    unsigned n = packed_at(texel, f, channel);
+    if (f.kind == floats)
+        return unsigned_float(n, f.bits[channel] - 5);
+    return float(n) / float((1u << f.bits[channel]) - 1);
+}
+void put_packed_channel(unsigned char *texel, const Format &f, unsigned channel, float x) {
+    unsigned n = f.kind == floats
+                     ? to_unsigned_float(x, f.bits[channel] - 5)
+                     : unsigned(step(x, 0, float((1u << f.bits[channel]) - 1)));
+    put_packed(texel, f, channel, n);
+}
+
 float channel_at(const unsigned char *bytes, const Format &f) {
     switch (f.kind) {
     case floats:
@@ -266,7 +334,8 @@ void load(const msl_texture &t, const unsigned *at, unsigned layer, unsigned sam
     out[0] = out[1] = out[2] = 0;
     out[3] = 1;
     for (unsigned i = 0; i < t.format.channels; i++)
-        out[i] = channel_at(texel + i * t.format.bytes, t.format);
+        out[i] = t.format.bytes == 0 ? packed_channel_at(texel, t.format, i)
+                                     : channel_at(texel + i * t.format.bytes, t.format);
 }
 } // namespace
 
@@ -294,7 +363,9 @@ void msl_load_uint(const msl_texture *t, const unsigned *at, unsigned layer, uns
     out[3] = 1;
     const unsigned char *texel = t->texel(at, layer, sample, lod);
     for (unsigned i = 0; i < t->format.channels; i++)
-        out[i] = whole_at(texel + i * t->format.bytes, t->format.bytes, t->format.kind == sints);
+        out[i] = t->format.bytes == 0
+                     ? packed_at(texel, t->format, i)
+                     : whole_at(texel + i * t->format.bytes, t->format.bytes, t->format.kind == sints);
 }
 
 void msl_store_float(msl_texture *t, const unsigned *at, unsigned layer, unsigned lod,
@@ -305,7 +376,10 @@ void msl_store_float(msl_texture *t, const unsigned *at, unsigned layer, unsigne
         return;
     unsigned char *texel = t->texel(at, layer, 0, lod);
     for (unsigned i = 0; i < t->format.channels; i++)
-        put_channel(texel + i * t->format.bytes, t->format, value[i]);
+        if (t->format.bytes == 0)
+            put_packed_channel(texel, t->format, i, value[i]);
+        else
+            put_channel(texel + i * t->format.bytes, t->format, value[i]);
 }
 
 void msl_store_uint(msl_texture *t, const unsigned *at, unsigned layer, unsigned lod,
@@ -316,7 +390,10 @@ void msl_store_uint(msl_texture *t, const unsigned *at, unsigned layer, unsigned
         return;
     unsigned char *texel = t->texel(at, layer, 0, lod);
     for (unsigned i = 0; i < t->format.channels; i++)
-        memcpy(texel + i * t->format.bytes, &value[i], t->format.bytes);
+        if (t->format.bytes == 0)
+            put_packed(texel, t->format, i, value[i]);
+        else
+            memcpy(texel + i * t->format.bytes, &value[i], t->format.bytes);
 }
 }
 
@@ -437,9 +514,20 @@ struct Taps {
 
     // Whether there is such a texel: not beyond a cube's corner.
     bool tap(int dx, int dy, int dz, float *out) const {
+        unsigned place[3], where;
+        if (!find(dx, dy, dz, place, where))
+            return false;
+        float texel[4];
+        load(t, place, where, 0, lod, texel);
+        reading(texel, out);
+        return true;
+    }
+
+    // Where such a texel is, if there is one, and in which layer.
+    bool find(int dx, int dy, int dz, unsigned (&place)[3], unsigned &where) const {
         const int64_t at[3] = {base[0] + dx, base[1] + dy, base[2] + dz};
-        unsigned place[3] = {0, 0, 0};
-        unsigned where = layer;
+        place[0] = place[1] = place[2] = 0;
+        where = layer;
         if (cube) {
             int64_t n = t.of_level(lod, 0);
             bool x = at[0] < 0 || at[0] >= n, y = at[1] < 0 || at[1] >= n;
@@ -465,9 +553,6 @@ struct Taps {
             for (int d = 0; d < 3; d++)
                 place[d] = wrap(at[d], t.of_level(lod, d), bits(flags, msl_address + 2 * d, 2));
         }
-        float texel[4];
-        load(t, place, where, 0, lod, texel);
-        reading(texel, out);
         return true;
     }
 
@@ -551,6 +636,18 @@ void msl_gather_float(const msl_texture *t, unsigned flags, const msl_place *pla
     const int order[4] = {2, 3, 1, 0};
     for (int i = 0; i < 4; i++)
         out[i] = v[order[i]][channel];
+}
+
+void msl_gather_uint(const msl_texture *t, unsigned flags, const msl_place *place,
+                     unsigned channel, unsigned *out) {
+    Taps around(*t, flags, *place, nullptr, 0, true);
+    const int order[4] = {2, 3, 1, 0};
+    for (int i = 0; i < 4; i++) {
+        unsigned at[3], layer, texel[4] = {};
+        if (around.find(order[i] & 1, order[i] >> 1, 0, at, layer))
+            msl_load_uint(t, at, layer, 0, 0, texel);
+        out[i] = texel[channel];
+    }
 }
 
 float msl_lod(const msl_texture *t, const msl_place *place, const float *dx, const float *dy) {
@@ -844,7 +941,8 @@ void prepare(Slot &s, unsigned index, unsigned invocations) {
         char name[64];
         word(name);
         s.texture.format = format_named(name);
-        s.texture.texel_bytes = s.texture.format.channels * s.texture.format.bytes;
+        s.texture.texel_bytes =
+            s.texture.format.bytes == 0 ? 4 : s.texture.format.channels * s.texture.format.bytes;
         size_t texels = 1;
         for (unsigned &size : s.texture.size) {
             size = unsigned(number());

@@ -100,6 +100,8 @@ void msl_sample_float(const msl_texture *texture, unsigned flags, const msl_plac
 // The four texels that a linear filter reads, in the order in which Metal gathers them.
 void msl_gather_float(const msl_texture *texture, unsigned flags, const msl_place *place,
                       const float *reference, unsigned channel, float *out);
+void msl_gather_uint(const msl_texture *texture, unsigned flags, const msl_place *place,
+                     unsigned channel, unsigned *out);
 // The level of detail of derivatives of the coordinates.
 float msl_lod(const msl_texture *texture, const msl_place *place, const float *dx, const float *dy);
 // Waits for the workgroup's other threads. `line` tells one barrier from another.

@@ -79,6 +79,10 @@ pub enum Part {
     Depth,
     /// `[[sample_mask]]`.
     Mask,
+    /// `[[clip_distance]]`.
+    ClipDistances,
+    /// `[[color(0), index(1)]]`.
+    SecondSource,
 }
 
 /// Positions and indices that an invocation can ask for.
@@ -255,6 +259,14 @@ fn parse_member(member: &[String]) -> Result<Member, String> {
         .position(|t| t == "[[")
         .unwrap_or(member.len());
     let (declared, attributes) = member.split_at(begin);
+    // Behind the attributes of an array is its length.
+    let (attributes, length) = match attributes {
+        [attributes @ .., open, length, close] if open == "[" && close == "]" => (
+            attributes,
+            Some(length.parse::<u32>().map_err(|_| "no length")?),
+        ),
+        _ => (attributes, None),
+    };
     let (value, name) = match declared {
         [value, name] => (value, name),
         [space, colons, value, name] if space == "metal" && colons == "::" => (value, name),
@@ -282,6 +294,13 @@ fn parse_member(member: &[String]) -> Result<Member, String> {
             ("position", None) => Part::Position,
             ("depth", Some("any")) => Part::Depth,
             ("sample_mask", None) => Part::Mask,
+            ("clip_distance", None) => Part::ClipDistances,
+            ("index", Some("0")) if part == Some(Part::Colour(0)) => continue,
+            ("index", Some("1")) if part == Some(Part::Colour(0)) => {
+                part = Some(Part::SecondSource);
+                continue;
+            }
+            ("invariant", None) => continue,
             (other, None) if INTERPOLATIONS.contains(&other) => continue,
             (other, _) => return Err(format!("attribute `{other}` is not known here")),
         };
@@ -292,7 +311,7 @@ fn parse_member(member: &[String]) -> Result<Member, String> {
     Ok(Member {
         name: name.clone(),
         scalar: scalar.into(),
-        size: size.into(),
+        size: length.unwrap_or(1) * u32::from(size),
         part: part.ok_or("no attribute says what it is")?,
     })
 }

@@ -4,6 +4,7 @@ import { WIDTH, captured, filling, points, taken, typeName } from "./wgsl.mjs";
 
 /** Bytes of a texel of a format, of which the name says channels and their bits: `rg16float`. */
 function texelBytes(format) {
+    if (/^rgb10a2|^rg11b10/.test(format)) return 4;
     const [, channels, bits] = /^(rgba|rg|r|depth)(\d+)/.exec(format);
     return { r: 1, rg: 2, rgba: 4, depth: 1 }[channels] * bits / 8;
 }
@@ -29,10 +30,21 @@ const TIER = "texture-formats-tier1";
 /** The feature of operations of subgroups. */
 const SUBGROUPS = "subgroups";
 
-/** Of numbers of primitives. */
-const PRIMITIVES = "primitive-index";
+/** Extensions of WGSL, each with the feature that it needs. */
+const EXTENSIONS = {
+    subgroups: SUBGROUPS,
+    primitive_index: "primitive-index",
+    clip_distances: "clip-distances",
+    dual_source_blending: "dual-source-blending",
+};
 
-const FEATURES = ["float32-filterable", TIER, SUBGROUPS, PRIMITIVES];
+const FEATURES = ["float32-filterable", "float32-blendable", TIER, ...Object.values(EXTENSIONS)];
+
+/** What is there, multiplied by the second source. */
+const SECOND_SOURCE = {
+    color: { srcFactor: "zero", dstFactor: "src1" },
+    alpha: { srcFactor: "zero", dstFactor: "src1-alpha" },
+};
 
 const FILTERS = ["validation", "out-of-memory", "internal"];
 
@@ -82,11 +94,10 @@ export async function execute(device, job, code, inputs) {
 }
 
 async function run(device, job, code, inputs, held) {
-    if (code.includes("\nenable subgroups;") && !device.features.has(SUBGROUPS)) {
-        throw new Error(`the device lacks ${SUBGROUPS}`);
-    }
-    if (code.includes("\nenable primitive_index;") && !device.features.has(PRIMITIVES)) {
-        throw new Error(`the device lacks ${PRIMITIVES}`);
+    for (const [extension, feature] of Object.entries(EXTENSIONS)) {
+        if (code.includes(`\nenable ${extension};`) && !device.features.has(feature)) {
+            throw new Error(`the device lacks ${feature}`);
+        }
     }
     const maker = new Maker(device, job, code, inputs, held);
     const cases = [];
@@ -328,7 +339,7 @@ class Maker {
                     } };
                 case "storage_texture":
                     // Core WebGPU stores neither 16-bit normalised numbers nor small texels.
-                    if (/16[su]norm$|^rg?(8|16)/.test(role.format) && !this.device.features.has(TIER)) {
+                    if (/16[su]norm$|^rg?(8|16)|^rgb10a2|^rg11b10/.test(role.format) && !this.device.features.has(TIER)) {
                         throw new Error(`the device lacks ${TIER}`);
                     }
                     return { ...entry, storageTexture: {
@@ -465,7 +476,8 @@ class Maker {
 
     /** The reads of all written slots, in order. */
     inOrder(reads, one) {
-        const written = ["atomic", "write", "storage_texture", "position", "passed", "depth", "target"];
+        const written = ["atomic", "write", "storage_texture", "position", "passed",
+            "clip_distances", "depth", "target", "second_source"];
         return this.job.slots.flatMap(({ name, role }, i) => {
             if (!written.includes(role.kind) || role.access === "read-only") return [];
             if (reads.has(i)) return [reads.get(i)];
@@ -536,7 +548,11 @@ class Maker {
         if (height > limit) throw new Error(`${one.invocations} points need more than ${limit} rows`);
         const layout = await this.layout(one);
         const fillers = await this.fillers(one);
-        const groups = groupsOf(outputs.map((o) => o.format), this.device.limits);
+        // A second source is seen by blending, in a pass of its own.
+        const apart = outputs.some((o) => o.blend);
+        const groups = apart
+            ? outputs.map((_, n) => [n])
+            : groupsOf(outputs.map((o) => o.format), this.device.limits);
         if (groups.length === 0) groups.push([]);
         if (groups.length > 1 && this.job.slots.some(({ role }) => ["atomic", "write"].includes(role.kind))) {
             throw new Error("its targets need several passes, and it writes buffers");
@@ -562,10 +578,14 @@ class Maker {
             groups.forEach((group, g) => {
                 const colours = [];
                 for (const n of group) {
-                    const { format, i, take, at } = outputs[n];
+                    const { format, i, take, at, blend } = outputs[n];
                     const texture = this.texture(format, [WIDTH, height],
                         GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC);
-                    colours[at(group, n)] = { view: texture.createView(), loadOp: "clear", storeOp: "store" };
+                    const all = blend ? 1 : 0;
+                    colours[at(group, n)] = {
+                        view: texture.createView(),
+                        clearValue: [all, all, all, all], loadOp: "clear", storeOp: "store",
+                    };
                     reads.set(i, readTexture(texture, one.invocations * take, take));
                 }
                 let depthStencilAttachment;
@@ -603,11 +623,20 @@ class Maker {
         const outputs = this.having("target", one).map(({ location, value, i }) => ({
             i, location, format: targetFormat(value), take: value.size * 4, at: () => location,
         }));
+        for (const { value, i } of this.having("second_source", one)) {
+            outputs.push({
+                i, location: 0, format: targetFormat(value), take: value.size * 4, at: () => 0,
+                blend: SECOND_SOURCE,
+            });
+        }
         const vertex = { module: helper, entryPoint: "hankel_points" };
         const depth = this.job.slots.findIndex(({ role }) => role.kind === "depth");
         return this.draw(one, height, varyings, vertex, outputs, (group) => {
             const targets = [];
-            for (const n of group) targets[outputs[n].location] = { format: outputs[n].format };
+            for (const n of group) {
+                const { location, format, blend } = outputs[n];
+                targets[location] = { format, blend };
+            }
             const all = Array.from(targets, (t) => t ?? null);
             return { module, entryPoint: this.job.entry_point, targets: all };
         }, depth < 0 ? undefined : depth);
@@ -618,7 +647,8 @@ class Maker {
         const position = { scalar: "f32", size: 4 };
         const returned = this.job.slots.flatMap(({ role: { kind, location, value } }, i) =>
             kind === "position" ? [{ value: position, i }]
-                : kind === "passed" ? [{ location, value, i }] : []);
+                : kind === "passed" ? [{ location, value, i }]
+                : kind === "clip_distances" ? [{ clips: true, value, i }] : []);
         const text = captured(this.code, this.job.entry_point, returned, height);
         const module = await this.module(text);
         const outputs = returned.map(({ value, i }) => ({

@@ -91,19 +91,22 @@ ${copies}    return point;
 `;
 }
 
-/** `value` as four words, its bits unchanged. */
-function words(expression, { scalar, size }) {
+/** `value` as four words, its bits unchanged; an array of up to four numbers, if `isArray` says so. */
+function words(expression, { scalar, size }, isArray) {
+    if (size > 4) throw new Error(`${size} numbers are not read back here`);
     const of = (part) => (scalar === "u32" ? part : `bitcast<u32>(${part})`);
-    const parts = [..."xyzw"].map((c, i) =>
-        i >= size ? "0u" : of(size === 1 ? expression : `${expression}.${c}`),
-    );
+    const parts = [..."xyzw"].map((c, i) => {
+        if (i >= size) return "0u";
+        if (isArray) return of(`${expression}[${i}]`);
+        return of(size === 1 ? expression : `${expression}.${c}`);
+    });
     return `vec4<u32>(${parts.join(", ")})`;
 }
 
 /**
  * The text with a new vertex entry point `hankel_captured`, which calls the old one as a plain
  * function, draws vertex `i` into a pixel of its own and passes the bits of each output on.
- * `outputs` are the outputs' values, with a location or, for the position, none.
+ * `outputs` are the outputs' values, with a location or, for the position and clip distances, none.
  */
 export function captured(code, name, outputs, height) {
     const { start, body, parameters, result } = header(code, "vertex", name);
@@ -121,19 +124,21 @@ export function captured(code, name, outputs, height) {
         entry.push(`@builtin(vertex_index) ${index}: u32`);
     }
     let passed = "", copies = "";
-    outputs.forEach(({ location, value }, i) => {
+    outputs.forEach(({ location, value, clips }, i) => {
+        const builtIn = clips ? "clip_distances" : "position";
         const member = members?.find((m) =>
             location === undefined
-                ? m.attributes.builtin === "position"
+                ? m.attributes.builtin === builtIn
                 : m.attributes.location === String(location),
         );
-        const alone = !members && location === undefined && result.found.builtin === "position";
+        const alone = !members && location === undefined && result.found.builtin === builtIn;
         if (!member && !alone) {
             throw new Error(`\`${name}\` does not return ${
-                location === undefined ? "a position" : `location ${location}`}`);
+                location === undefined ? builtIn : `location ${location}`}`);
         }
         passed += `    @location(${i}) @interpolate(flat) v${i}: vec4<u32>,\n`;
-        copies += `    point.v${i} = ${words(member ? `result.${member.name}` : "result", value)};\n`;
+        const own = member ? `result.${member.name}` : "result";
+        copies += `    point.v${i} = ${words(own, value, clips)};\n`;
     });
     return `${code.slice(0, start)}fn ${name}(${parameters.map((p) => p.rest).join(", ")}) -> ${
         result.rest} ${code.slice(body)}
@@ -179,6 +184,9 @@ const TEXELS = {
     r32uint: ["u32", "words[at]"],
     rgba32uint: ["vec4<u32>",
         "vec4<u32>(words[at], words[at + 1u], words[at + 2u], words[at + 3u])"],
+    rg16uint: ["vec2<u32>", "vec2<u32>(words[at] & 0xffffu, words[at] >> 16u)"],
+    rg16sint: ["vec2<i32>",
+        "vec2<i32>(extractBits(i32(words[at]), 0u, 16u), extractBits(i32(words[at]), 16u, 16u))"],
     depth32float: ["f32", "bitcast<f32>(words[at])"],
 };
 

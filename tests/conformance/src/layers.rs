@@ -1,10 +1,11 @@
 //! Layers, cubes, and textures of one dimension. Levels are as in [`super::sampling`].
 
-use hankel_dsl::format::Rgba8Unorm;
+use hankel_dsl::access::Read;
+use hankel_dsl::format::{R32Sint, Rgba8Unorm};
 use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    DepthTexture2dArray, Real, Sampler, StorageTexture2dArray, Texture1d, Texture2dArray,
-    TextureCube, TextureCubeArray, kernel,
+    DepthTexture2dArray, Real, Sampler, StorageTexture1d, StorageTexture2dArray, Texture1d,
+    Texture2dArray, TextureCube, TextureCubeArray, kernel,
 };
 
 /// Texels of all levels of all layers.
@@ -72,6 +73,32 @@ pub fn around(
 ) -> f32 {
     let level = (i / 384 % 9) as f32 * 0.25;
     source.sample_level(sampler, through_a_face(i, on), level).x
+}
+
+/// A cube at the level that follows from gradients along a face.
+#[kernel(compute, threads(64))]
+pub fn around_by_gradients(
+    #[index] i: u32,
+    #[element]
+    #[range(-0.7..=0.7)]
+    on: Vec2,
+    #[texture]
+    #[size(16, 16)]
+    #[levels(3)]
+    source: TextureCube<'_>,
+    #[sampler]
+    #[mip_filter(nearest)]
+    sampler: Sampler,
+) -> f32 {
+    // 2 to the power of 3/4 texels of the face, which has 8 for each unit: level 1.
+    let step = 1.681_792_8 / 8.0;
+    let to = through_a_face(i, on);
+    let (dx, dy) = match i / 64 % 3 {
+        0 => (Vec3::new(0.0, step, 0.0), Vec3::new(0.0, 0.0, step)),
+        1 => (Vec3::new(step, 0.0, 0.0), Vec3::new(0.0, 0.0, step)),
+        _ => (Vec3::new(step, 0.0, 0.0), Vec3::new(0.0, step, 0.0)),
+    };
+    source.sample_gradient(sampler, to, dx, dy).x
 }
 
 /// One of several cubes.
@@ -157,4 +184,38 @@ pub fn written_counts(
         );
     }
     x + target.layers()
+}
+
+/// Integers in rows, of both signs.
+#[kernel(compute, threads(64))]
+pub fn along_integers(
+    #[index] i: u32,
+    #[texture]
+    #[size(100)]
+    source: Texture1d<'_, u32>,
+    #[texture]
+    #[size(37)]
+    signed: Texture1d<'_, i32>,
+) -> UVec4 {
+    let texel = source.load(i % source.size());
+    let other = signed.load(i % signed.size());
+    UVec4::new(texel.x, texel.w, other.y as u32, other.z as u32)
+}
+
+/// Texels of a row, written in another order.
+#[kernel(compute, threads(64))]
+pub fn rearranged(
+    #[index] i: u32,
+    #[element] x: u32,
+    #[texture] from: StorageTexture1d<'_, R32Sint, Read>,
+    #[texture] to: StorageTexture1d<'_, Rgba8Unorm>,
+) -> i32 {
+    let count = to.size();
+    if i < count {
+        to.store(
+            count - 1 - i,
+            Vec4::new((i & 15) as f32 / 15.0, 0.0, 1.0, 0.2),
+        );
+    }
+    from.load(i % from.size()).wrapping_add(x as i32)
 }

@@ -270,3 +270,37 @@ pub fn blurred_sideways(
     let right = source.shifted::<1, 0>().sample_bias(sampler, uv, 1.0);
     Vec4::new(left.x, left.y, right.x, right.y)
 }
+
+/// Texels beside others in three dimensions, at a level and by gradients.
+#[kernel(compute, threads(8, 8), texture(rgba32float))]
+pub fn neighbours_in_space(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(16, 8, 8)]
+    #[levels(2)]
+    source: Texture3d<'_>,
+    #[sampler]
+    #[filter(nearest)]
+    #[mip_filter(nearest)]
+    #[address(repeat)]
+    sampler: Sampler,
+) -> Vec4 {
+    let level = at.y & 1;
+    let size = source.level_size(level);
+    let middle = Vec3::new(
+        at.x as f32 + 0.5,
+        at.y as f32 + 0.5,
+        (at.x % 3) as f32 + 0.5,
+    );
+    let place = middle / Vec3::new(size.x as f32, size.y as f32, size.z as f32);
+    let beside = source
+        .shifted::<1, -2, 3>()
+        .sample_level(sampler, place, level as f32);
+    let step = 0.840_896_4 / 16.0;
+    let (dx, dy) = (Vec3::new(step, 0.0, 0.0), Vec3::new(0.0, step, 0.0));
+    let whole = middle * Vec3::new(1.0 / 16.0, 1.0 / 8.0, 1.0 / 8.0);
+    let above = source
+        .shifted::<-8, 0, 7>()
+        .sample_gradient(sampler, whole, dx, dy);
+    Vec4::new(beside.x, beside.w, above.y, above.z)
+}

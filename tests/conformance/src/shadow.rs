@@ -2,8 +2,8 @@
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTextureCube,
-    DepthTextureCubeArray, kernel,
+    ComparisonSampler, DepthTexture2d, DepthTexture2dArray, DepthTexture2dMultisampled,
+    DepthTextureCube, DepthTextureCubeArray, NonFilteringSampler, kernel,
 };
 
 /// Which texels are behind the reference.
@@ -205,4 +205,109 @@ pub fn four_by_offsets(
         four.x + four.y * 2.0,
         four.z + four.w * 2.0,
     )
+}
+
+/// A search for blockers and a comparison in the same depths: how many of the four texels around a corner lie before a
+/// reference, their mean depth, and whether the nearest one is lit.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    parity(
+        ulp = 0,
+        absolute = 1e-30,
+        why = "drivers may take subnormal depths for 0 where they are drawn"
+    )
+)]
+pub fn blockers(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(32, 16)]
+    #[levels(2)]
+    depths: DepthTexture2d<'_>,
+    #[sampler]
+    #[address(repeat)]
+    nearest: NonFilteringSampler,
+    #[sampler]
+    #[filter(nearest)]
+    #[mip_filter(nearest)]
+    #[compare(less)]
+    #[address(repeat)]
+    compares: ComparisonSampler,
+) -> Vec4 {
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    let middle = Vec2::new((at.x as f32 + 0.5) / 32.0, (at.y as f32 + 0.5) / 16.0);
+    let four = depths.gather(nearest, corner);
+    let (mut count, mut sum) = (0.0, 0.0);
+    for depth in [four.x, four.y, four.z, four.w] {
+        if depth < 0.5 {
+            count += 1.0;
+            sum += depth;
+        }
+    }
+    Vec4::new(
+        count,
+        sum,
+        depths.sample_level(nearest, middle, at.y & 1),
+        depths.compare_level_zero(compares, middle, 0.25),
+    )
+}
+
+/// Depths as they are, of a layer and around a light: nearest texels and gathered ones.
+#[kernel(
+    fragment,
+    parity(
+        ulp = 0,
+        absolute = 1e-30,
+        why = "drivers may take subnormal depths for 0 where they are drawn"
+    )
+)]
+pub fn unlit(
+    #[frag_coord] at: Vec3,
+    #[texture]
+    #[size(32, 16)]
+    #[levels(3)]
+    layers: DepthTexture2dArray<'_>,
+    #[texture]
+    #[size(16, 16)]
+    around: DepthTextureCube<'_>,
+    #[texture]
+    #[size(16, 16)]
+    #[layers(2)]
+    lights: DepthTextureCubeArray<'_>,
+    #[sampler]
+    #[address(repeat)]
+    sampler: NonFilteringSampler,
+) -> Vec4 {
+    // Away from what lies between two levels, and between two texels of each.
+    let uv = Vec2::new((at.x * 1.681_792_8 + 0.1) / 32.0, (at.y + 0.15) / 16.0);
+    let to = Vec3::new((at.x % 16.0) * 0.1 - 0.77, (at.y % 16.0) * 0.1 - 0.77, 1.0);
+    let light = at.x as u32 & 1;
+    let four = around.gather(sampler, Vec3::new(1.0, 0.375, -0.125));
+    Vec4::new(
+        layers.sample(sampler, uv, 1),
+        layers.sample_level(sampler, uv, light, 2),
+        around.sample_level(sampler, to, 0) + four.x,
+        lights.sample_level(sampler, to, light, 0) + four.z,
+    )
+}
+
+/// Each sample of depths with several.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(r32float),
+    parity(
+        ulp = 0,
+        absolute = 1e-30,
+        why = "drivers may take subnormal depths for 0 where they are drawn"
+    )
+)]
+pub fn depth_of_sample(
+    #[index] at: UVec2,
+    #[texture] depths: DepthTexture2dMultisampled<'_>,
+) -> f32 {
+    let size = depths.size();
+    let place = UVec2::new(at.x % size.x, at.y % size.y);
+    depths.load(place, (at.x + at.y) % depths.samples())
 }

@@ -3,9 +3,9 @@
 use hankel_dsl::format::Rgba32Float;
 use hankel_dsl::glam::{IVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    Atomics, Centroid, Depth, Element, Flat, Linear, PerSample, SampleMask, StorageMut,
-    StorageTexture2d, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy, dpdy_coarse, dpdy_fine, fwidth,
-    fwidth_fine, kernel,
+    Atomics, Centroid, ClipDistances, Depth, Element, Flat, Linear, PerSample, SampleMask,
+    SecondSource, StorageMut, StorageTexture2d, discard, dpdx, dpdx_coarse, dpdx_fine, dpdy,
+    dpdy_coarse, dpdy_fine, fwidth, fwidth_fine, kernel,
 };
 
 /// Numbers of the vertex and of its instance, integers, and a float that is not interpolated.
@@ -258,4 +258,51 @@ pub fn sloped(
         beyond.add(0, 1);
     }
     colour
+}
+
+/// A vertex between two planes, in front of which a primitive is drawn, with a varying behind their distances.
+#[kernel(
+    vertex,
+    invariant,
+    parity(non_finite, why = "sums of absurd numbers overflow")
+)]
+pub fn clipped(
+    #[attribute] position: Vec4,
+    #[attribute] planes: Vec2,
+    #[attribute] uv: Vec2,
+) -> (Vec4, ClipDistances<2>, Vec2) {
+    (
+        position,
+        ClipDistances([position.x + planes.x, planes.y]),
+        uv,
+    )
+}
+
+/// A vertex in a box of six planes.
+#[kernel(vertex)]
+pub fn boxed(
+    #[attribute] position: Vec4,
+    #[attribute] least: Vec3,
+    #[attribute] most: Vec3,
+) -> (Vec4, ClipDistances<6>) {
+    (
+        position,
+        ClipDistances([least.x, least.y, least.z, most.x, most.y, most.z]),
+    )
+}
+
+/// Stained glass: its own light, and how much of what is behind it each channel lets through.
+#[kernel(fragment)]
+pub fn stained(
+    #[varying]
+    #[range(0.0..=1.0)]
+    light: Vec4,
+    #[varying]
+    #[range(0.0..=1.0)]
+    tint: Vec4,
+) -> (Vec4, SecondSource<Vec4>) {
+    (
+        light * 0.5,
+        SecondSource(Vec4::new(1.0 - tint.x, 1.0 - tint.y, tint.z, tint.w)),
+    )
 }

@@ -2,13 +2,14 @@
 
 use hankel_dsl::access::{Read, ReadWrite};
 use hankel_dsl::format::{
-    R32Float, R32Sint, R32Uint, Rg16Float, Rgba8Sint, Rgba8Snorm, Rgba16Float, Rgba32Float,
+    R32Float, R32Sint, R32Uint, Rg11B10Ufloat, Rg16Float, Rgb10A2Uint, Rgb10A2Unorm, Rgba8Sint,
+    Rgba8Snorm, Rgba16Float, Rgba32Float,
 };
 use hankel_dsl::glam::{IVec2, IVec4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use hankel_dsl::{
-    ComparisonSampler, DepthTextureCube, Element, Sampler, StorageTexture2d, StorageTexture2dArray,
-    StorageTexture3d, Texture2d, Texture2dArray, Texture2dMultisampled, Texture3d, TextureCube,
-    TextureCubeArray, array_element, kernel,
+    ComparisonSampler, DepthTextureCube, Element, NonFilteringSampler, Sampler, StorageTexture2d,
+    StorageTexture2dArray, StorageTexture3d, Texture2d, Texture2dArray, Texture2dMultisampled,
+    Texture3d, TextureCube, TextureCubeArray, array_element, kernel,
 };
 
 /// Texels of integers, as they are: of all levels, of layers, of a volume.
@@ -114,6 +115,64 @@ pub fn counted(#[index] at: UVec2) -> u32 {
 #[kernel(compute, threads(8, 8), texture(r8sint, r16sint, r32sint))]
 pub fn small(#[index] at: UVec2) -> i32 {
     at.x as i32 - at.y as i32
+}
+
+/// Numbers from 0 to 1 that share a word, the last of which has four steps.
+#[kernel(compute, threads(8, 8), texture(rgb10a2unorm))]
+pub fn shares_of_word(#[index] at: UVec2) -> Vec4 {
+    let share = |n: u32| (n & 1023) as f32 / 1023.0;
+    Vec4::new(
+        share(at.x * 31 + at.y),
+        share(at.y * 17),
+        share(1023 - at.x),
+        (at.x & 3) as f32 / 3.0,
+    )
+}
+
+/// Integers that share a word.
+#[kernel(compute, threads(8, 8), texture(rgb10a2uint))]
+pub fn counts_of_word(#[index] at: UVec2) -> UVec4 {
+    UVec4::new(
+        (at.x * 31 + at.y) & 1023,
+        (at.y * 17) & 1023,
+        1023 - (at.x & 1023),
+        at.x & 3,
+    )
+}
+
+/// Floats without a sign that share a word: powers of two, and steps of one between them.
+#[kernel(compute, threads(8, 8), texture(rg11b10ufloat))]
+pub fn floats_of_word(#[index] at: UVec2) -> Vec3 {
+    let power = (1_u32 << (at.y & 7)) as f32 / 16.0;
+    let step = |n: u32, digits: f32| power * (1.0 + n as f32 / digits);
+    Vec3::new(
+        step(at.x & 63, 64.0),
+        step((at.x * 5 + at.y) & 63, 64.0),
+        step(at.x & 31, 32.0),
+    )
+}
+
+/// Texels whose channels share a word, as they are read.
+#[kernel(
+    compute,
+    threads(8, 8),
+    texture(rgba32float),
+    parity(
+        ulp = 0,
+        absolute = 5e-7,
+        why = "a step of 1/1023 or 1/3 may be a product with that, which is rounded"
+    )
+)]
+pub fn read_words(
+    #[index] at: UVec2,
+    #[texture] floats: StorageTexture2d<'_, Rg11B10Ufloat, Read>,
+    #[texture] shares: StorageTexture2d<'_, Rgb10A2Unorm, Read>,
+    #[texture] counts: StorageTexture2d<'_, Rgb10A2Uint, Read>,
+) -> Vec4 {
+    let size = floats.size();
+    let place = UVec2::new(at.x % size.x, at.y % size.y);
+    let (a, b, c) = (floats.load(place), shares.load(place), counts.load(place));
+    Vec4::new(a.x + b.w, a.y, a.z + b.x, (c.x + c.y * 3 + c.w) as f32)
 }
 
 /// Storage textures of two channels and of signed numbers, written at any texel.
@@ -393,4 +452,54 @@ pub fn faces_lit(
 #[kernel(compute, threads(8, 8), texture(r32uint))]
 pub fn sample_count(#[index] at: UVec2, #[texture] source: Texture2dMultisampled<'_>) -> u32 {
     source.samples() * 100 + (at.x + at.y) % source.samples()
+}
+
+/// Channels of the four texels around a corner: of a texture, of a layer, on a cube's face and on one of several cubes.
+#[kernel(compute, threads(8, 8), texture(rgba32uint))]
+pub fn four_integers(
+    #[index] at: UVec2,
+    #[texture]
+    #[size(32, 16)]
+    flat: Texture2d<'_, u32>,
+    #[texture]
+    #[size(32, 16)]
+    #[layers(2)]
+    layers: Texture2dArray<'_, i32>,
+    #[texture]
+    #[size(16, 16)]
+    around: TextureCube<'_, u32>,
+    #[texture]
+    #[size(16, 16)]
+    #[layers(2)]
+    cubes: TextureCubeArray<'_, i32>,
+    #[sampler]
+    #[address(repeat)]
+    sampler: NonFilteringSampler,
+) -> UVec4 {
+    let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
+    let to = to_a_corner(at);
+    let a = flat.gather::<1>(sampler, corner);
+    let b = layers.gather::<2>(sampler, corner, at.x & 1);
+    let c = around.gather::<0>(sampler, to);
+    let d = cubes.gather::<3>(sampler, to, at.y & 1);
+    UVec4::new(
+        a.x ^ a.w,
+        (b.y ^ b.z) as u32,
+        c.x ^ c.z,
+        (d.w ^ d.x) as u32 ^ around.size().x,
+    )
+}
+
+/// Samples that are integers, of both signs.
+#[kernel(compute, threads(8, 8), texture(rgba32uint))]
+pub fn samples_of_integers(
+    #[index] at: UVec2,
+    #[texture] unsigned: Texture2dMultisampled<'_, u32>,
+    #[texture] signed: Texture2dMultisampled<'_, i32>,
+) -> UVec4 {
+    let size = unsigned.size();
+    let place = UVec2::new(at.x % size.x, at.y % size.y);
+    let sample = (at.x + at.y) % unsigned.samples();
+    let (a, b) = (unsigned.load(place, sample), signed.load(place, 3 - sample));
+    UVec4::new(a.x, b.x as u32, a.w, sample)
 }

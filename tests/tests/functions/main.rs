@@ -226,6 +226,7 @@ fn entry(function: &Function) -> KernelEntry {
         subgroups: Subgroups::Unused,
         compensated: None,
         image_pass: None,
+        invariant: false,
     };
     let (run, words, described) = (function.run, arguments(function).len(), function.clone());
     KernelEntry::new(kernel, move |call| {

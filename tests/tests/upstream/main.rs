@@ -348,6 +348,7 @@ fn description(texel: Option<TexelFormat>) -> Kernel {
         subgroups: describe::Subgroups::Unused,
         compensated: None,
         image_pass: None,
+        invariant: false,
     }
 }
 

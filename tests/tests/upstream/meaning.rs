@@ -156,13 +156,17 @@ fn naga_panics_at_a_fetch_from_an_array_of_textures() {
 }
 
 #[test]
-fn naga_refuses_masks_of_samples_and_numbers_of_layers() {
+fn naga_refuses_masks_of_samples_numbers_of_layers_and_gathered_depths() {
     for (case, workaround) in [
         (
             "naga-sample-mask",
             "codegen/src/translate/reading.rs, `with_number_masks`",
         ),
         ("naga-layers", "codegen/src/translate/cleanup/layers.rs"),
+        (
+            "naga-depth-gather",
+            "codegen/src/translate/cleanup/depths.rs",
+        ),
     ] {
         let options = naga::front::spv::Options::default();
         let module = naga::front::spv::parse_u8_slice(&assembled(case), &options)
@@ -186,6 +190,32 @@ fn naga_writes_masks_and_layers_that_glsl_does_not_have() {
     assert!(
         glsl.contains("imageSize(") && glsl.contains(", 0)"),
         "mended: drop `plain_queries` in codegen/src/translate/glsl.rs\n{glsl}"
+    );
+}
+
+#[test]
+fn naga_declares_one_clip_distance_in_hlsl() {
+    let hlsl = to_hlsl(&wgsl("naga-hlsl-clip-distances"));
+    assert!(
+        hlsl.lines()
+            .any(|line| line.trim().starts_with("float distances")
+                && line.ends_with(" : SV_ClipDistance;")
+                && !line.contains('[')),
+        "mended: drop `with_clip_distances` in codegen/src/translate/hlsl.rs\n{hlsl}"
+    );
+}
+
+#[test]
+fn naga_takes_textures_of_three_dimensions_for_flat_ones() {
+    let hlsl = to_hlsl(&wgsl("naga-hlsl-volume-offset"));
+    assert!(
+        hlsl.contains("int2(int3("),
+        "mended: drop `with_offsets_in_space` in codegen/src/translate/hlsl.rs\n{hlsl}"
+    );
+    let msl = to_msl(&wgsl("naga-msl-gradients"));
+    assert!(
+        msl.contains("gradient2d("),
+        "mended: drop `with_gradients` in codegen/src/translate/msl.rs\n{msl}"
     );
 }
 

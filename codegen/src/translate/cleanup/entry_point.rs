@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use naga::{
     Block, Expression, GlobalVariable, Handle, LocalVariable, Module, Span, Statement, Type,
+    TypeInner,
 };
 
 use super::shapes::drop_return;
@@ -165,6 +166,18 @@ fn outputs_to_result(
             continue;
         }
         let global = &module.global_variables[output];
+        if let TypeInner::Vector { size, .. } = module.types[global.ty].inner
+            && let Some(parts) = stores_of_parts(function, &pointers, size as usize)
+        {
+            components.push(function.expressions.append(
+                Expression::Compose {
+                    ty: global.ty,
+                    components: parts,
+                },
+                Span::UNDEFINED,
+            ));
+            continue;
+        }
         if global.init.is_some() {
             return None;
         }
@@ -237,6 +250,59 @@ fn single_store(
     };
     function.body.cull(place..=place);
     Some(value)
+}
+
+/// The values of the stores to the components of one vector, if each component has one, at the function's top level, and
+/// nothing reads them back; the stores are removed. A pair of numbers is stored so.
+fn stores_of_parts(
+    function: &mut naga::Function,
+    pointers: &HashSet<Handle<Expression>>,
+    size: usize,
+) -> Option<Vec<Handle<Expression>>> {
+    // Which component each pointer is for.
+    let mut parts = HashMap::new();
+    for (handle, expression) in function.expressions.iter() {
+        match expression {
+            Expression::AccessIndex { base, index } if pointers.contains(base) => {
+                parts.insert(handle, *index as usize);
+            }
+            Expression::Access { base, .. } if pointers.contains(base) => return None,
+            _ => {}
+        }
+    }
+    let is_read = |expression: &Expression| match expression {
+        Expression::Load { pointer } => pointers.contains(pointer) || parts.contains_key(pointer),
+        _ => false,
+    };
+    if function.expressions.iter().any(|(_, it)| is_read(it)) {
+        return None;
+    }
+    let mut stores = 0;
+    each_statement(&function.body, &mut |statement| {
+        if let Statement::Store { pointer, .. } = statement {
+            stores += usize::from(pointers.contains(pointer) || parts.contains_key(pointer));
+        }
+    });
+    let mut values = vec![None; size];
+    for statement in &function.body {
+        if let Statement::Store { pointer, value } = statement
+            && let Some(&part) = parts.get(pointer)
+        {
+            *values.get_mut(part)? = Some(*value);
+        }
+    }
+    let values: Option<Vec<_>> = values.into_iter().collect();
+    let values = values.filter(|_| stores == size)?;
+    let mut at = 0;
+    while at < function.body.len() {
+        match &function.body[at] {
+            Statement::Store { pointer, .. } if parts.contains_key(pointer) => {
+                function.body.cull(at..=at);
+            }
+            _ => at += 1,
+        }
+    }
+    Some(values)
 }
 
 fn returns(block: &Block) -> bool {

@@ -17,6 +17,7 @@
 //! - [`name_bit_counts`] names counts of bits, where a variable's precision must widen them;
 //! - [`restore_sampling`] says again where varyings are evaluated;
 //! - [`restore_layers`] asks for the number of layers of a texture where SPIR-V does;
+//! - [`restore_depths`] takes depths that are read as they are for what they are;
 //! - [`name_roundings`] names every result of arithmetic, where that must be computed as written.
 //!
 //! Each declines where it does not apply, and the validator has the last word: it runs after them,
@@ -24,6 +25,7 @@
 
 mod bits;
 mod blocks;
+mod depths;
 mod entry_point;
 mod layers;
 mod locals;
@@ -38,6 +40,7 @@ mod walk;
 
 pub use bits::{convert_wide_signs, has_bit_counts, has_functions_of_bits, name_bit_counts};
 pub use blocks::unwrap_blocks;
+pub use depths::restore_depths;
 pub use entry_point::fold_entry_point;
 pub use layers::restore_layers;
 pub use locals::{drop_dead_locals, drop_unused_locals};

@@ -33,6 +33,8 @@ fn wanted_features() -> wgpu::Features {
         | wgpu::Features::SUBGROUP
         | wgpu::Features::IMMEDIATES
         | wgpu::Features::PRIMITIVE_INDEX
+        | wgpu::Features::CLIP_DISTANCES
+        | wgpu::Features::DUAL_SOURCE_BLENDING
         | wgpu::Features::FLOAT32_FILTERABLE
         | wgpu::Features::FLOAT32_BLENDABLE
         | wgpu::Features::TEXTURE_FORMAT_16BIT_NORM

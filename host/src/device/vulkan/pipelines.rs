@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hankel_dsl::native::describe::{
-    BuiltIn, Channels, Kernel, Output, Param, Precision, Role, Rounding, Scalar, Stage,
-    TexelAccess, Type,
+    BuiltIn, Channels, Kernel, Output, Param, Precision, Role, Rounding, SamplerKind, Scalar,
+    Stage, TexelAccess, Type,
 };
 
 use super::super::error::{DeviceError, Result};
@@ -155,6 +155,19 @@ impl VulkanDevice {
                 .contains(wgpu::Features::PRIMITIVE_INDEX)
         {
             return Err(self.missing("numbers of primitives", kernel));
+        }
+        for output in &kernel.outputs {
+            let (feature, what) = match output {
+                Output::ClipDistances { .. } => (wgpu::Features::CLIP_DISTANCES, "clip distances"),
+                Output::SecondSource { .. } => (
+                    wgpu::Features::DUAL_SOURCE_BLENDING,
+                    "a second source of blending",
+                ),
+                _ => continue,
+            };
+            if !self.device.features().contains(feature) {
+                return Err(self.missing(what, kernel));
+            }
         }
         let constants = slots::constants(kernel, program.constants)?;
         let numbered: Vec<(u32, u32)> = kernel
@@ -531,6 +544,7 @@ impl VulkanDevice {
                     return Err(self.missing(&feature, kernel));
                 }
                 let view_dimension = match texture.shape.dimensions {
+                    1 => wgpu::TextureViewDimension::D1,
                     3 => wgpu::TextureViewDimension::D3,
                     _ if array => wgpu::TextureViewDimension::D2Array,
                     _ => wgpu::TextureViewDimension::D2,
@@ -550,16 +564,19 @@ impl VulkanDevice {
                 };
                 (ty, Resource::View(view))
             }
-            Use::Sampler { .. } => {
+            Use::Sampler(kind) => {
                 let Bind::Sampler(sampler) = bind else {
                     return Err(refuse("it must be a sampler"));
                 };
-                let ty = if sampler.compare.is_some() {
-                    wgpu::SamplerBindingType::Comparison
-                } else if sampler.is_filtering() {
-                    wgpu::SamplerBindingType::Filtering
-                } else {
-                    wgpu::SamplerBindingType::NonFiltering
+                let ty = match kind {
+                    SamplerKind::Comparison => wgpu::SamplerBindingType::Comparison,
+                    SamplerKind::Filtering if sampler.is_filtering() => {
+                        wgpu::SamplerBindingType::Filtering
+                    }
+                    // A texture that the device cannot filter is read by such a sampler, too.
+                    SamplerKind::Filtering | SamplerKind::NonFiltering => {
+                        wgpu::SamplerBindingType::NonFiltering
+                    }
                 };
                 (
                     wgpu::BindingType::Sampler(ty),
@@ -1060,6 +1077,22 @@ impl VulkanDevice {
                 )));
             }
         }
+        let second = fragment
+            .outputs
+            .iter()
+            .any(|it| matches!(it, Output::SecondSource { .. }));
+        if let Some(blend) = pass
+            .colours
+            .iter()
+            .map(|it| it.blend)
+            .find(|it| it.takes_second() && !second)
+        {
+            return Err(bad(format!(
+                "it blends with a second source (`{}`), which kernel `{}` does not return",
+                blend.name(),
+                fragment.name
+            )));
+        }
         if targets != pass.colours.len() {
             return Err(bad(format!(
                 "it has {} colour targets, but kernel `{}` writes {targets}",
@@ -1215,6 +1248,8 @@ fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
         Blend::Additive => alike(BlendFactor::One, BlendFactor::One, BlendOperation::Add),
         Blend::Multiplicative => alike(BlendFactor::Dst, BlendFactor::Zero, BlendOperation::Add),
         Blend::Least => alike(BlendFactor::One, BlendFactor::One, BlendOperation::Min),
+        Blend::Dual => alike(BlendFactor::One, BlendFactor::Src1, BlendOperation::Add),
+        Blend::Second => alike(BlendFactor::Zero, BlendFactor::Src1, BlendOperation::Add),
     }
 }
 

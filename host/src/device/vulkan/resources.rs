@@ -68,6 +68,9 @@ pub fn format(format: Format) -> wgpu::TextureFormat {
         ($texel:expr; $($name:ident)*) => {
             match $texel {
                 $(TexelFormat::$name => wgpu::TextureFormat::$name,)*
+                TexelFormat::Rgb10A2Unorm => wgpu::TextureFormat::Rgb10a2Unorm,
+                TexelFormat::Rgb10A2Uint => wgpu::TextureFormat::Rgb10a2Uint,
+                TexelFormat::Rg11B10Ufloat => wgpu::TextureFormat::Rg11b10Ufloat,
             }
         };
     }

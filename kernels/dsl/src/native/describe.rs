@@ -51,6 +51,9 @@ pub struct Kernel {
     /// Of an image pass with two forms: what its other form is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image_pass: Option<ImagePass>,
+    /// Another vertex kernel that computes the position from the same numbers in the same way gives the same bits.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub invariant: bool,
 }
 
 /// A text of a description. A call, not inlined: the built-in kernels have thousands of them.
@@ -425,9 +428,8 @@ pub enum Role {
     Sampler {
         /// Number in set 0.
         binding: u32,
-        /// It compares depths with a reference.
-        #[serde(default, skip_serializing_if = "core::ops::Not::not")]
-        comparison: bool,
+        /// What it does.
+        sampler: SamplerKind,
     },
     /// A specialisation constant (`u32`).
     Constant {
@@ -535,10 +537,51 @@ impl Interpolation {
     }
 }
 
-/// How a storage texture is seen, in WebGPU's words: `2d`, `2d-array`, `3d`.
+/// What a sampler does, in WebGPU's words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SamplerKind {
+    /// It may filter.
+    Filtering,
+    /// It takes the nearest texel of the nearest level: what depths that are not compared and integers are sampled with.
+    NonFiltering,
+    /// It compares depths with a reference.
+    Comparison,
+}
+
+impl SamplerKind {
+    /// Whether it compares.
+    #[must_use]
+    pub const fn is_comparison(self) -> bool {
+        matches!(self, Self::Comparison)
+    }
+
+    /// Whether a sampler is one of these.
+    #[must_use]
+    pub fn fits(self, sampler: &super::Sampler) -> bool {
+        match self {
+            Self::Filtering => sampler.compare.is_none(),
+            Self::NonFiltering => sampler.compare.is_none() && !sampler.is_filtering(),
+            Self::Comparison => sampler.compare.is_some(),
+        }
+    }
+
+    /// What must be given, for a message.
+    #[must_use]
+    pub const fn wanted(self) -> &'static str {
+        match self {
+            Self::Filtering => "a sampler that does not compare",
+            Self::NonFiltering => "a sampler that neither filters nor compares",
+            Self::Comparison => "a sampler that compares",
+        }
+    }
+}
+
+/// How a storage texture is seen, in WebGPU's words: `1d`, `2d`, `2d-array`, `3d`.
 #[must_use]
 pub const fn storage_view(dimensions: u32, array: bool) -> &'static str {
     match (dimensions, array) {
+        (1, _) => "1d",
         (3, _) => "3d",
         (_, true) => "2d-array",
         (_, false) => "2d",
@@ -624,180 +667,179 @@ pub enum BuiltIn {
     PrimitiveIndex,
 }
 
-/// Shape of a texture that is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TextureKind {
+/// What the texels of a texture that is read hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Holds {
+    Floats,
+    Unsigned,
+    Signed,
+    Depths,
+}
+
+/// How a texture is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum View {
+    D1,
+    D2,
+    D2Array,
+    D3,
+    Cube,
+    CubeArray,
+}
+
+/// How many samples a texel has.
+#[derive(Clone, Copy)]
+enum Samples {
+    One,
+    Several,
+}
+
+/// Declares [`TextureKind`]: of each its type in Rust, how it is seen, what it holds, and how many samples a texel has.
+macro_rules! texture_kinds {
+    ($($(#[doc = $doc:literal])* $kind:ident $name:literal $view:ident $holds:ident $samples:ident;)*) => {
+        /// Shape of a texture that is read.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum TextureKind { $($(#[doc = $doc])* $kind,)* }
+
+        impl TextureKind {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$kind),*];
+
+            /// The type in Rust, without the lifetime.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$kind => $name,)* }
+            }
+
+            const fn seen(self) -> View {
+                match self { $(Self::$kind => View::$view,)* }
+            }
+
+            const fn holds(self) -> Holds {
+                match self { $(Self::$kind => Holds::$holds,)* }
+            }
+
+            /// Whether its texels have several samples.
+            #[must_use]
+            pub const fn is_multisampled(self) -> bool {
+                matches!(match self { $(Self::$kind => Samples::$samples,)* }, Samples::Several)
+            }
+        }
+    };
+}
+
+texture_kinds! {
     /// One dimension.
-    Texture1d,
+    Texture1d "Texture1d" D1 Floats One;
     /// Two dimensions, filterable.
-    Texture2d,
+    Texture2d "Texture2d" D2 Floats One;
     /// Layers of two dimensions.
-    Texture2dArray,
+    Texture2dArray "Texture2dArray" D2Array Floats One;
     /// Two dimensions with several samples in each texel; read sample by sample.
-    Texture2dMultisampled,
+    Texture2dMultisampled "Texture2dMultisampled" D2 Floats Several;
     /// Three dimensions, filterable.
-    Texture3d,
+    Texture3d "Texture3d" D3 Floats One;
     /// The six faces of a cube, filterable.
-    TextureCube,
+    TextureCube "TextureCube" Cube Floats One;
     /// Cubes in an array.
-    TextureCubeArray,
+    TextureCubeArray "TextureCubeArray" CubeArray Floats One;
     /// Depths in two dimensions, which a sampler compares with a reference.
-    DepthTexture2d,
+    DepthTexture2d "DepthTexture2d" D2 Depths One;
     /// Layers of such depths.
-    DepthTexture2dArray,
+    DepthTexture2dArray "DepthTexture2dArray" D2Array Depths One;
+    /// Depths with several samples in each texel; read sample by sample.
+    DepthTexture2dMultisampled "DepthTexture2dMultisampled" D2 Depths Several;
     /// Such depths on the faces of a cube.
-    DepthTextureCube,
+    DepthTextureCube "DepthTextureCube" Cube Depths One;
     /// Such cubes in an array.
-    DepthTextureCubeArray,
+    DepthTextureCubeArray "DepthTextureCubeArray" CubeArray Depths One;
+    /// One dimension of unsigned integers.
+    UintTexture1d "Texture1d<u32>" D1 Unsigned One;
     /// Two dimensions of unsigned integers, not filtered.
-    UintTexture2d,
+    UintTexture2d "Texture2d<u32>" D2 Unsigned One;
     /// Layers of two dimensions of unsigned integers.
-    UintTexture2dArray,
+    UintTexture2dArray "Texture2dArray<u32>" D2Array Unsigned One;
+    /// Unsigned integers with several samples in each texel.
+    UintTexture2dMultisampled "Texture2dMultisampled<u32>" D2 Unsigned Several;
     /// Three dimensions of unsigned integers.
-    UintTexture3d,
+    UintTexture3d "Texture3d<u32>" D3 Unsigned One;
+    /// Unsigned integers on the faces of a cube, which are gathered.
+    UintTextureCube "TextureCube<u32>" Cube Unsigned One;
+    /// Such cubes in an array.
+    UintTextureCubeArray "TextureCubeArray<u32>" CubeArray Unsigned One;
+    /// One dimension of signed integers.
+    SintTexture1d "Texture1d<i32>" D1 Signed One;
     /// Two dimensions of signed integers, not filtered.
-    SintTexture2d,
+    SintTexture2d "Texture2d<i32>" D2 Signed One;
     /// Layers of two dimensions of signed integers.
-    SintTexture2dArray,
+    SintTexture2dArray "Texture2dArray<i32>" D2Array Signed One;
+    /// Signed integers with several samples in each texel.
+    SintTexture2dMultisampled "Texture2dMultisampled<i32>" D2 Signed Several;
     /// Three dimensions of signed integers.
-    SintTexture3d,
+    SintTexture3d "Texture3d<i32>" D3 Signed One;
+    /// Signed integers on the faces of a cube, which are gathered.
+    SintTextureCube "TextureCube<i32>" Cube Signed One;
+    /// Such cubes in an array.
+    SintTextureCubeArray "TextureCubeArray<i32>" CubeArray Signed One;
 }
 
 impl TextureKind {
-    /// All of them.
-    pub const ALL: [Self; 17] = [
-        Self::Texture1d,
-        Self::Texture2d,
-        Self::Texture2dArray,
-        Self::Texture2dMultisampled,
-        Self::Texture3d,
-        Self::TextureCube,
-        Self::TextureCubeArray,
-        Self::DepthTexture2d,
-        Self::DepthTexture2dArray,
-        Self::DepthTextureCube,
-        Self::DepthTextureCubeArray,
-        Self::UintTexture2d,
-        Self::UintTexture2dArray,
-        Self::UintTexture3d,
-        Self::SintTexture2d,
-        Self::SintTexture2dArray,
-        Self::SintTexture3d,
-    ];
-
-    /// The type in Rust, without the lifetime.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Texture1d => "Texture1d",
-            Self::Texture2d => "Texture2d",
-            Self::Texture2dArray => "Texture2dArray",
-            Self::Texture2dMultisampled => "Texture2dMultisampled",
-            Self::Texture3d => "Texture3d",
-            Self::TextureCube => "TextureCube",
-            Self::TextureCubeArray => "TextureCubeArray",
-            Self::DepthTexture2d => "DepthTexture2d",
-            Self::DepthTexture2dArray => "DepthTexture2dArray",
-            Self::DepthTextureCube => "DepthTextureCube",
-            Self::DepthTextureCubeArray => "DepthTextureCubeArray",
-            Self::UintTexture2d => "Texture2d<u32>",
-            Self::UintTexture2dArray => "Texture2dArray<u32>",
-            Self::UintTexture3d => "Texture3d<u32>",
-            Self::SintTexture2d => "Texture2d<i32>",
-            Self::SintTexture2dArray => "Texture2dArray<i32>",
-            Self::SintTexture3d => "Texture3d<i32>",
-        }
-    }
-
     /// How it is seen, in WebGPU's words: `1d`, `2d`, `2d-array`, `3d`, `cube`, `cube-array`.
     #[must_use]
     pub const fn view(self) -> &'static str {
-        match self {
-            Self::Texture1d => "1d",
-            Self::Texture2d
-            | Self::Texture2dMultisampled
-            | Self::DepthTexture2d
-            | Self::UintTexture2d
-            | Self::SintTexture2d => "2d",
-            Self::Texture2dArray
-            | Self::DepthTexture2dArray
-            | Self::UintTexture2dArray
-            | Self::SintTexture2dArray => "2d-array",
-            Self::Texture3d | Self::UintTexture3d | Self::SintTexture3d => "3d",
-            Self::TextureCube | Self::DepthTextureCube => "cube",
-            Self::TextureCubeArray | Self::DepthTextureCubeArray => "cube-array",
+        match self.seen() {
+            View::D1 => "1d",
+            View::D2 => "2d",
+            View::D2Array => "2d-array",
+            View::D3 => "3d",
+            View::Cube => "cube",
+            View::CubeArray => "cube-array",
         }
     }
 
     /// Dimensions of a texel's place within a layer: 1, 2 or 3.
     #[must_use]
     pub const fn dimensions(self) -> u32 {
-        match self {
-            Self::Texture1d => 1,
-            Self::Texture3d | Self::UintTexture3d | Self::SintTexture3d => 3,
-            _ => 2,
+        match self.seen() {
+            View::D1 => 1,
+            View::D3 => 3,
+            View::D2 | View::D2Array | View::Cube | View::CubeArray => 2,
         }
     }
 
     /// Whether it has any number of layers or cubes.
     #[must_use]
     pub const fn is_array(self) -> bool {
-        matches!(
-            self,
-            Self::Texture2dArray
-                | Self::TextureCubeArray
-                | Self::DepthTexture2dArray
-                | Self::DepthTextureCubeArray
-                | Self::UintTexture2dArray
-                | Self::SintTexture2dArray
-        )
+        matches!(self.seen(), View::D2Array | View::CubeArray)
     }
 
     /// What its channels are as a kernel sees them: floats, or integers of one sign.
     #[must_use]
     pub const fn channels(self) -> Channels {
-        match self {
-            Self::UintTexture2d | Self::UintTexture2dArray | Self::UintTexture3d => Channels::Uint,
-            Self::SintTexture2d | Self::SintTexture2dArray | Self::SintTexture3d => Channels::Sint,
-            _ => Channels::Float,
+        match self.holds() {
+            Holds::Floats | Holds::Depths => Channels::Float,
+            Holds::Unsigned => Channels::Uint,
+            Holds::Signed => Channels::Sint,
         }
     }
 
     /// Whether its layers are faces of cubes.
     #[must_use]
     pub const fn is_cube(self) -> bool {
-        matches!(
-            self,
-            Self::TextureCube
-                | Self::TextureCubeArray
-                | Self::DepthTextureCube
-                | Self::DepthTextureCubeArray
-        )
+        matches!(self.seen(), View::Cube | View::CubeArray)
     }
 
     /// Whether it holds depths.
     #[must_use]
     pub const fn is_depth(self) -> bool {
-        matches!(
-            self,
-            Self::DepthTexture2d
-                | Self::DepthTexture2dArray
-                | Self::DepthTextureCube
-                | Self::DepthTextureCubeArray
-        )
-    }
-
-    /// Whether its texels have several samples.
-    #[must_use]
-    pub const fn is_multisampled(self) -> bool {
-        matches!(self, Self::Texture2dMultisampled)
+        matches!(self.holds(), Holds::Depths)
     }
 
     /// Whether it can have several mip levels.
     #[must_use]
     pub const fn has_levels(self) -> bool {
-        !matches!(self, Self::Texture1d | Self::Texture2dMultisampled)
+        !self.is_multisampled() && self.dimensions() != 1
     }
 
     /// Why a texture of so many layers does not fit, if it does not.
@@ -857,6 +899,16 @@ pub enum Output {
     Depth,
     /// Which samples of the pixel are written (fragment stage).
     SampleMask,
+    /// Distances from planes at which the primitive is clipped (vertex stage).
+    ClipDistances {
+        /// Their type: an array of 1 to 8 `f32`.
+        ty: Type,
+    },
+    /// The second source of blending into the target at location 0 (fragment stage).
+    SecondSource {
+        /// Its type, that of the target.
+        ty: Type,
+    },
     /// A colour attachment (fragment stage).
     Target {
         /// Output location.

@@ -14,7 +14,7 @@ use glam::{IVec4, UVec2, UVec3, UVec4, Vec4};
 use rayon::prelude::*;
 
 use super::call::{Arg, Call, CallError, Mode, Sampler, TextureMut, TextureRef, texture_bytes};
-use super::describe::{self, TexelAccess, TexelFormat, TextureKind};
+use super::describe::{self, SamplerKind, TexelAccess, TexelFormat, TextureKind};
 use super::fragment;
 use super::lanes::{self, Scalar, Work, on_lanes};
 use super::layout::Lane;
@@ -325,16 +325,12 @@ impl<'a> Args<'a> {
     }
 
     /// A sampler.
-    pub fn sampler(&mut self, name: &'static str, comparison: bool) -> Result<Sampler, CallError> {
+    pub fn sampler(&mut self, name: &'static str, kind: SamplerKind) -> Result<Sampler, CallError> {
         match self.args.next() {
-            Some(Arg::Sampler(s)) if s.compare.is_some() == comparison => Ok(s),
+            Some(Arg::Sampler(s)) if kind.fits(&s) => Ok(s),
             _ => Err(CallError::Kind {
                 name,
-                expected: if comparison {
-                    "a sampler that compares"
-                } else {
-                    "a sampler that does not compare"
-                },
+                expected: kind.wanted(),
             }),
         }
     }

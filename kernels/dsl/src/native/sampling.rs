@@ -67,9 +67,16 @@ pub fn load(t: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32, sample: u3
 
 /// The same of a texture of integers; signed ones come as their bits.
 #[inline]
-pub fn load_integer(t: &TextureRef<'_>, at: [u32; 3], layer: u32, level: u32) -> UVec4 {
+pub fn load_integer(
+    t: &TextureRef<'_>,
+    at: [u32; 3],
+    layer: u32,
+    level: u32,
+    sample: u32,
+) -> UVec4 {
     let level = Level::of(t, level, layer);
-    t.format.load_integer(level.bytes(level.nearest(at), 0))
+    t.format
+        .load_integer(level.bytes(level.nearest(at), sample))
 }
 
 /// The coordinate of a texel that may lie beyond the edge ("Wrapping Operation").
@@ -99,8 +106,8 @@ pub enum Place {
         dimensions: usize,
         /// The layer.
         layer: u32,
-        /// Texels further along x and y, of the level that is read.
-        shift: [i32; 2],
+        /// Texels further along each axis, of the level that is read.
+        shift: [i32; 3],
     },
     /// In a direction in the cube that begins at a layer.
     Cube {
@@ -175,7 +182,7 @@ impl<'a> Taps<'a> {
             Place::Cube { direction, first } => {
                 let (face, [s, t]) = face(direction);
                 let at = [s * 0.5 + 0.5, t * 0.5 + 0.5, 0.0];
-                (at, 2, Some((level, first, face)), first + face, [0; 2])
+                (at, 2, Some((level, first, face)), first + face, [0; 3])
             }
         };
         let own = Level::of(t, level, layer);
@@ -190,7 +197,7 @@ impl<'a> Taps<'a> {
                 n => x + f32::from(n) / 1024.0,
             };
             let floor = x.floor();
-            base[d] = (floor as i64).saturating_add(shift.get(d).copied().unwrap_or(0).into());
+            base[d] = (floor as i64).saturating_add(shift[d].into());
             weight[d] = if linear { x - floor } else { 0.0 };
         }
         let mut address = sampler.address;
@@ -212,23 +219,28 @@ impl<'a> Taps<'a> {
 
     /// A texel; none beyond a cube's corner.
     fn tap(&self, step: [i64; 3]) -> Option<Vec4> {
+        self.place(step).map(|(level, at)| level.texel(at, 0))
+    }
+
+    /// Where a texel lies; nowhere beyond a cube's corner.
+    fn place(&self, step: [i64; 3]) -> Option<(Level<'a>, [u32; 3])> {
         let at = [0, 1, 2].map(|d| self.base[d] + step[d]);
         let Some((level, first, face_here)) = self.cube else {
             let at = [0, 1, 2].map(|d| wrap(at[d], self.own.size[d], self.address[d]));
-            return Some(self.own.texel(at, 0));
+            return Some((self.own, at));
         };
         let n = i64::from(self.own.size[0]);
         let beyond = |i: i64| i < 0 || i >= n;
         match (beyond(at[0]), beyond(at[1])) {
             (true, true) => None,
-            (false, false) => Some(self.own.texel([at[0] as u32, at[1] as u32, 0], 0)),
+            (false, false) => Some((self.own, [at[0] as u32, at[1] as u32, 0])),
             // The texel across the edge lies in the direction of its middle on this face's plane.
             _ => {
                 let middle = |i: i64| (2 * i + 1) as f32 / n as f32 - 1.0;
                 let (face, on) = face(direction(face_here, [middle(at[0]), middle(at[1])]));
                 let index = |x: f32| (((x * 0.5 + 0.5) * n as f32) as i64).clamp(0, n - 1) as u32;
                 let level = Level::of(self.own.texture, level, first + face);
-                Some(level.texel([index(on[0]), index(on[1]), 0], 0))
+                Some((level, [index(on[0]), index(on[1]), 0]))
             }
         }
     }
@@ -350,6 +362,24 @@ pub fn gather(t: &TextureRef<'_>, sampler: &Sampler, place: Place, channel: usiz
     gathered(t, sampler, place, &|texel| Vec4::splat(texel[channel]))
 }
 
+/// The same of a texture of integers; signed ones come as their bits. Beyond a cube's corner, where there is no texel, it
+/// is one of the other three: devices differ.
+pub fn gather_integers(
+    t: &TextureRef<'_>,
+    sampler: &Sampler,
+    place: Place,
+    channel: usize,
+) -> UVec4 {
+    let taps = Taps::new(t, sampler, place, 0, true);
+    let texel = |step: [i64; 3]| {
+        let (level, at) = taps.place(step)?;
+        Some(t.format.load_integer(level.bytes(at, 0))[channel])
+    };
+    let four = [[0, 1], [1, 1], [1, 0], [0, 0]].map(|[x, y]| texel([x, y, 0]));
+    let inside = four.iter().flatten().next().copied().unwrap_or(0);
+    UVec4::from_array(four.map(|it| it.unwrap_or(inside)))
+}
+
 /// The same with a comparison of each.
 pub fn gather_compare(t: &TextureRef<'_>, sampler: &Sampler, place: Place, reference: f32) -> Vec4 {
     let of = |texel: Vec4| Vec4::splat(holds(sampler, reference, texel.x));
@@ -420,7 +450,7 @@ mod tests {
             at: Vec3::new(x, y, 0.0),
             dimensions: 2,
             layer: 0,
-            shift: [0; 2],
+            shift: [0; 3],
         }
     }
 

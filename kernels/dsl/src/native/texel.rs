@@ -3,7 +3,7 @@
 
 use glam::{UVec4, Vec4};
 
-use super::channel::{self, Channel};
+use super::channel::{self, Stored, Texels};
 use super::describe::{Channels, TexelFormat};
 
 /// A texel; channels that the format lacks are 0, alpha 1.
@@ -14,12 +14,6 @@ where
 {
     let absent = [zero, zero, zero, one];
     std::array::from_fn(|i| if i < channels { channel(i) } else { absent[i] })
-}
-
-/// The bytes of channel `i`.
-#[inline(always)]
-fn bytes_of<C: Channel>(bytes: &[u8], i: usize) -> &[u8] {
-    &bytes[i * C::BYTES..(i + 1) * C::BYTES]
 }
 
 macro_rules! formats {
@@ -36,11 +30,19 @@ macro_rules! formats {
                 }
             }
 
-            /// Bytes of one channel.
+            /// Bytes of one channel; of channels that share a word, of all of them.
             #[must_use]
             pub const fn channel_bytes(self) -> usize {
                 match self {
-                    $(Self::$name => channel::$channel::BYTES,)*
+                    $(Self::$name => <channel::$channel as Texels>::BYTES,)*
+                }
+            }
+
+            /// Bits of each channel.
+            #[must_use]
+            pub const fn channel_bits(self) -> [u32; 4] {
+                match self {
+                    $(Self::$name => <channel::$channel as Texels>::BITS,)*
                 }
             }
 
@@ -48,7 +50,7 @@ macro_rules! formats {
             #[must_use]
             pub const fn stored(self) -> channel::Stored {
                 match self {
-                    $(Self::$name => channel::$channel::STORED,)*
+                    $(Self::$name => <channel::$channel as Texels>::STORED,)*
                 }
             }
 
@@ -56,7 +58,7 @@ macro_rules! formats {
             #[must_use]
             pub const fn numbers(self) -> Channels {
                 match self {
-                    $(Self::$name => channel::$channel::NUMBERS,)*
+                    $(Self::$name => <channel::$channel as Texels>::NUMBERS,)*
                 }
             }
 
@@ -75,7 +77,7 @@ macro_rules! formats {
             pub fn load(self, bytes: &[u8]) -> Vec4 {
                 match self {
                     $(Self::$name => Vec4::from_array(all($channels, 0.0, 1.0, |i| {
-                        channel::$channel::load(bytes_of::<channel::$channel>(bytes, i))
+                        <channel::$channel as Texels>::load(bytes, i)
                     })),)*
                 }
             }
@@ -87,7 +89,7 @@ macro_rules! formats {
             pub fn load_integer(self, bytes: &[u8]) -> UVec4 {
                 match self {
                     $(Self::$name => UVec4::from_array(all($channels, 0, 1, |i| {
-                        channel::$channel::load_integer(bytes_of::<channel::$channel>(bytes, i))
+                        <channel::$channel as Texels>::load_integer(bytes, i)
                     })),)*
                 }
             }
@@ -97,12 +99,16 @@ macro_rules! formats {
             #[inline]
             pub fn store(self, bytes: &mut [u8], v: Vec4) {
                 match self {
-                    $(Self::$name => {
-                        let channels = bytes.chunks_exact_mut(channel::$channel::BYTES).take($channels);
-                        for (bytes, x) in channels.zip(v.to_array()) {
-                            channel::$channel::store(x, bytes);
-                        }
-                    })*
+                    $(Self::$name => <channel::$channel as Texels>::store(bytes, $channels, v),)*
+                }
+            }
+
+            /// Writes one texel of an integer format, which must [hold](Self::holds) it; otherwise the lower
+            /// bits are kept. Signed numbers are given as their bits.
+            #[inline]
+            pub fn store_integer(self, bytes: &mut [u8], v: UVec4) {
+                match self {
+                    $(Self::$name => <channel::$channel as Texels>::store_integers(bytes, $channels, v),)*
                 }
             }
         }
@@ -115,7 +121,10 @@ impl TexelFormat {
     /// Bytes of one texel.
     #[must_use]
     pub const fn bytes(self) -> usize {
-        self.channels() * self.channel_bytes()
+        match self.stored() {
+            Stored::Packed => self.channel_bytes(),
+            _ => self.channels() * self.channel_bytes(),
+        }
     }
 
     /// Whether the channels are integers.
@@ -130,30 +139,15 @@ impl TexelFormat {
     #[inline]
     #[must_use]
     pub fn holds(self, v: UVec4) -> bool {
-        let bits = 8 * self.channel_bytes() as u32;
-        let fits = |x: u32| match self.numbers() {
+        let fits = |(x, bits): (u32, u32)| match self.numbers() {
             Channels::Float => true,
             Channels::Uint => bits == 32 || x >> bits == 0,
             Channels::Sint => {
                 bits == 32 || (-(1 << (bits - 1))..1 << (bits - 1)).contains(&(x as i32))
             }
         };
-        v.to_array()[..self.channels()].iter().all(|x| fits(*x))
-    }
-
-    /// Writes one texel of an integer format, which must [hold](Self::holds) it; otherwise the lower
-    /// bits are kept. Signed numbers are given as their bits.
-    #[inline]
-    pub fn store_integer(self, bytes: &mut [u8], v: UVec4) {
-        if self.is_integer() {
-            let size = self.channel_bytes();
-            let channels = bytes.chunks_exact_mut(size).take(self.channels());
-            for (bytes, x) in channels.zip(v.to_array()) {
-                bytes.copy_from_slice(&x.to_le_bytes()[..size]);
-            }
-        } else {
-            self.store(bytes, v.as_vec4());
-        }
+        let mut channels = v.to_array().into_iter().zip(self.channel_bits());
+        channels.by_ref().take(self.channels()).all(fits)
     }
 }
 
@@ -214,7 +208,8 @@ mod tests {
 
     #[test]
     fn integers_survive_a_round_trip_and_what_does_not_fit_is_known() {
-        for format in FORMATS.into_iter().filter(|f| f.is_integer()) {
+        let alike = |f: &TexelFormat| f.is_integer() && f.stored() != Stored::Packed;
+        for format in FORMATS.into_iter().filter(alike) {
             let bits = 8 * format.channel_bytes() as u32;
             let signed = format.numbers() == Channels::Sint;
             let (least, most) = if signed {

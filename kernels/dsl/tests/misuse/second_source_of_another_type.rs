@@ -1,0 +1,10 @@
+#![allow(unused_imports)]
+use hankel_dsl::{SecondSource, glam::*, kernel};
+
+/// Glass.
+#[kernel(fragment)]
+fn glass(#[varying] light: Vec4) -> (Vec4, SecondSource<f32>) {
+    (light, SecondSource(light.w))
+}
+
+fn main() {}
