@@ -547,7 +547,7 @@ impl Graph {
         let fragment = &self.kernels[kernel].kernel;
         let clips = |it: &Output| matches!(it, Output::ClipDistances { .. });
         if vertex.outputs.iter().any(clips) {
-            return Err(place.kernel(&format!(
+            return Err(place.kernel(format!(
                 "frames clip at the view alone, and vertex kernel `{}` returns clip distances",
                 vertex.name
             )));

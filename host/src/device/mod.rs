@@ -448,7 +448,7 @@ pub enum Blend {
     Multiplicative,
     /// The smaller one of `source` and `destination`, channel by channel.
     Least,
-    /// `source + second destination`, where `second` is the [second source](Output::SecondSource) of the fragment
+    /// `source + second destination`, where `second` is the [second source](hankel_dsl::SecondSource) of the fragment
     /// kernel: a colour, and what lets the light behind it through, for each channel.
     Dual,
     /// `second destination`: the same without the source.
