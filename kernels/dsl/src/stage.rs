@@ -50,9 +50,25 @@ pub struct SampleMask(pub u32);
 
 /// How far inside of up to 8 planes a vertex lies. What of a primitive lies outside of a plane, where the interpolated
 /// distance is below 0, is clipped. A vertex kernel returns it beside the position: `-> (Vec4, ClipDistances<2>)`.
-/// MSL and GLSL have it everywhere, WebGPU and GLSL ES where the manifest's `requires` can be met.
+/// WebGPU and GLSL ES have them where what the manifest `requires` is there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipDistances<const PLANES: usize>(pub [f32; PLANES]);
+
+impl<const PLANES: usize> ClipDistances<PLANES> {
+    /// All of them.
+    #[doc(hidden)]
+    #[inline(always)]
+    #[must_use]
+    pub const fn all(self) -> [f32; PLANES] {
+        const {
+            assert!(
+                PLANES >= 1 && PLANES <= 8,
+                "a vertex has 1 to 8 clip distances"
+            );
+        };
+        self.0
+    }
+}
 
 /// A second colour for the first target, which blending may take as a factor ("dual-source blending"): a transmittance of
 /// each channel, for example. A fragment kernel with one target returns it beside its colour and of the same type:

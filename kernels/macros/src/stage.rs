@@ -268,9 +268,8 @@ impl Returned {
         match self {
             Self::Varying { passed, .. } => passed.unwrap(value),
             Self::Position | Self::Target { .. } => quote!(#value),
-            Self::Depth | Self::SecondSource { .. } | Self::ClipDistances { .. } => {
-                quote!(#value.0)
-            }
+            Self::ClipDistances { .. } => quote!(#value.all()),
+            Self::Depth | Self::SecondSource { .. } => quote!(#value.0),
             Self::SampleMask => quote!([#value.0]),
         }
     }

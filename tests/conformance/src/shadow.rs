@@ -208,7 +208,7 @@ pub fn four_by_offsets(
 }
 
 /// A search for blockers and a comparison in the same depths: how many of the four texels around a corner lie before a
-/// reference, their mean depth, and whether the nearest one is lit.
+/// reference, the nearest of them, the depth of a level, and whether it is lit.
 #[kernel(
     compute,
     threads(8, 8),
@@ -238,16 +238,11 @@ pub fn blockers(
     let corner = Vec2::new(at.x as f32 / 32.0, at.y as f32 / 16.0);
     let middle = Vec2::new((at.x as f32 + 0.5) / 32.0, (at.y as f32 + 0.5) / 16.0);
     let four = depths.gather(nearest, corner);
-    let (mut count, mut sum) = (0.0, 0.0);
-    for depth in [four.x, four.y, four.z, four.w] {
-        if depth < 0.5 {
-            count += 1.0;
-            sum += depth;
-        }
-    }
+    let is_before = |depth: f32| if depth < 0.5 { 1.0 } else { 0.0 };
+    let least = |a: f32, b: f32| if a < b { a } else { b };
     Vec4::new(
-        count,
-        sum,
+        is_before(four.x) + is_before(four.y) + (is_before(four.z) + is_before(four.w)),
+        least(least(four.x, four.y), least(four.z, four.w)),
         depths.sample_level(nearest, middle, at.y & 1),
         depths.compare_level_zero(compares, middle, 0.25),
     )
