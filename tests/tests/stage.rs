@@ -348,3 +348,54 @@ fn what_a_language_does_not_sample_is_refused() {
         }
     }
 }
+
+#[test]
+fn what_stages_return_beside_places_and_colours_is_in_the_texts() {
+    let generated = Crate::conformance().generate();
+    for (kernel, extension, words) in [
+        (
+            "clipped",
+            ".wgsl",
+            &["enable clip_distances;", "@invariant"][..],
+        ),
+        (
+            "clipped",
+            ".hlsl",
+            &["precise float4 ", "float2 clip_distances"],
+        ),
+        (
+            "clipped",
+            ".metal",
+            &["[[position, invariant]]", "[[clip_distance]] [2]"],
+        ),
+        (
+            "clipped",
+            ".vert",
+            &["invariant gl_Position;", "float gl_ClipDistance[2];"],
+        ),
+        (
+            "boxed",
+            ".hlsl",
+            &["float4 clip_distances", "_more : SV_ClipDistance1"],
+        ),
+        ("stained", ".wgsl", &["@blend_src(0)", "@blend_src(1)"]),
+        ("stained", ".hlsl", &["SV_Target0", "SV_Target1"]),
+        ("stained", ".metal", &["[[color(0), index(1)]]"]),
+        ("stained", ".frag", &["layout(location = 0, index = 1)"]),
+    ] {
+        let text = text(&generated, kernel, extension);
+        for word in words {
+            assert!(text.contains(word), "no {word} in {text}");
+        }
+    }
+    let requires = |kernel: &str, language| {
+        let of_kernel = &generated.manifest.kernels[kernel].languages[&language];
+        of_kernel.requires.clone()
+    };
+    assert_eq!(requires("clipped", Wgsl), ["clip-distances"]);
+    assert_eq!(requires("clipped", Essl300), ["GL_EXT_clip_cull_distance"]);
+    assert_eq!(requires("stained", Wgsl), ["dual-source-blending"]);
+    let blockers = &generated.manifest.kernels["blockers"].bindings;
+    let nearest = blockers.iter().find(|it| it.name == "nearest");
+    assert_eq!(nearest.unwrap().kind, BindingKind::NonFilteringSampler);
+}
