@@ -595,7 +595,6 @@ fn blending(blend: Blend) -> Option<frame::Blend> {
         Blend::Additive => both(component("add", "one", "one")),
         Blend::Multiplicative => both(component("add", "zero", "src")),
         Blend::Least => both(component("min", "one", "one")),
-        Blend::Dual => both(component("add", "one", "src1")),
         Blend::Second => both(component("add", "zero", "src1")),
     })
 }

@@ -326,8 +326,8 @@ fn what_cannot_be_blended_is_refused() {
         Some(draw.single_depth([32; 2]).unwrap())
     };
     refused(
-        add(TexelFormat::Rgba16Unorm, Blend::Dual, &none),
-        &["pass `glass`", "`dual`", "second source"],
+        add(TexelFormat::Rgba16Unorm, Blend::Second, &none),
+        &["pass `glass`", "second source"],
     );
     refused(
         add(TexelFormat::Rgba16Unorm, Blend::Alpha, &single),

@@ -476,11 +476,10 @@ impl Graph {
                 target.format.name()
             )));
         }
-        if blend.takes_second() {
-            return Err(refuse(format!(
-                "frames blend one colour, and `{}` takes a second source",
-                blend.name()
-            )));
+        if blend == Blend::Second {
+            return Err(refuse(
+                "frames blend one colour, and this takes a second source".into(),
+            ));
         }
         let Some(before) = before else {
             return Ok(());

@@ -448,10 +448,7 @@ pub enum Blend {
     Multiplicative,
     /// The smaller one of `source` and `destination`, channel by channel.
     Least,
-    /// `source + second destination`, where `second` is the [second source](hankel_dsl::SecondSource) of the fragment
-    /// kernel: a colour, and what lets the light behind it through, for each channel.
-    Dual,
-    /// `second destination`: the same without the source.
+    /// `second destination`, where `second` is the [second source](hankel_dsl::SecondSource) of the fragment kernel.
     Second,
 }
 
@@ -465,15 +462,8 @@ impl Blend {
             Self::Additive => "additive",
             Self::Multiplicative => "multiplicative",
             Self::Least => "least",
-            Self::Dual => "dual",
             Self::Second => "second",
         }
-    }
-
-    /// Whether it takes a second source.
-    #[must_use]
-    pub const fn takes_second(self) -> bool {
-        matches!(self, Self::Dual | Self::Second)
     }
 
     /// What is there afterwards, before it is stored, of one source or two.
@@ -491,7 +481,6 @@ impl Blend {
             Self::Additive => source + destination,
             Self::Multiplicative => source * destination,
             Self::Least => source.min(destination),
-            Self::Dual => source + second * destination,
             Self::Second => second * destination,
         }
     }

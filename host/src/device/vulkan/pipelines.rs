@@ -1081,15 +1081,9 @@ impl VulkanDevice {
             .outputs
             .iter()
             .any(|it| matches!(it, Output::SecondSource { .. }));
-        if let Some(blend) = pass
-            .colours
-            .iter()
-            .map(|it| it.blend)
-            .find(|it| it.takes_second() && !second)
-        {
+        if !second && pass.colours.iter().any(|it| it.blend == Blend::Second) {
             return Err(bad(format!(
-                "it blends with a second source (`{}`), which kernel `{}` does not return",
-                blend.name(),
+                "it blends with a second source, which kernel `{}` does not return",
                 fragment.name
             )));
         }
@@ -1248,7 +1242,6 @@ fn blend_state(blend: Blend) -> Option<wgpu::BlendState> {
         Blend::Additive => alike(BlendFactor::One, BlendFactor::One, BlendOperation::Add),
         Blend::Multiplicative => alike(BlendFactor::Dst, BlendFactor::Zero, BlendOperation::Add),
         Blend::Least => alike(BlendFactor::One, BlendFactor::One, BlendOperation::Min),
-        Blend::Dual => alike(BlendFactor::One, BlendFactor::Src1, BlendOperation::Add),
         Blend::Second => alike(BlendFactor::Zero, BlendFactor::Src1, BlendOperation::Add),
     }
 }
