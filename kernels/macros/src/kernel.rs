@@ -370,15 +370,8 @@ impl BuiltIn {
     }
 }
 
-/// Types of textures that are read.
-const TEXTURES: [&str; 12] = [
-    "Texture1d",
-    "Texture2d",
-    "Texture2dArray",
-    "Texture2dMultisampled",
-    "Texture3d",
-    "TextureCube",
-    "TextureCubeArray",
+/// Types of textures that are read: of depths.
+const TEXTURES_OF_DEPTHS: [&str; 5] = [
     "DepthTexture2d",
     "DepthTexture2dArray",
     "DepthTexture2dMultisampled",
@@ -386,7 +379,7 @@ const TEXTURES: [&str; 12] = [
     "DepthTextureCubeArray",
 ];
 
-/// Those that may hold integers, `Texture2d<'_, u32>`.
+/// Those that may hold floats or integers, `Texture2d<'_, u32>`.
 const TEXTURES_OF: [&str; 7] = [
     "Texture1d",
     "Texture2d",
@@ -416,7 +409,7 @@ fn texture_kind(ty: &Type) -> Option<Ident> {
         },
         _ => return None,
     };
-    let known = TEXTURES.iter().any(|it| name == it);
+    let known = of_integers || TEXTURES_OF_DEPTHS.iter().any(|it| name == it);
     known.then(|| format_ident!("{before}{name}"))
 }
 
@@ -457,10 +450,12 @@ impl Role {
             }
             Self::Texture(kind) => {
                 let kind = kind.to_string();
-                let dimensions = match () {
-                    () if kind.ends_with("1d") => 1,
-                    () if kind.ends_with("3d") => 3,
-                    () => 2,
+                let dimensions = if kind.ends_with("1d") {
+                    1
+                } else if kind.ends_with("3d") {
+                    3
+                } else {
+                    2
                 };
                 Holder::Texture {
                     dimensions,
@@ -979,8 +974,9 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
                 Role::Texture(texture_kind(ty).unwrap_or_else(|| name.clone()))
             }
             _ => {
-                let names: Vec<_> = TEXTURES
+                let names: Vec<_> = TEXTURES_OF
                     .iter()
+                    .chain(&TEXTURES_OF_DEPTHS)
                     .map(|name| format!("`{name}<'_>`"))
                     .collect();
                 return Err(syn::Error::new(
