@@ -22,7 +22,7 @@ use crate::files::sha256;
 use crate::kept::Kept;
 use crate::messages::Messages;
 use crate::spirv::fingerprint::{self, Fingerprint};
-use crate::spirv::{self, divide};
+use crate::spirv::{self, divide, unlinked};
 
 /// Most processes that link at once: each reads the standard library's SPIR-V.
 const MOST_PROCESSES: usize = 8;
@@ -117,7 +117,7 @@ impl Unlinked<'_> {
         let rlink = std::fs::read(rlink_of(self.list)?).ok()?;
         let rlink = Rlink::of(&rlink, &folder, &name)?;
         let object = std::fs::read(&rlink.object).ok()?;
-        let words = spirv::words(&object, &name).ok()?;
+        let words = unlinked::lean(&spirv::words(&object, &name).ok()?);
         let module = spirv::load(&words, &name).ok()?;
         rlink.remove_others(&folder, &name);
         let kept = Kept::within(self.linked_dir.join(&name));
@@ -246,7 +246,8 @@ fn of_library(object: &[u8]) -> Option<String> {
     if object.len() > MOST_READ {
         return Some(sha256(object));
     }
-    let module = spirv::load(&spirv::words(object, "").ok()?, "").ok()?;
+    let words = unlinked::lean(&spirv::words(object, "").ok()?);
+    let module = spirv::load(&words, "").ok()?;
     Some(sha256(&fingerprint::library(&module)))
 }
 

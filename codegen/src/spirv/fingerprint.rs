@@ -1,15 +1,15 @@
 //! What an entry point is made of, as a hash: of the functions that it reaches, their types, constants, names and
-//! decorations, in a module that is not linked yet. Ids do not count, nor does what else the module has, nor the
-//! lines of the source.
+//! decorations, in a module that is not linked yet. Ids do not count, nor does what else the module has. Lines of the
+//! source would count, so they have to be gone: `unlinked.rs`.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{Function, Instruction, Module, Operand};
-use rspirv::spirv::{Decoration, Op, Word};
+use rspirv::spirv::{Decoration, Word};
 use sha2::{Digest, Sha256};
 
-use super::{id, op};
+use super::id;
 
 /// A SHA-256.
 pub type Hash = [u8; 32];
@@ -76,21 +76,12 @@ struct Fingerprints<'a> {
     functions: HashMap<Word, &'a Function>,
     /// Names and decorations.
     notes: HashMap<Word, Vec<&'a Instruction>>,
-    /// rust-gpu's own instructions.
-    custom: Option<Word>,
     known: HashMap<Word, Fingerprint>,
 }
 
 /// Stack for functions that call each other, and what has to be left of it.
 const STACK: usize = 16 << 20;
 const RED_ZONE: usize = 256 << 10;
-
-/// rust-gpu's own instructions, which its linker removes.
-const CUSTOM: &str = "Rust.rustc_codegen_spirv.";
-/// Those of them that say which line comes next, or that none is known.
-const LINES: [u32; 2] = [0, 1];
-/// How the decoration begins that says on which line something is declared.
-const DECLARED_ON_LINE: &str = "L";
 
 impl<'a> Fingerprints<'a> {
     fn of(module: &'a Module) -> Self {
@@ -101,22 +92,16 @@ impl<'a> Fingerprints<'a> {
         let functions = module.functions.iter();
         let mut notes: HashMap<Word, Vec<&Instruction>> = HashMap::new();
         for note in module.debug_names.iter().chain(&module.annotations) {
-            let is_line = op(note) == Op::DecorateString
-                && matches!(note.operands.last(), Some(Operand::LiteralString(text)) if text.starts_with(DECLARED_ON_LINE));
-            if let (Some(target), false) = (id(note, 0), is_line) {
+            if let Some(target) = id(note, 0) {
                 notes.entry(target).or_default().push(note);
             }
         }
-        let custom = module.ext_inst_imports.iter().find(|it| {
-            matches!(it.operands.first(), Some(Operand::LiteralString(name)) if name.starts_with(CUSTOM))
-        });
         Self {
             globals: globals.filter_map(|it| Some((it.result_id?, it))).collect(),
             functions: functions
                 .filter_map(|it| Some((it.def_id()?, it)))
                 .collect(),
             notes,
-            custom: custom.and_then(|it| it.result_id),
             known: HashMap::new(),
         }
     }
@@ -142,26 +127,12 @@ impl<'a> Fingerprints<'a> {
         // Calls may be as deep as an author likes.
         stacker::maybe_grow(RED_ZONE, STACK, || {
             for it in all {
-                if !self.is_line(it) {
-                    self.instruction(it, &mut part);
-                }
+                self.instruction(it, &mut part);
             }
         });
         let made = part.finish();
         self.known.insert(id, made);
         made
-    }
-
-    fn is_line(&self, it: &Instruction) -> bool {
-        match op(it) {
-            Op::Line | Op::NoLine => true,
-            Op::ExtInst => {
-                self.custom.is_some()
-                    && id(it, 0) == self.custom
-                    && matches!(it.operands.get(1), Some(Operand::LiteralExtInstInteger(which)) if LINES.contains(which))
-            }
-            _ => false,
-        }
     }
 
     /// Adds an instruction, with all that it refers to.
@@ -243,7 +214,10 @@ impl Part {
 
 #[cfg(test)]
 mod tests {
+    use rspirv::spirv::Op;
+
     use super::*;
+    use crate::spirv::op;
     use crate::spirv::tests::of_wgsl;
 
     const SCALED: &str = "
@@ -288,26 +262,6 @@ mod tests {
             assert_ne!(text, SCALED);
             assert_ne!(scale(&text).hash, before.hash, "{new}");
         }
-    }
-
-    #[test]
-    fn lines_do_not_count() {
-        let mut module = of_wgsl(SCALED);
-        let before = entry_points(&module)["scale"];
-        let file = module.header.as_mut().map_or(0, |header| {
-            header.bound += 1;
-            header.bound - 1
-        });
-        let name = Operand::LiteralString("a.rs".into());
-        let string = Instruction::new(Op::String, None, Some(file), vec![name]);
-        module.debug_string_source.push(string);
-        let number = Operand::LiteralBit32;
-        let line = vec![Operand::IdRef(file), number(3), number(1)];
-        let line = Instruction::new(Op::Line, None, None, line);
-        for function in &mut module.functions {
-            function.blocks[0].instructions.insert(0, line.clone());
-        }
-        assert_eq!(entry_points(&module)["scale"], before);
     }
 
     #[test]

@@ -22,6 +22,7 @@ pub(crate) mod tables;
 pub mod trim;
 pub(crate) mod undefined;
 pub mod uniform;
+pub(crate) mod unlinked;
 pub mod widths;
 
 use rspirv::binary::Assemble;
