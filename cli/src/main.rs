@@ -24,6 +24,10 @@ use clap::error::{ContextKind, ContextValue};
 use args::{Arguments, Command};
 use failure::Outcome;
 
+#[cfg(target_os = "linux")]
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() -> ExitCode {
     hankel_system::signals::watch();
     let arguments = match Arguments::try_parse() {

@@ -246,7 +246,7 @@ pub fn compile(
     let own = [target_dir.clone(), sysroot, compiler.backend.clone()];
     let spec = target_spec(&version, &target_dir)?;
     let flags_of_all = flags_of_all(compiler);
-    let how_to_link = || Separately::of(links_at_once.clone(), &version, wanted.names().len());
+    let how_to_link = || Separately::of(links_at_once.clone(), &version);
     let mut separately = how_to_link();
     let mut before = None;
     for _ in 0..MOST_ATTEMPTS {

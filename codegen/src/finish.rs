@@ -13,8 +13,8 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, branches, canonical, exact, holders, interface, libm, names, narrow, offsets,
-    order, parts, references, refused, split, tables, trim, undefined, uniform, widths,
+    self, bounds, branches, canonical, exact, halves, holders, interface, libm, names, narrow,
+    offsets, order, parts, references, refused, split, tables, trim, undefined, uniform, widths,
 };
 use crate::translate::reading;
 
@@ -54,6 +54,8 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         construct: failure.construct.or_else(|| place.clone()),
         ..failure
     };
+    // Where a line is known depends on how the module was linked, and some edits look at the next instruction.
+    trim::lines(&mut module);
     widths::mend(&mut module);
     offsets::make_constant(&mut module);
     narrow::widen(&mut module, name).map_err(placed)?;
@@ -169,6 +171,7 @@ pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool
     let mut has_references = false;
     exact::pin(&mut module);
     exact::fold(&mut module);
+    halves::fold(&mut module);
     tables::reach_constants(&mut module);
     // Inlining and unrolling bring constants together, and what they decide may bring more.
     for _ in 0..MOST_ROUNDS {
@@ -194,13 +197,14 @@ pub(crate) fn optimise(mut module: Module, name: &str) -> Result<(Vec<u32>, bool
         has_references |= is_divided && references::resolve(&mut module, name).0;
         let changes = [
             exact::fold(&mut module),
+            halves::fold(&mut module),
             bounds::fold(&mut module),
             branches::fold(&mut module),
             branches::thread(&mut module),
             tables::keep(&mut module),
             references::sweep(&mut module),
         ];
-        if !is_divided && changes == [false; 6] {
+        if !is_divided && changes == [false; 7] {
             break;
         }
     }

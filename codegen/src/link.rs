@@ -33,16 +33,13 @@ pub(crate) const LIST: &str = ".spv.json";
 /// The end of the names of objects.
 const OBJECT: &str = ".rcgu.o";
 
-/// The most entry points that are linked at once in any case: to look at what each reaches, and to start the linker by
-/// itself, takes as long as linking about as many.
-const MOST_AT_ONCE: usize = 6;
-
 /// How long a compiler counts as one that cannot link what it has not compiled just now: the cause may have been another
 /// one, like a full disk.
 const NOTED_FOR: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// Whether linking is a step of its own: [`Unlinked`]. Where this compiler cannot do that, or what it would link is wrong,
-/// it compiles and links at once.
+/// it compiles and links at once. Such modules compute the same; where the source has arms that a constant rules out, some
+/// have other bytes.
 pub(crate) struct Separately {
     is_on: bool,
     has_failed: bool,
@@ -52,14 +49,14 @@ pub(crate) struct Separately {
 }
 
 impl Separately {
-    /// For a crate of so many entry points. `file` is for the note.
-    pub(crate) fn of(file: PathBuf, version: &str, entry_points: usize) -> Self {
+    /// For this version of the compiler. `file` is for the note.
+    pub(crate) fn of(file: PathBuf, version: &str) -> Self {
         let age = std::fs::metadata(&file).and_then(|it| it.modified());
         let age = age.map_or(Duration::MAX, |it| it.elapsed().unwrap_or_default());
         let is_noted =
             age < NOTED_FOR && std::fs::read_to_string(&file).is_ok_and(|it| it == version);
         Self {
-            is_on: !is_noted && entry_points > MOST_AT_ONCE,
+            is_on: !is_noted,
             has_failed: false,
             file,
             version: version.into(),
@@ -397,8 +394,7 @@ mod tests {
     #[test]
     fn a_compiler_that_links_nothing_by_itself_is_noted() {
         let folder = Folder::new().unwrap();
-        let of = |version: &str| Separately::of(folder.join("note"), version, MOST_AT_ONCE + 1);
-        assert!(!Separately::of(folder.join("note"), "1", MOST_AT_ONCE).is_on());
+        let of = |version: &str| Separately::of(folder.join("note"), version);
         let mut first = of("1");
         first.at_once_works();
         assert!(of("1").is_on(), "it has not failed");

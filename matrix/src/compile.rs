@@ -74,6 +74,7 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
     };
     let profile = format!("{model}_{}", SHADER_MODEL.replace('.', "_"));
     let mut direct3d = dxc.command(&job.code, &job.entry_point, &profile, out);
+    direct3d.args(options_of_numbers(&job.code)?);
     compile(&mut direct3d, "dxc", folder(job), limit)?;
     let mut arguments: Vec<String> = ["-spirv", "-fspv-target-env=vulkan1.1", "-fvk-use-dx-layout"]
         .map(String::from)
@@ -89,8 +90,15 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
     }
     let mut command = dxc.command(&job.code, &job.entry_point, &profile, out);
     command.args(arguments);
+    command.args(options_of_numbers(&job.code)?);
     compile(&mut command, "dxc", folder(job), limit)?;
     adopt::hlsl(&compiled(out)?, job).map_err(Failure::refused)
+}
+
+/// DXC's options for the numbers of a text: without this one a `half` is a `float`.
+fn options_of_numbers(code: &Path) -> Result<Option<&'static str>, Failure> {
+    let text = fs::read_to_string(code).map_err(|error| Failure::refused(error.to_string()))?;
+    Ok(text.contains("half").then_some("-enable-16bit-types"))
 }
 
 /// The shader model that HLSL is written and compiled for: the first with 64-bit floats in

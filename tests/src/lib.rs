@@ -13,6 +13,11 @@ use hankel_dsl::native::Entry;
 use hankel_dsl::native::describe::Kernel;
 use hankel_toolchain::pinned::RUST_GPU_VERSION;
 
+/// As in `hankel` itself.
+#[cfg(target_os = "linux")]
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The repository.
 #[must_use]
 pub fn root() -> PathBuf {

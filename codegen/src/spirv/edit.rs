@@ -1,5 +1,7 @@
 //! What several edits need: new ids, and types and constants that are there once.
 
+use std::collections::{HashMap, HashSet};
+
 use rspirv::dr::{Block, Instruction, Module, Operand};
 use rspirv::spirv::{GlslStd450Op as GLOp, Op, StorageClass, Word};
 
@@ -47,6 +49,19 @@ impl<'a> Editor<'a> {
             .types_global_values
             .push(Instruction::new(op_code, ty, Some(new), operands));
         new
+    }
+
+    /// Floating-point numbers of so many bits.
+    pub fn float_type_of(&mut self, bits: u32) -> FloatType {
+        let operands = vec![Operand::LiteralBit32(bits)];
+        let id = self.once(Op::TypeFloat, None, operands);
+        FloatType { id, bits }
+    }
+
+    /// Vectors of `count` values of type `part`.
+    pub fn vector_type_of(&mut self, part: Word, count: u32) -> Word {
+        let operands = vec![Operand::IdRef(part), Operand::LiteralBit32(count)];
+        self.once(Op::TypeVector, None, operands)
     }
 
     pub fn bool_type(&mut self) -> Word {
@@ -125,6 +140,19 @@ impl<'a> Editor<'a> {
         self.once(Op::Constant, Some(ty.id), vec![operand])
     }
 
+    /// A constant of 16 bits, of type `ty`.
+    pub fn half(&mut self, ty: Word, bits: u16) -> Word {
+        let bits = Operand::LiteralBit32(bits.into());
+        self.once(Op::Constant, Some(ty), vec![bits])
+    }
+
+    /// What a constant vector is made of.
+    pub fn parts_of(&self, constant: Word) -> Option<Vec<Word>> {
+        let found = super::global(self.module, constant);
+        let found = found.filter(|it| op(it) == Op::ConstantComposite)?;
+        found.operands.iter().map(Operand::id_ref_any).collect()
+    }
+
     /// The value of a constant of floats, not of a specialisation constant.
     pub fn float_value(&self, constant: Word) -> Option<f64> {
         let found = super::global(self.module, constant).filter(|it| op(it) == Op::Constant)?;
@@ -163,6 +191,18 @@ pub fn functions_set(module: &Module) -> Option<Word> {
         .and_then(|it| it.result_id)
 }
 
+/// The import of GLSL's functions, which the module has afterwards.
+pub fn import_functions(module: &mut Module) -> Word {
+    if let Some(there) = functions_set(module) {
+        return there;
+    }
+    let new = Editor::new(module).new_id();
+    let name = Operand::LiteralString("GLSL.std.450".into());
+    let import = Instruction::new(Op::ExtInstImport, None, Some(new), vec![name]);
+    module.ext_inst_imports.push(import);
+    new
+}
+
 /// Instructions that take the place of one; the last of them has its id.
 pub struct Sequence<'e, 'm> {
     editor: &'e mut Editor<'m>,
@@ -185,6 +225,16 @@ impl<'e, 'm> Sequence<'e, 'm> {
         let operands = operands.iter().map(|it| Operand::IdRef(*it)).collect();
         self.made
             .push(Instruction::new(op_code, Some(ty), Some(new), operands));
+        new
+    }
+
+    /// An instruction that ends in numbers: the places of parts.
+    pub fn part(&mut self, op_code: Op, ty: Word, operands: &[Word], places: &[u32]) -> Word {
+        let new = self.then(op_code, ty, operands);
+        if let Some(made) = self.made.last_mut() {
+            let places = places.iter().copied().map(Operand::LiteralBit32);
+            made.operands.extend(places);
+        }
         new
     }
 
@@ -261,4 +311,53 @@ pub fn replace_each(
         }
     }
     module.functions = functions;
+}
+
+/// Puts other types in the place of some, and makes one of those that are the same then. What takes a place must be declared
+/// before all that holds what it takes the place of.
+pub fn exchange_types(module: &mut Module, mut same: HashMap<Word, Word>) {
+    let gone: HashSet<Word> = same.keys().copied().collect();
+    module
+        .types_global_values
+        .retain(|it| it.result_id.is_none_or(|id| !gone.contains(&id)));
+    let mut seen: HashMap<(Op, Vec<Operand>), Word> = HashMap::new();
+    let mut kept = Vec::new();
+    for mut it in std::mem::take(&mut module.types_global_values) {
+        rename(&mut it, &same);
+        if let (Op::TypePointer | Op::TypeFunction | Op::TypeVector, Some(made)) =
+            (op(&it), it.result_id)
+        {
+            let key = (op(&it), it.operands.clone());
+            if let Some(first) = seen.get(&key) {
+                same.insert(made, *first);
+                continue;
+            }
+            seen.insert(key, made);
+        }
+        kept.push(it);
+    }
+    module.types_global_values = kept;
+    let is_gone = |it: &Instruction| id(it, 0).is_some_and(|id| same.contains_key(&id));
+    module.debug_names.retain(|it| !is_gone(it));
+    module.annotations.retain(|it| !is_gone(it));
+    for function in &mut module.functions {
+        for it in function.all_inst_iter_mut() {
+            rename(it, &same);
+        }
+    }
+}
+
+fn rename(it: &mut Instruction, same: &HashMap<Word, Word>) {
+    if let Some(ty) = it.result_type.as_mut()
+        && let Some(other) = same.get(ty)
+    {
+        *ty = *other;
+    }
+    for operand in &mut it.operands {
+        if let Operand::IdRef(id) = operand
+            && let Some(other) = same.get(id)
+        {
+            *id = *other;
+        }
+    }
 }

@@ -7,6 +7,7 @@ pub(crate) mod divide;
 pub(crate) mod edit;
 pub mod exact;
 pub(crate) mod fingerprint;
+pub(crate) mod halves;
 pub(crate) mod holders;
 pub mod interface;
 pub mod libm;

@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{GlslStd450Op as GLOp, Op, StorageClass, Word};
 
-use super::edit::{Editor, Sequence, replace_each};
+use super::edit::{Editor, Sequence, exchange_types, replace_each};
 use super::{id, literal, op};
 use crate::error::{Failure, Step};
 
@@ -45,7 +45,7 @@ pub fn widen(module: &mut Module, kernel: &str) -> Result<(), Failure> {
     }
     known.refuse(module, kernel)?;
     replace_each(module, |editor, it| known.replaced(editor, it));
-    exchange_types(module, &known);
+    exchange(module, &known);
     Ok(())
 }
 
@@ -381,7 +381,7 @@ fn function(it: &Instruction) -> Option<(GLOp, Option<bool>)> {
 }
 
 /// Puts types of 32 bits in the place of narrow ones, and one type in the place of several that are then the same.
-fn exchange_types(module: &mut Module, known: &Known) {
+fn exchange(module: &mut Module, known: &Known) {
     let mut same: HashMap<Word, Word> = HashMap::new();
     for signed in [false, true] {
         let ids: Vec<Word> = known
@@ -412,48 +412,7 @@ fn exchange_types(module: &mut Module, known: &Known) {
         same.extend(ids.iter().filter_map(|id| Some((*id, wide.result_id?))));
         module.types_global_values.insert(0, wide);
     }
-    let gone: HashSet<Word> = same.keys().copied().collect();
-    module
-        .types_global_values
-        .retain(|it| it.result_id.is_none_or(|id| !gone.contains(&id)));
-    let mut seen: HashMap<(Op, Vec<Operand>), Word> = HashMap::new();
-    let mut kept = Vec::new();
-    for mut it in std::mem::take(&mut module.types_global_values) {
-        rename(&mut it, &same);
-        if let (Op::TypePointer | Op::TypeFunction, Some(made)) = (op(&it), it.result_id) {
-            let key = (op(&it), it.operands.clone());
-            if let Some(first) = seen.get(&key) {
-                same.insert(made, *first);
-                continue;
-            }
-            seen.insert(key, made);
-        }
-        kept.push(it);
-    }
-    module.types_global_values = kept;
-    let is_gone = |it: &Instruction| id(it, 0).is_some_and(|id| same.contains_key(&id));
-    module.debug_names.retain(|it| !is_gone(it));
-    module.annotations.retain(|it| !is_gone(it));
-    for function in &mut module.functions {
-        for it in function.all_inst_iter_mut() {
-            rename(it, &same);
-        }
-    }
-}
-
-fn rename(it: &mut Instruction, same: &HashMap<Word, Word>) {
-    if let Some(ty) = it.result_type.as_mut()
-        && let Some(other) = same.get(ty)
-    {
-        *ty = *other;
-    }
-    for operand in &mut it.operands {
-        if let Operand::IdRef(id) = operand
-            && let Some(other) = same.get(id)
-        {
-            *id = *other;
-        }
-    }
+    exchange_types(module, same);
 }
 
 #[cfg(test)]

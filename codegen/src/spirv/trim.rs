@@ -32,12 +32,13 @@ pub fn capabilities(module: &mut Module) {
 }
 
 /// Capabilities that are enabled for every kernel crate, used or not.
-pub const ENABLED: [Capability; 20] = [
+pub const ENABLED: [Capability; 21] = [
     // Of the number of a primitive.
     Capability::Geometry,
     // `narrow` leaves no such number.
     Capability::Int8,
     Capability::Int16,
+    Capability::Float16,
     Capability::Float64,
     Capability::Int64,
     Capability::ImageQuery,
@@ -59,6 +60,7 @@ pub const ENABLED: [Capability; 20] = [
 
 fn needs(instruction: &Instruction) -> Option<Capability> {
     match op(instruction) {
+        Op::TypeFloat if literal(instruction, 0) == Some(16) => Some(Capability::Float16),
         Op::TypeFloat if literal(instruction, 0) == Some(64) => Some(Capability::Float64),
         Op::TypeInt if literal(instruction, 0) == Some(64) => Some(Capability::Int64),
         Op::ImageQuerySize

@@ -21,6 +21,7 @@ use rspirv::spirv::{BuiltIn, Decoration, ImageOperands, Op, StorageClass, Word};
 
 use crate::Language;
 use crate::spirv::edit::{Sequence, replace_each};
+use crate::spirv::halves;
 use crate::spirv::{decoration, global, id, literal, op};
 
 /// What naga's reader does not take over.
@@ -115,7 +116,7 @@ fn samplings(module: &Module) -> BTreeMap<(bool, u32), Sampling> {
 pub fn for_language(module: &mut Module, language: Language) -> bool {
     match language {
         Language::Glsl | Language::Essl310 | Language::Essl300 => {
-            plain_depths(module) | remainders(module)
+            plain_depths(module) | remainders(module) | halves::widen(module)
         }
         Language::Hlsl => swapped_bytes(module),
         Language::Spirv | Language::Wgsl | Language::Msl => false,

@@ -22,7 +22,8 @@ const READ_STORAGE: &str = "readonly_and_readwrite_storage_textures";
 const SUBGROUPS: &str = "subgroups";
 
 /// Extensions of WGSL that naga enables, each with WebGPU's feature.
-const EXTENSIONS: [(&str, &str); 3] = [
+const EXTENSIONS: [(&str, &str); 4] = [
+    ("f16", "shader-f16"),
     ("primitive_index", "primitive-index"),
     ("clip_distances", "clip-distances"),
     ("dual_source_blending", "dual-source-blending"),

@@ -109,7 +109,7 @@
 //! `#[derive(Element)]` checks at compile time that a `repr(C)` structure lies in memory as a
 //! shader (std430) sees it, names the field that does not, and describes it for the host.
 #![no_std]
-#![cfg_attr(target_arch = "spirv", feature(asm_experimental_arch))]
+#![cfg_attr(target_arch = "spirv", feature(asm_experimental_arch, f16))]
 
 #[cfg(not(target_arch = "spirv"))]
 extern crate std;
@@ -139,7 +139,7 @@ mod workgroup;
 pub use atomics::{AtomicInteger, Atomics};
 pub use data::{Bool, PackedVec3};
 pub use glam;
-pub use half::{F16, F16x2, F16x4};
+pub use half::{F16, F16x2, F16x4, Half, Half2, Half3, Half4};
 /// ```
 /// use hankel_dsl::{Real, apart};
 /// #[apart(R, if N > 3)]

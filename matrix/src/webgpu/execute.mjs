@@ -32,6 +32,7 @@ const SUBGROUPS = "subgroups";
 
 /** Extensions of WGSL, each with the feature that it needs. */
 const EXTENSIONS = {
+    f16: "shader-f16",
     subgroups: SUBGROUPS,
     primitive_index: "primitive-index",
     clip_distances: "clip-distances",

@@ -2,7 +2,9 @@
 //! vectors of three without padding, numbers of 16 bits, matrices.
 
 use hankel_dsl::glam::{Mat4, UVec2, UVec4, Vec2, Vec3, Vec4};
-use hankel_dsl::{Bool, Buffer, Element, F16, F16x2, PackedVec3, kernel};
+use hankel_dsl::{
+    Bool, Buffer, Element, F16, F16x2, F16x4, Half, Half2, Half3, Half4, PackedVec3, kernel,
+};
 
 /// What to do with a number.
 #[derive(Clone, Copy, Debug, PartialEq, Element)]
@@ -216,6 +218,83 @@ pub fn half_bits(#[element] bits: u32) -> UVec2 {
     UVec2::new(F16::new(f32::from_bits(bits)).to_bits(), wide)
 }
 
+/// What the device's own halves give, as numbers of 32 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Element)]
+#[repr(C)]
+pub struct OwnHalves {
+    /// A sum, a difference, a product and a quotient.
+    pub operators: Vec4,
+    /// A root, a magnitude, the smaller and the larger of two.
+    pub functions: Vec4,
+    /// A sum of a product, a whole number, one that is limited, and one that a comparison chooses.
+    pub others: Vec4,
+}
+
+/// Arithmetic on halves by the device's own instructions.
+#[kernel(
+    compute,
+    threads(64),
+    inputs = inputs::own_halves,
+    parity(
+        ulp = 32768,
+        why = "a quotient, a root and a product with a sum of 16 bits are within 4 ulp, each of which is 8192 ulp of f32"
+    )
+)]
+pub fn own_halves(#[element] pair: Halves) -> OwnHalves {
+    let (a, b) = (Half2::from(pair.a), Half2::from(pair.b));
+    let (x, y) = (a.x, b.x);
+    let larger = if x > y { x } else { y };
+    OwnHalves {
+        operators: Half4::new(x + y, x - y, x * y, a.y / b.y).into(),
+        functions: Half4::new(a.y.abs().sqrt(), y.abs(), x.min(y), x.max(y)).into(),
+        others: Half4::new(
+            x.abs().mul_add(y.abs(), b.y.abs()),
+            x.floor(),
+            y.clamp(Half::new(-0.5), Half::new(1.5)),
+            larger,
+        )
+        .into(),
+    }
+}
+
+/// Vectors of halves, two, three and four at a time.
+#[kernel(
+    compute,
+    threads(64),
+    inputs = inputs::own_halves,
+    parity(
+        ulp = 65536,
+        absolute = 0.0625,
+        why = "four results of 16 bits in a row, each within 2 ulp; those of sums that cancel, of numbers below 32"
+    )
+)]
+pub fn own_half_vectors(#[element] pair: Halves) -> OwnHalves {
+    let (a, b) = (Half2::from(pair.a), Half2::from(pair.b));
+    let all = Half4::from(F16x4 {
+        xy: pair.a,
+        zw: pair.b,
+    });
+    let mut three = Half3::new(b.x, a.y, b.y) * (a.x * Half::new(0.0625));
+    three += Half3::from(Vec3::new(0.1, 0.2, 0.3));
+    let mut index = 0;
+    let mut sum = Half2::default();
+    while index < 3 {
+        sum = sum.mul_add(Half2::splat(Half::new(0.5)), a.max(b));
+        index += 1;
+    }
+    let back = F16x2::from(sum.min(-b));
+    OwnHalves {
+        operators: all.into(),
+        functions: Vec3::from(three - Half3::splat(b.x)).extend(a.abs().dot(b.abs()).get()),
+        others: Vec4::new(
+            all.abs().dot(all.abs()).get(),
+            Vec2::from(back).x,
+            Vec2::from(sum).y,
+            three.dot(three).get(),
+        ),
+    }
+}
+
 #[cfg(not(target_arch = "spirv"))]
 mod inputs {
     //! Halves that are numbers.
@@ -245,5 +324,22 @@ mod inputs {
             })
             .collect();
         [Given::new("finite halves").buffer("pair", &pairs)].into()
+    }
+
+    /// From 1/16 to 16, of both signs, so that no result leaves the range of a half, nor is so small that a device may
+    /// take it for zero.
+    pub fn own_halves(request: &Request) -> Vec<Given> {
+        let mut chance = Source::new(request.seed);
+        let mut half = || {
+            let bits = chance.bits() as u32;
+            (0x2c00 + bits % 0x2000) | ((bits >> 16) & 0x8000)
+        };
+        let pairs: Vec<Halves> = (0..4099)
+            .map(|_| Halves {
+                a: F16x2::from_bits(half() | (half() << 16)),
+                b: F16x2::from_bits(half() | (half() << 16)),
+            })
+            .collect();
+        [Given::new("halves from 1/16 to 16").buffer("pair", &pairs)].into()
     }
 }

@@ -105,6 +105,8 @@ hankel_dsl::kernels![
     data::bones_in_world,
     data::halves,
     data::half_bits,
+    data::own_halves,
+    data::own_half_vectors,
     data::pushed,
     data::pushed_colour,
     texels::whole,

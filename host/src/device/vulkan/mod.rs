@@ -28,6 +28,7 @@ use resources::{Memory, Texture};
 /// Features that are used where the adapter has them.
 fn wanted_features() -> wgpu::Features {
     wgpu::Features::PASSTHROUGH_SHADERS
+        | wgpu::Features::SHADER_F16
         | wgpu::Features::SHADER_F64
         | wgpu::Features::SHADER_INT64
         | wgpu::Features::SUBGROUP

@@ -347,6 +347,7 @@ impl VulkanDevice {
         }
         let features = self.device.features();
         for (capability, feature, name) in [
+            (9, wgpu::Features::SHADER_F16, "16-bit floats"),
             (10, wgpu::Features::SHADER_F64, "64-bit floats"),
             (11, wgpu::Features::SHADER_INT64, "64-bit integers"),
         ] {

@@ -1,11 +1,15 @@
 //! Numbers of 16 bits (IEEE 754 binary16), on every target.
 //!
 //! A half is computed with as [`F16`], and lies in memory in pairs: [`F16x2`], and [`F16x4`], which is
-//! two of them. No target needs an extension for it.
+//! two of them. No target needs an extension for it. [`Half`] is computed with by the device's own instructions.
 //!
 //! Each operation is one of `f32` and a rounding. For `+ - * /` and `sqrt` that is the rounded result
 //! itself, since `f32` has more than twice the digits (Figueroa, When is double rounding innocuous?,
 //! 1995), so that native code and every language give the same bits.
+
+mod own;
+
+pub use own::{Half, Half2, Half3, Half4};
 
 use core::cmp::Ordering;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
