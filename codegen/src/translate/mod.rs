@@ -423,6 +423,7 @@ impl Ir {
             validate(&module, name)?;
             naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
             cleanup::drop_dead_locals(&mut module);
+            cleanup::drop_copies(&mut module);
             validate(&module, name)?;
             naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
             cleanup::drop_unused_locals(&mut module);

@@ -95,7 +95,8 @@ pub fn drop_dead_locals(module: &mut Module) {
     });
 }
 
-fn drop_stores(block: &mut Block, is_dead: &impl Fn(Handle<Expression>) -> bool) {
+/// Drops stores of which that holds.
+pub fn drop_stores(block: &mut Block, is_dead: &impl Fn(Handle<Expression>) -> bool) {
     let old = std::mem::take(block);
     for (mut statement, span) in old.span_into_iter() {
         match &mut statement {

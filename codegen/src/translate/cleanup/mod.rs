@@ -10,7 +10,7 @@
 //! - [`matrix_types`] makes a matrix of a structure that holds its columns;
 //! - [`plain_loops`] ends loops with `break` in their body instead of a condition at their end;
 //! - [`constant_indices`] makes `v[0]` with a constant index `v.x`;
-//! - [`drop_dead_locals`] drops variables that are only written;
+//! - [`drop_dead_locals`] drops variables that are only written, [`drop_copies`] those that hold what another one holds;
 //! - [`drop_last_return`] drops the `return` at the end;
 //! - [`name_loads`] names what is loaded after the member or structure that it comes from;
 //! - [`name_phis`] and [`name_values`] name what has no name in SPIR-V after what it is;
@@ -25,6 +25,7 @@
 
 mod bits;
 mod blocks;
+mod copies;
 mod depths;
 mod entry_point;
 mod layers;
@@ -40,6 +41,7 @@ mod walk;
 
 pub use bits::{convert_wide_signs, has_bit_counts, has_functions_of_bits, name_bit_counts};
 pub use blocks::unwrap_blocks;
+pub use copies::drop_copies;
 pub use depths::restore_depths;
 pub use entry_point::fold_entry_point;
 pub use layers::restore_layers;
