@@ -54,8 +54,6 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         construct: failure.construct.or_else(|| place.clone()),
         ..failure
     };
-    // Where a line is known depends on how the module was linked, and some edits look at the next instruction.
-    trim::lines(&mut module);
     widths::mend(&mut module);
     offsets::make_constant(&mut module);
     narrow::widen(&mut module, name).map_err(placed)?;

@@ -38,8 +38,8 @@ const OBJECT: &str = ".rcgu.o";
 const NOTED_FOR: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// Whether linking is a step of its own: [`Unlinked`]. Where this compiler cannot do that, or what it would link is wrong,
-/// it compiles and links at once. Such modules compute the same; where the source has arms that a constant rules out, some
-/// have other bytes.
+/// it compiles and links at once. Such modules compute the same, and a few have other bytes: with lines of the source in
+/// them, rust-gpu keeps branches that are empty.
 pub(crate) struct Separately {
     is_on: bool,
     has_failed: bool,

@@ -73,8 +73,9 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
         Stage::Fragment => "ps",
     };
     let profile = format!("{model}_{}", SHADER_MODEL.replace('.', "_"));
+    let numbers = option_of_numbers(&job.code)?;
     let mut direct3d = dxc.command(&job.code, &job.entry_point, &profile, out);
-    direct3d.args(options_of_numbers(&job.code)?);
+    direct3d.args(numbers);
     compile(&mut direct3d, "dxc", folder(job), limit)?;
     let mut arguments: Vec<String> = ["-spirv", "-fspv-target-env=vulkan1.1", "-fvk-use-dx-layout"]
         .map(String::from)
@@ -90,15 +91,17 @@ pub fn hlsl_dxc(dxc: &Dxc, job: &Job, out: &Path, limit: Duration) -> Result<Vec
     }
     let mut command = dxc.command(&job.code, &job.entry_point, &profile, out);
     command.args(arguments);
-    command.args(options_of_numbers(&job.code)?);
+    command.args(numbers);
     compile(&mut command, "dxc", folder(job), limit)?;
     adopt::hlsl(&compiled(out)?, job).map_err(Failure::refused)
 }
 
-/// DXC's options for the numbers of a text: without this one a `half` is a `float`.
-fn options_of_numbers(code: &Path) -> Result<Option<&'static str>, Failure> {
+/// DXC's option for a text with halves: without it a `half` is a `float`.
+fn option_of_numbers(code: &Path) -> Result<Option<&'static str>, Failure> {
     let text = fs::read_to_string(code).map_err(|error| Failure::refused(error.to_string()))?;
-    Ok(text.contains("half").then_some("-enable-16bit-types"))
+    let mut words = text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+    let is_half = |word: &str| matches!(word, "half" | "half2" | "half3" | "half4");
+    Ok(words.any(is_half).then_some("-enable-16bit-types"))
 }
 
 /// The shader model that HLSL is written and compiled for: the first with 64-bit floats in

@@ -16,8 +16,8 @@ use super::{decoration, id, op};
 /// Orders types, constants, variables, functions and annotations, and numbers all ids anew.
 ///
 /// Variables with a binding come first, by set and binding, then those with a built-in or a location; all else
-/// follows as functions use it, from the entry point on; so do the variables of a function. Modules with instructions for which the order has a meaning of
-/// its own, which rust-gpu does not write, stay as they are.
+/// follows as functions use it, from the entry point on; so do the variables of a function. Modules with instructions
+/// for which the order has a meaning of its own, which rust-gpu does not write, stay as they are.
 pub fn order(module: &mut Module) {
     let globals = &module.types_global_values;
     let has_own_order = globals.iter().any(|it| it.result_id.is_none())
@@ -28,7 +28,6 @@ pub fn order(module: &mut Module) {
     }
     order_functions(module);
     for function in &mut module.functions {
-        drop_unused_phis(function);
         order_variables(function);
     }
     order_globals(module);
@@ -80,30 +79,6 @@ fn order_functions(module: &mut Module) {
         module.functions.push(function);
     }
     module.functions.extend(rest.into_iter().flatten());
-}
-
-/// Removes what is only chosen: whether rust-gpu leaves such an `OpPhi` depends on where lines of the source are known.
-fn drop_unused_phis(function: &mut Function) {
-    let is_phi = |it: &&Instruction| op(it) == Op::Phi;
-    let all: Vec<&Instruction> = function.all_inst_iter().collect();
-    let phis = all.iter().copied().filter(is_phi);
-    let phis: HashMap<Word, &Instruction> =
-        phis.filter_map(|it| Some((it.result_id?, it))).collect();
-    let others = all.iter().copied().filter(|it| !is_phi(it));
-    let mut wanted: Vec<Word> = others.flat_map(ids).collect();
-    let mut used = HashSet::new();
-    while let Some(id) = wanted.pop() {
-        if let Some(phi) = phis.get(&id)
-            && used.insert(id)
-        {
-            wanted.extend(ids(phi));
-        }
-    }
-    let is_used = |it: &Instruction| it.result_id.is_some_and(|id| used.contains(&id));
-    for block in &mut function.blocks {
-        let instructions = &mut block.instructions;
-        instructions.retain(|it| op(it) != Op::Phi || is_used(it));
-    }
 }
 
 /// Variables as the function uses them: rust-gpu puts those of an inlined function where no line of the source is
@@ -383,25 +358,6 @@ mod tests {
             order(&mut other);
             assert_eq!(store(&other), expected, "seed {seed}");
         }
-    }
-
-    #[test]
-    fn what_is_only_chosen_is_gone() {
-        let mut expected = module();
-        order(&mut expected);
-        let mut other = module();
-        let function = other.functions.iter_mut().find(|it| it.blocks.len() > 2);
-        let blocks = &mut function.unwrap().blocks;
-        let label = blocks[0].label_id().unwrap();
-        let chosen = |id: Word, of: Word| {
-            let operands = vec![Operand::IdRef(of), Operand::IdRef(label)];
-            Instruction::new(Op::Phi, Some(1), Some(id), operands)
-        };
-        // One of another, that of the first, and one of both.
-        let phis = [chosen(2001, 2002), chosen(2002, 2001), chosen(2003, 2001)];
-        blocks[1].instructions.splice(0..0, phis);
-        order(&mut other);
-        assert_eq!(store(&other), store(&expected));
     }
 
     #[test]

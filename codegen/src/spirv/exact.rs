@@ -22,7 +22,7 @@ use super::edit::{called, functions_set};
 use super::{id, op};
 
 /// Arithmetic, to which alone `NoContraction` means something.
-fn arithmetic(op: Op) -> bool {
+pub(super) fn arithmetic(op: Op) -> bool {
     matches!(
         op,
         Op::FAdd

@@ -12,7 +12,7 @@ use rspirv::spirv::{GlslStd450Op as GLOp, Op, Word};
 use super::edit::{
     Editor, FloatType, Sequence, called, exchange_types, import_functions, is_call, replace_each,
 };
-use super::{id, literal, op};
+use super::{exact, id, literal, op};
 
 /// The numbers of 16 bits of a module.
 struct Halves {
@@ -156,17 +156,7 @@ impl Halves {
 /// Whether the result may have more than 16 bits where its operands are halves.
 fn is_rounded(it: &Instruction, set: Word) -> bool {
     match op(it) {
-        Op::FAdd
-        | Op::FSub
-        | Op::FMul
-        | Op::FDiv
-        | Op::FRem
-        | Op::FMod
-        | Op::VectorTimesScalar
-        | Op::Dot
-        | Op::FConvert
-        | Op::ConvertSToF
-        | Op::ConvertUToF => true,
+        Op::FConvert | Op::ConvertSToF | Op::ConvertUToF => true,
         Op::ExtInst => !matches!(
             called(it, set),
             Some(
@@ -186,7 +176,7 @@ fn is_rounded(it: &Instruction, set: Word) -> bool {
                     | GLOp::Step
             )
         ),
-        _ => false,
+        other => exact::arithmetic(other) && other != Op::FNegate,
     }
 }
 

@@ -1,7 +1,7 @@
 //! The SPIR-V that rustc leaves for rust-gpu's linker, without what no shader shows: the lines of the source, and blocks
 //! that nothing reaches.
 //!
-//! Most instructions of such a module are of these kinds. rustc makes a block of each arm that a constant rules out:
+//! Most instructions of such a module are of these kinds. rustc makes a block of each branch that a constant rules out:
 //! `unroll!` has many. The linker copies all of them for each call that it inlines, and goes through the decorations
 //! with lines then. Without them it takes half of the time and half of the memory.
 

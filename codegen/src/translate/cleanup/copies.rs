@@ -20,7 +20,6 @@ pub fn drop_copies(module: &mut Module) {
                 if let Expression::LocalVariable(local) = expression
                     && *local == copy
                 {
-                    // What is stored to it goes before the next round.
                     *local = original;
                 }
             }
@@ -28,7 +27,7 @@ pub fn drop_copies(module: &mut Module) {
     });
 }
 
-/// A variable, and another one that has the same value wherever the first is read. Its store is gone.
+/// A variable, and another one that has the same value wherever the first is read. The store to the first is removed.
 fn found(function: &mut Function) -> Option<(Local, Local)> {
     let facts = Facts::of(function);
     let (copy, original) = facts.in_block(&function.body)?;
@@ -94,17 +93,14 @@ impl<'a> Facts<'a> {
     fn in_block(&self, block: &Block) -> Option<(Local, Local)> {
         self.stored_twice(block)
             .or_else(|| {
-                let statements = block.iter().enumerate();
-                let loops = statements.filter_map(|(at, statement)| match statement {
+                block.iter().enumerate().find_map(|(at, it)| match it {
                     Statement::Loop {
                         body,
                         break_if: None,
                         ..
-                    } => Some((at, body)),
+                    } => self.kept_by_loop(body, &block[at + 1..]),
                     _ => None,
-                });
-                let mut loops = loops;
-                loops.find_map(|(at, body)| self.kept_by_loop(body, &block[at + 1..]))
+                })
             })
             .or_else(|| block.iter().find_map(|it| self.within(it)))
     }

@@ -11,7 +11,6 @@ mod own;
 
 pub use own::{Half, Half2, Half3, Half4};
 
-use core::cmp::Ordering;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use glam::{Vec2, Vec4};
@@ -120,36 +119,43 @@ impl F16 {
     }
 }
 
-impl PartialEq for F16 {
-    #[inline(always)]
-    fn eq(&self, other: &Self) -> bool {
-        self.0 == other.0
-    }
-}
+/// Comparisons of a number that is held in a field, each by itself: a shader has no `Ordering`.
+macro_rules! compared {
+    ($number:ident) => {
+        impl PartialEq for $number {
+            #[inline(always)]
+            fn eq(&self, other: &Self) -> bool {
+                self.0 == other.0
+            }
+        }
 
-/// Each comparison by itself: a shader has no `Ordering`.
-impl PartialOrd for F16 {
-    #[inline(always)]
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.0.partial_cmp(&other.0)
-    }
-    #[inline(always)]
-    fn lt(&self, other: &Self) -> bool {
-        self.0 < other.0
-    }
-    #[inline(always)]
-    fn le(&self, other: &Self) -> bool {
-        self.0 <= other.0
-    }
-    #[inline(always)]
-    fn gt(&self, other: &Self) -> bool {
-        self.0 > other.0
-    }
-    #[inline(always)]
-    fn ge(&self, other: &Self) -> bool {
-        self.0 >= other.0
-    }
+        impl PartialOrd for $number {
+            #[inline(always)]
+            fn partial_cmp(&self, other: &Self) -> Option<core::cmp::Ordering> {
+                self.0.partial_cmp(&other.0)
+            }
+            #[inline(always)]
+            fn lt(&self, other: &Self) -> bool {
+                self.0 < other.0
+            }
+            #[inline(always)]
+            fn le(&self, other: &Self) -> bool {
+                self.0 <= other.0
+            }
+            #[inline(always)]
+            fn gt(&self, other: &Self) -> bool {
+                self.0 > other.0
+            }
+            #[inline(always)]
+            fn ge(&self, other: &Self) -> bool {
+                self.0 >= other.0
+            }
+        }
+    };
 }
+use compared;
+
+compared!(F16);
 
 impl Neg for F16 {
     type Output = Self;
@@ -276,6 +282,7 @@ impl From<F16x4> for Vec4 {
 
 #[cfg(test)]
 mod tests {
+    use core::cmp::Ordering;
     use std::vec::Vec;
 
     use super::*;

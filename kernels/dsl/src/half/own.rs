@@ -15,12 +15,11 @@
 //! Sources: WGSL, 15.7.4 "Floating Point Accuracy"; Vulkan, appendix A "Precision and Operation of SPIR-V Instructions";
 //! Metal Shading Language Specification, 8.4 "ULPs and Relative Error".
 
-use core::cmp::Ordering;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::{F16x2, F16x4};
+use super::{F16x2, F16x4, compared};
 #[cfg(not(target_arch = "spirv"))]
 use crate::Real;
 
@@ -52,6 +51,18 @@ macro_rules! instruction {
         $(let $name = $value;)+
         $native
     }};
+}
+
+/// Methods of one instruction each, whose operands are the number itself, by the first name, and others like it.
+macro_rules! functions {
+    ($($(#[$doc:meta])* $name:ident($own:ident $(, $other:ident)*) = $instruction:literal, $native:expr;)+) => { $(
+        $(#[$doc])*
+        #[inline(always)]
+        #[must_use]
+        pub fn $name(self $(, $other: Self)*) -> Self {
+            instruction!(Self, $instruction, [$own = self $(, $other = $other)*], $native)
+        }
+    )+ };
 }
 
 /// What a half is held in.
@@ -107,76 +118,20 @@ impl Half {
         return self.0;
     }
 
-    /// Square root; the number must not be negative.
-    #[inline(always)]
-    #[must_use]
-    pub fn sqrt(self) -> Self {
-        instruction!(
-            Self,
-            "OpExtInst typeof*{r} %glsl 31",
-            [a = self],
-            rounded(Real::sqrt(a.0))
-        )
-    }
-
-    /// Magnitude.
-    #[inline(always)]
-    #[must_use]
-    pub fn abs(self) -> Self {
-        instruction!(
-            Self,
-            "OpExtInst typeof*{r} %glsl 4",
-            [a = self],
-            Self(Real::abs(a.0))
-        )
-    }
-
-    /// The largest whole number that is not above it.
-    #[inline(always)]
-    #[must_use]
-    pub fn floor(self) -> Self {
-        instruction!(
-            Self,
-            "OpExtInst typeof*{r} %glsl 8",
-            [a = self],
-            Self(Real::floor(a.0))
-        )
-    }
-
-    /// The smaller of two numbers.
-    #[inline(always)]
-    #[must_use]
-    pub fn min(self, other: Self) -> Self {
-        instruction!(
-            Self,
-            "OpExtInst typeof*{r} %glsl 37",
-            [a = self, b = other],
-            Self(Real::min(a.0, b.0))
-        )
-    }
-
-    /// The larger of two numbers.
-    #[inline(always)]
-    #[must_use]
-    pub fn max(self, other: Self) -> Self {
-        instruction!(
-            Self,
-            "OpExtInst typeof*{r} %glsl 40",
-            [a = self, b = other],
-            Self(Real::max(a.0, b.0))
-        )
-    }
-
-    /// `self * factor + summand`, rounded once or twice.
-    #[inline(always)]
-    #[must_use]
-    pub fn mul_add(self, factor: Self, summand: Self) -> Self {
-        instruction!(
-            Self,
-            "OpExtInst typeof*{r} %glsl 50",
-            [a = self, b = factor, c = summand],
-            rounded(rounded(a.0 * b.0).0 + c.0)
-        )
+    functions! {
+        /// Square root; the number must not be negative.
+        sqrt(a) = "OpExtInst typeof*{r} %glsl 31", rounded(Real::sqrt(a.0));
+        /// Magnitude.
+        abs(a) = "OpExtInst typeof*{r} %glsl 4", Self(Real::abs(a.0));
+        /// The largest whole number that is not above it.
+        floor(a) = "OpExtInst typeof*{r} %glsl 8", Self(Real::floor(a.0));
+        /// The smaller of two numbers.
+        min(a, other) = "OpExtInst typeof*{r} %glsl 37", Self(Real::min(a.0, other.0));
+        /// The larger of two numbers.
+        max(a, other) = "OpExtInst typeof*{r} %glsl 40", Self(Real::max(a.0, other.0));
+        /// `self * factor + summand`, rounded once or twice.
+        mul_add(a, factor, summand) = "OpExtInst typeof*{r} %glsl 50",
+            rounded(rounded(a.0 * factor.0).0 + summand.0);
     }
 
     /// The number itself from `least` to `most`, which must not be below `least`.
@@ -187,36 +142,7 @@ impl Half {
     }
 }
 
-impl PartialEq for Half {
-    #[inline(always)]
-    fn eq(&self, other: &Self) -> bool {
-        self.0 == other.0
-    }
-}
-
-/// Each comparison by itself: a shader has no `Ordering`.
-impl PartialOrd for Half {
-    #[inline(always)]
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.get().partial_cmp(&other.get())
-    }
-    #[inline(always)]
-    fn lt(&self, other: &Self) -> bool {
-        self.0 < other.0
-    }
-    #[inline(always)]
-    fn le(&self, other: &Self) -> bool {
-        self.0 <= other.0
-    }
-    #[inline(always)]
-    fn gt(&self, other: &Self) -> bool {
-        self.0 > other.0
-    }
-    #[inline(always)]
-    fn ge(&self, other: &Self) -> bool {
-        self.0 >= other.0
-    }
-}
+compared!(Half);
 
 impl Neg for Half {
     type Output = Self;
@@ -299,52 +225,21 @@ macro_rules! vectors {
                 Self { $x: x $(, $part: x)+ }
             }
 
-            /// Magnitudes.
-            #[inline(always)]
-            #[must_use]
-            pub fn abs(self) -> Self {
-                instruction!(
-                    Self,
-                    "OpExtInst typeof*{r} %glsl 4",
-                    [a = self],
-                    Self { $x: a.$x.abs() $(, $part: a.$part.abs())+ }
-                )
-            }
-
-            /// The smaller parts.
-            #[inline(always)]
-            #[must_use]
-            pub fn min(self, other: Self) -> Self {
-                instruction!(
-                    Self,
-                    "OpExtInst typeof*{r} %glsl 37",
-                    [a = self, b = other],
-                    Self { $x: a.$x.min(b.$x) $(, $part: a.$part.min(b.$part))+ }
-                )
-            }
-
-            /// The larger parts.
-            #[inline(always)]
-            #[must_use]
-            pub fn max(self, other: Self) -> Self {
-                instruction!(
-                    Self,
-                    "OpExtInst typeof*{r} %glsl 40",
-                    [a = self, b = other],
-                    Self { $x: a.$x.max(b.$x) $(, $part: a.$part.max(b.$part))+ }
-                )
-            }
-
-            /// `self * factor + summand`, part by part, rounded once or twice.
-            #[inline(always)]
-            #[must_use]
-            pub fn mul_add(self, factor: Self, summand: Self) -> Self {
-                instruction!(
-                    Self,
-                    "OpExtInst typeof*{r} %glsl 50",
-                    [a = self, b = factor, c = summand],
-                    Self { $x: a.$x.mul_add(b.$x, c.$x) $(, $part: a.$part.mul_add(b.$part, c.$part))+ }
-                )
+            functions! {
+                /// Magnitudes.
+                abs(a) = "OpExtInst typeof*{r} %glsl 4", Self { $x: a.$x.abs() $(, $part: a.$part.abs())+ };
+                /// The smaller parts.
+                min(a, other) = "OpExtInst typeof*{r} %glsl 37",
+                    Self { $x: a.$x.min(other.$x) $(, $part: a.$part.min(other.$part))+ };
+                /// The larger parts.
+                max(a, other) = "OpExtInst typeof*{r} %glsl 40",
+                    Self { $x: a.$x.max(other.$x) $(, $part: a.$part.max(other.$part))+ };
+                /// `self * factor + summand`, part by part, rounded once or twice.
+                mul_add(a, factor, summand) = "OpExtInst typeof*{r} %glsl 50",
+                    Self {
+                        $x: a.$x.mul_add(factor.$x, summand.$x)
+                        $(, $part: a.$part.mul_add(factor.$part, summand.$part))+
+                    };
             }
 
             /// The dot product.
