@@ -23,7 +23,7 @@ use hankel_codegen::placement::Placement;
 use hankel_codegen::spirv::words;
 use hankel_codegen::translate::Options;
 use hankel_codegen::{Error, Language, translated};
-use hankel_dsl::native::describe::Kernel;
+use hankel_dsl::native::describe::{ConstantValue, Kernel};
 use hankel_dsl::native::lanes;
 use hankel_host::crates::{KernelCrate, KernelEntry, Native, Package};
 use hankel_host::inputs::{self, Case};
@@ -624,7 +624,7 @@ fn placement(args: &Placed) -> Result<Placement> {
 }
 
 /// `SUFFIX:CONSTANT=VALUE,…`, by the suffix.
-fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, u32>>> {
+fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, ConstantValue>>> {
     const HELP: &str = "Write --variant _NAME:CONSTANT=NUMBER, with a comma between constants; the suffix \
                         has lower-case letters, digits and `_`.";
     /// A name of a file may have 255 bytes.
@@ -653,8 +653,8 @@ fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, u32>>>
 }
 
 /// `CONSTANT=VALUE` pairs; `option` is what stands before them.
-fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, u32>> {
-    const HELP: &str = "Write NAME=NUMBER, once for each constant.";
+fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, ConstantValue>> {
+    const HELP: &str = "Write NAME=VALUE, once for each constant.";
     let mut values = BTreeMap::new();
     for pair in pairs {
         let wrong = |problem: String| Failure::input(format!("{option}{pair}: {problem}"), HELP);
@@ -662,12 +662,7 @@ fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, u32>> {
             .split_once('=')
             .ok_or_else(|| wrong("there is no `=`".into()))?;
         let (name, text) = (name.trim(), text.trim());
-        let value: u32 = text.parse().map_err(|_| {
-            wrong(format!(
-                "a specialisation constant is a whole number from 0 to {}, which `{text}` is not",
-                u32::MAX
-            ))
-        })?;
+        let value: ConstantValue = text.parse().map_err(wrong)?;
         if let Some(before) = values.insert(name.to_owned(), value) {
             return Err(wrong(format!("`{name}` was set to {before} already")));
         }

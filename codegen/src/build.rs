@@ -14,7 +14,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use hankel_dsl::native::describe::{Kernel, Role};
+use hankel_dsl::native::describe::{ConstantValue, Kernel, Role};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -141,6 +141,22 @@ impl Request {
                 known,
             });
         }
+        let all = self.options.constants.iter();
+        let all = all.chain(self.options.variants.values().flatten());
+        for (name, value) in all {
+            for param in chosen.values().flat_map(|kernel| &kernel.params) {
+                if let Role::Constant { scalar, .. } = param.role
+                    && param.name == *name
+                    && value.word(scalar).is_none()
+                {
+                    return Err(Error::ConstantType {
+                        name: name.clone(),
+                        value: value.to_string(),
+                        scalar: scalar.name(),
+                    });
+                }
+            }
+        }
         let mut names: BTreeSet<String> = chosen.keys().map(|&name| name.to_owned()).collect();
         for (suffix, values) in &self.options.variants {
             let fail = |problem: String| Error::Variant {
@@ -243,7 +259,7 @@ pub(crate) struct Variant {
     pub set: u32,
 }
 
-fn has_all(kernel: &Kernel, values: &BTreeMap<String, u32>) -> bool {
+fn has_all(kernel: &Kernel, values: &BTreeMap<String, ConstantValue>) -> bool {
     values
         .keys()
         .all(|name| constants(kernel).any(|constant| constant == name))
@@ -540,12 +556,14 @@ fn one(
     })
 }
 
-fn defaults(kernel: &Kernel) -> BTreeMap<String, u32> {
+fn defaults(kernel: &Kernel) -> BTreeMap<String, ConstantValue> {
     kernel
         .params
         .iter()
         .filter_map(|param| match param.role {
-            Role::Constant { default, .. } => Some((param.name.clone(), default)),
+            Role::Constant {
+                scalar, default, ..
+            } => Some((param.name.clone(), ConstantValue::of_word(scalar, default))),
             _ => None,
         })
         .collect()

@@ -218,6 +218,16 @@ pub enum Error {
         /// What there is.
         known: Vec<String>,
     },
+    /// A specialisation constant's value is not of its type.
+    #[error("constant `{name}` is a `{scalar}`, which `{value}` is not")]
+    ConstantType {
+        /// The constant.
+        name: String,
+        /// What was given.
+        value: String,
+        /// Its type.
+        scalar: &'static str,
+    },
     /// A variant that cannot be made.
     #[error("variant `{suffix}`: {problem}")]
     Variant {
@@ -439,6 +449,9 @@ impl Error {
             Self::Variant { .. } => "Choose another suffix, or constants of one kernel: \
                  `hankel list --bindings` shows them."
                 .into(),
+            Self::ConstantType { .. } => {
+                "Give a whole number for `u32` and `i32`, a number for `f32`, `true` or `false` for `bool`.".into()
+            }
             Self::UnknownConstant { .. } => "Give the constant's name in the kernel.".into(),
             Self::Function(_) => {
                 "Write it in the part of Rust that `#[function]`'s documentation names.".into()
@@ -461,6 +474,12 @@ impl Error {
     }
 }
 
+/// Whether spirv-val's words are about textures or samplers that are values.
+fn is_of_textures(failure: &Failure) -> bool {
+    let construct = failure.construct.as_deref().unwrap_or_default();
+    construct.contains("_ptr_UniformConstant") || failure.message.contains("OpTypeImage-06924")
+}
+
 impl Failure {
     /// What the user can do about it.
     pub fn advice(&self) -> String {
@@ -475,6 +494,10 @@ impl Failure {
                  `--msl-slot-base`, `--glsl-binding-base`)."
             }
             Step::Read => "The file is damaged or no SPIR-V: make it again.",
+            Step::Validate if is_of_textures(self) => {
+                "A texture or sampler cannot be chosen while the kernel runs, nor kept in an array or a variable: \
+                 read from each, and choose between what was read."
+            }
             Step::Validate if self.message.contains("capability") => {
                 "The module uses something whose capability rust-gpu was not told of; keep to what \
                  the DSL offers."

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use hankel_dsl::native::describe::{Kernel, Role, Rounding};
+use hankel_dsl::native::describe::{ConstantValue, Kernel, Role, Rounding};
 use rspirv::dr::Module;
 use spirv_tools::TargetEnv;
 use spirv_tools::opt::{Optimizer, Passes};
@@ -13,8 +13,9 @@ use crate::cost::{self, Cost};
 use crate::error::{Failure, Step, guarded};
 use crate::spirv::uniform::{Group, Memory};
 use crate::spirv::{
-    self, bounds, branches, canonical, exact, halves, holders, interface, libm, names, narrow,
-    offsets, order, parts, references, refused, split, tables, trim, undefined, uniform, widths,
+    self, bounds, branches, canonical, constants, empty, exact, halves, holders, interface, libm,
+    names, narrow, offsets, order, parts, references, refused, split, tables, trim, undefined,
+    uniform, widths,
 };
 use crate::translate::reading;
 
@@ -112,13 +113,15 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
         exact::keep(&mut module);
     }
     undefined::fill(&mut module);
+    constants::retype(&mut module, kernel);
+    empty::fill(&mut module);
     interface::apply(&mut module, kernel);
     trim::debug(&mut module);
     trim::capabilities(&mut module);
     trim::memory_model(&mut module);
     trim::accesses_of_textures(&mut module);
     reading::coordinate_types(&mut module);
-    reading::subgroup_operands(&mut module);
+    reading::late_operands(&mut module);
     split::apply(&mut module, kernel);
     names::apply(&mut module, kernel)?;
     let words = spirv::store(&module);
@@ -139,13 +142,16 @@ pub fn finish(raw: &[u8], kernel: &Kernel) -> Result<Finished, Failure> {
 pub fn freeze(
     spirv: &[u8],
     kernel: &Kernel,
-    values: &BTreeMap<String, u32>,
+    values: &BTreeMap<String, ConstantValue>,
 ) -> Result<Finished, Failure> {
     let name = kernel.name.as_str();
     let mut module = spirv::load(&spirv::words(spirv, name)?, name)?;
     for param in &kernel.params {
-        if let (Role::Constant { id, .. }, Some(value)) = (&param.role, values.get(&param.name)) {
-            spirv::freeze_constant(&mut module, *id, *value);
+        if let (Role::Constant { id, scalar, .. }, Some(value)) =
+            (&param.role, values.get(&param.name))
+            && let Some(word) = value.word(*scalar)
+        {
+            spirv::freeze_constant(&mut module, *id, word);
         }
     }
     finish(&spirv::bytes(&spirv::store(&module)), kernel)

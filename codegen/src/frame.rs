@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hankel_dsl::native::describe::{self, Kernel, Stage, Type};
+use hankel_dsl::native::describe::{self, ConstantValue, Kernel, Role, Stage, Type};
 use rspirv::dr::Operand;
 use rspirv::spirv::{Decoration, Op};
 use schemars::JsonSchema;
@@ -727,7 +727,17 @@ fn jobs(request: &Request, draft: &Draft) -> Result<Vec<Variant>> {
         let mut options = request.options.clone();
         options.variants.clear();
         options.open_constants = false;
-        options.constants = frozen.constants.clone();
+        options.constants = of
+            .params
+            .iter()
+            .filter_map(|param| match param.role {
+                Role::Constant { scalar, .. } => {
+                    let word = *frozen.constants.get(&param.name)?;
+                    Some((param.name.clone(), ConstantValue::of_word(scalar, word)))
+                }
+                _ => None,
+            })
+            .collect();
         options.placement = options.placement.of_copy(&of.name, name);
         let is_fragment = of.stage == Stage::Fragment;
         if is_fragment {

@@ -5,7 +5,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hankel_dsl::native::describe::{self, Kernel, Output, Role, SamplerKind, Stage};
+use hankel_dsl::native::describe::{
+    self, ConstantValue, Kernel, Output, Role, SamplerKind, Scalar, Stage,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -85,14 +87,16 @@ pub struct WriteOptions {
     /// Metal's version.
     pub msl_version: String,
     /// Specialisation constants that were given a value for good.
-    pub constants: BTreeMap<String, u32>,
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub constants: BTreeMap<String, ConstantValue>,
     /// The others stay open in HLSL, GLSL and MSL, too.
     #[serde(skip_serializing_if = "core::ops::Not::not", default)]
     pub open_constants: bool,
     /// Kernels that were written once more with constants fixed: by the end of the copy's name, the
     /// constants' values.
     #[serde(skip_serializing_if = "BTreeMap::is_empty", default)]
-    pub variants: BTreeMap<String, BTreeMap<String, u32>>,
+    #[schemars(with = "BTreeMap<String, BTreeMap<String, serde_json::Value>>")]
+    pub variants: BTreeMap<String, BTreeMap<String, ConstantValue>>,
     /// Where bindings are, if not where they are by default.
     #[serde(skip_serializing_if = "Placement::is_default", default)]
     pub placement: Placement,
@@ -411,15 +415,33 @@ pub struct Constant {
     pub name: String,
     /// `SpecId` in SPIR-V, `@id` in WGSL, `function_constant` in MSL.
     pub id: u32,
+    /// Its type: `u32`, `i32`, `f32` or `bool`.
+    #[serde(
+        rename = "type",
+        default = "unsigned",
+        skip_serializing_if = "is_unsigned"
+    )]
+    pub scalar: String,
     /// The value unless specialised.
-    pub default: u32,
+    #[schemars(with = "serde_json::Value")]
+    pub default: ConstantValue,
     /// Languages whose file lets it be specialised; the others have a value in it.
     pub overridable_in: Vec<Language>,
     /// The value in the others.
-    pub value: u32,
+    #[schemars(with = "serde_json::Value")]
+    pub value: ConstantValue,
     /// HLSL and GLSL: the macro whose value it has there, if whoever includes the text defines it.
     #[serde(rename = "macro", skip_serializing_if = "Option::is_none", default)]
     pub macro_name: Option<String>,
+}
+
+/// The type of most constants, which entries do not name.
+fn unsigned() -> String {
+    Scalar::U32.name().into()
+}
+
+fn is_unsigned(name: &str) -> bool {
+    name == Scalar::U32.name()
 }
 
 /// The macro that a text in HLSL or GLSL takes a constant from.
@@ -645,11 +667,22 @@ impl Constant {
 
 fn constants(kernel: &Kernel, options: &Options) -> Vec<Constant> {
     let constant = |param: &describe::Param| match param.role {
-        Role::Constant { id, default } => {
-            let frozen = options.constants.get(&param.name).copied();
+        Role::Constant {
+            id,
+            scalar,
+            default,
+        } => {
+            // As the type has it: 2 of a float is 2.0.
+            let frozen = options
+                .constants
+                .get(&param.name)
+                .and_then(|value| value.word(scalar))
+                .map(|word| ConstantValue::of_word(scalar, word));
+            let default = ConstantValue::of_word(scalar, default);
             Some(Constant {
                 name: param.name.clone(),
                 id,
+                scalar: scalar.name().into(),
                 default,
                 overridable_in: match frozen {
                     Some(_) => Vec::new(),

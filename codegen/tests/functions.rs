@@ -6,6 +6,7 @@
     reason = "the functions are what is translated, as somebody may write them"
 )]
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
@@ -15,8 +16,8 @@ use hankel_codegen::functions::ir::Library;
 use hankel_codegen::functions::print::Naming;
 use hankel_codegen::functions::source::CrateText;
 use hankel_codegen::functions::{FORMS, Refusal, read};
-use hankel_dsl::glam::{UVec2, Vec2, Vec3};
-use hankel_dsl::{Real, array_element, array_element_mut, function, lit, to_i32, unroll};
+use hankel_dsl::glam::{UVec2, UVec4, Vec2, Vec3, Vec3Swizzles};
+use hankel_dsl::{Real, array_element, array_element_mut, function, lit, math, to_i32, unroll};
 
 /// A crate of one file.
 fn krate(text: &str) -> CrateText {
@@ -175,6 +176,77 @@ both! {
         size * sign + kind as f32
     }
 
+    /// Loops with `for`: over what is known and what is not, left and continued, within each other.
+    #[function]
+    pub fn counted(x: f32, turns: u32) -> f32 {
+        const WEIGHTS: [f32; 6] = [0.5, 0.25, 0.125, 0.0625, 0.03125, 0.03125];
+        let mut sum = 0.0;
+        for (i, weight) in WEIGHTS.iter().enumerate() {
+            sum += (x + i as f32) * weight;
+        }
+        for row in -3..=3 {
+            if row == 0 {
+                continue;
+            }
+            for i in 0..turns & 7 {
+                sum = sum * 0.5 + (row * 2) as f32;
+                if sum > 4.0 {
+                    break;
+                }
+                sum -= i as f32;
+            }
+        }
+        let mut steps = 0;
+        for _ in 0..20 {
+            if sum * sum < 2.0 {
+                break;
+            } else {
+                sum *= 0.5;
+            }
+            steps += 1;
+        }
+        sum + steps as f32
+    }
+
+    /// Ends before the last line, and numbers that are told apart.
+    #[function]
+    pub fn ended(x: f32, kind: u32) -> f32 {
+        if !(x.abs() < 1e6) {
+            return -1.0;
+        }
+        let scale = match kind & 15 {
+            0 => 1.0,
+            1 | 2 => x,
+            3..=5 => {
+                if x < 0.0 {
+                    return x * 0.25;
+                }
+                x + 1.0
+            }
+            n if n > 12 => n as f32,
+            _ => 0.5,
+        };
+        let mut y = x * scale;
+        if y > 1.0 {
+            y -= 1.0;
+            if y > 1.0 {
+                return 1.0;
+            }
+        } else if y < -1.0 {
+            return y + scale;
+        }
+        y * y
+    }
+
+    /// Conversions, and components in another order.
+    #[function]
+    pub fn converted(x0: f32, word: u32) -> UVec4 {
+        let v = Vec3::new(x0, x0 * 1e10, -x0).zyx();
+        let whole = (x0 * 3.5) as i32;
+        let far = v.as_uvec3();
+        UVec4::new(v.y as u32, whole as u32, far.x ^ far.z, u32::from(x0 < 0.5) + (word < 7) as u32)
+    }
+
     /// Bits and whole numbers.
     #[function]
     pub fn bits(word: u32, x: f32) -> UVec2 {
@@ -203,7 +275,7 @@ both! {
 }
 
 const LIBRARY: &str = "\nhankel_dsl::library!(sample { api: 1, functions: [order, parts, loops, \
-                       branches, bits, reserved, calls] });";
+                       branches, bits, reserved, calls, counted, ended, converted] });";
 
 /// Values that tell operations apart.
 fn values() -> Vec<f32> {
@@ -237,6 +309,12 @@ fn natively() -> String {
                 bits_function(b, y).y,
                 bits(reserved(x, y)),
                 bits(calls(x, y)),
+                bits(counted(x, b)),
+                bits(ended(x, b)),
+                converted(x, b).x,
+                converted(x, b).y,
+                converted(x, b).z,
+                converted(x, b).w,
             ];
             lines.push(all.map(|w| format!("{w:08x}")).join(" "));
         }
@@ -297,9 +375,11 @@ fn c_and_rust_mean_what_the_source_means() {
          \x20       uint32_t b = hankel_bits_of(x) ^ (k << 7 | k >> 25);\n\
          \x20       hankel_float2 p = hankel_parts(hankel_make_float3(x, y, z), y);\n\
          \x20       hankel_uint2 q = hankel_bits(b, y);\n\
-         \x20       printf(\"%08x %08x %08x %08x %08x %08x %08x %08x %08x\\n\", of(hankel_order(x, y, z)),\n\
+         \x20       hankel_uint4 r = hankel_converted(x, b);\n\
+         \x20       printf(\"%08x %08x %08x %08x %08x %08x %08x %08x %08x %08x %08x %08x %08x %08x %08x\\n\", of(hankel_order(x, y, z)),\n\
          \x20           of(p.x), of(p.y), of(hankel_loops(x, b)), of(hankel_branches(x, y)), q.x, q.y,\n\
-         \x20           of(hankel_reserved(x, y)), of(hankel_calls(x, y)));\n    }}\n    return 0;\n}}\n",
+         \x20           of(hankel_reserved(x, y)), of(hankel_calls(x, y)),\n\
+         \x20           of(hankel_counted(x, b)), of(hankel_ended(x, b)), r.x, r.y, r.z, r.w);\n    }}\n    return 0;\n}}\n",
         list("f")
     );
     std::fs::write(at("program.c"), program).unwrap();
@@ -325,7 +405,9 @@ fn c_and_rust_mean_what_the_source_means() {
          \x20           let b = x.to_bits() ^ y.to_bits().rotate_left(7);\n\
          \x20           let (p, q) = (parts([x, y, z], y), bits(b, y));\n\
          \x20           let all = [of(order(x, y, z)), of(p[0]), of(p[1]), of(loops(x, b)),\n\
-         \x20               of(branches(x, y)), q[0], q[1], of(reserved(x, y)), of(calls(x, y))];\n\
+         \x20               of(branches(x, y)), q[0], q[1], of(reserved(x, y)), of(calls(x, y)),\n\
+         \x20               of(counted(x, b)), of(ended(x, b)), converted(x, b)[0], converted(x, b)[1],\n\
+         \x20               converted(x, b)[2], converted(x, b)[3]];\n\
          \x20           println!(\"{{}}\", all.map(|w| format!(\"{{w:08x}}\")).join(\" \"));\n\
          \x20       }}\n    }}\n}}\n",
         list("_f32")
@@ -346,11 +428,6 @@ fn what_has_no_form_is_refused_with_its_place() {
             "floor",
         ),
         (
-            "pub fn f(x: f32) -> u32 {\n    x as u32\n}",
-            "src/lib.rs:3:5",
-            "to_i32",
-        ),
-        (
             "pub fn f(x: u32) -> f32 {\n    let a = [1.0_f32, 2.0];\n    a[x as usize]\n}",
             "src/lib.rs:4:7",
             "usize",
@@ -366,14 +443,29 @@ fn what_has_no_form_is_refused_with_its_place() {
             "f64",
         ),
         (
-            "pub fn f(x: f32) -> f32 {\n    for i in 0..3 {}\n    x\n}",
-            "src/lib.rs:3:5",
-            "while",
+            "pub fn f(x: f32) -> f32 {\n    for i in (0..3).chain(5..6) {}\n    x\n}",
+            "src/lib.rs:3:15",
+            "a range",
         ),
         (
-            "pub fn f(x: f32) -> f32 {\n    if x < 1.0 {\n        return 2.0;\n    }\n    x\n}",
+            "pub fn f(x: f32, n: u32) -> f32 {\n    for i in 0..n {\n        if x < i as f32 {\n            return 2.0;\n        }\n    }\n    x\n}",
+            "src/lib.rs:4:9",
+            "break",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    loop {\n        if x < 1.0 {\n            break;\n        }\n    }\n    x\n}",
             "src/lib.rs:3:5",
-            "return",
+            "for i in",
+        ),
+        (
+            "pub fn f(x: f32) -> f32 {\n    match x {\n        _ if x < 1.0 => 2.0,\n        y @ _ => y,\n    }\n}",
+            "src/lib.rs:5:9",
+            "pattern",
+        ),
+        (
+            "pub fn f(x: Half) -> f32 {\n    0.0\n}\npub struct Half(f32);",
+            "src/lib.rs:2:13",
+            "no names",
         ),
         (
             "pub fn f(x: f32) -> f32 {\n    helper(x)\n}\nfn helper(x: f32) -> f32 {\n    helper(x)\n}",
@@ -404,11 +496,6 @@ fn what_has_no_form_is_refused_with_its_place() {
             "pub fn f(x: f32) -> f32 {\n    let mut y = x;\n    while y < 1.0 {\n        y += 1.0;\n    }\n    y\n}",
             "src/lib.rs:4:5",
             "counts",
-        ),
-        (
-            "pub fn f(b1: f32) -> f32 {\n    b1\n}",
-            "src/lib.rs:2:10",
-            "digit",
         ),
         (
             "pub fn f(x: f32) -> f32 {\n    dbg!(x)\n}",
@@ -716,4 +803,134 @@ fn self_is_the_type_with_its_parameters() {
     .expect("it is translated");
     let glsl = text(&libraries, "glsl");
     assert!(glsl.contains("x * 2.0 * 3.0"), "{glsl}");
+}
+
+/// The sources of a crate of this repository.
+fn crate_of(name: &str, folder: &Path) -> CrateText {
+    fn read_into(folder: &Path, at: &str, files: &mut BTreeMap<String, String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = format!("{at}/{}", path.file_name().unwrap().to_string_lossy());
+            if path.is_dir() {
+                read_into(&path, &name, files);
+            } else if name.ends_with(".rs") {
+                files.insert(name, std::fs::read_to_string(&path).unwrap());
+            }
+        }
+    }
+    let mut files = BTreeMap::new();
+    read_into(&folder.join("src"), "src", &mut files);
+    CrateText {
+        name: name.into(),
+        files,
+        ..CrateText::default()
+    }
+}
+
+/// Every elementary function of the DSL is in libraries, and means there what it means here.
+#[test]
+fn elementary_functions_mean_what_they_mean_here() {
+    macro_rules! functions {
+        ($($name:ident)*; $($pair:ident)*; $($device:ident)*; $($of_two:ident)*) => {
+            const NAMES: &[&str] = &[$(stringify!($name)),*];
+            const PAIRS: &[&str] = &[$(stringify!($pair)),*];
+            const DEVICE: &[&str] = &[$(stringify!($device)),*];
+            const DEVICE_PAIRS: &[&str] = &[$(stringify!($of_two)),*];
+            fn here(x: f32, y: f32) -> Vec<f32> {
+                vec![
+                    $(math::$name(x),)* $(math::$pair(x, y),)*
+                    $(math::native::$device(x),)* $(math::native::$of_two(x, y),)*
+                ]
+            }
+        };
+    }
+    functions!(
+        sin cos tan asin acos atan sinh cosh tanh exp exp2 exp_m1 ln ln_1p log2 cbrt floor ceil
+        trunc round fract sign;
+        pow atan2 step;
+        sin cos tan asin acos atan exp exp2 ln log2;
+        pow atan2
+    );
+    let mut source = String::new();
+    let mut calls = Vec::new();
+    for (module, prefix, one, two) in [
+        ("math", "of", NAMES, PAIRS),
+        ("math::native", "native", DEVICE, DEVICE_PAIRS),
+    ] {
+        for name in one {
+            source += &format!(
+                "/// Itself.\n#[function]\npub fn {prefix}_{name}(x: f32) -> f32 {{ {module}::{name}(x) }}\n"
+            );
+            calls.push((format!("{prefix}_{name}"), false));
+        }
+        for name in two {
+            source += &format!(
+                "/// Itself.\n#[function]\npub fn {prefix}_{name}(x: f32, y: f32) -> f32 {{ {module}::{name}(x, y) }}\n"
+            );
+            calls.push((format!("{prefix}_{name}"), true));
+        }
+    }
+    let names: Vec<&str> = calls.iter().map(|(name, _)| name.as_str()).collect();
+    let source = format!(
+        "use hankel_dsl::{{function, math}};\n{source}hankel_dsl::library!(sample {{ api: 1, functions: [{}] }});",
+        names.join(", ")
+    );
+    let dsl = Path::new(env!("CARGO_MANIFEST_DIR")).join("../kernels/dsl");
+    let libraries =
+        read(&[krate(&source), crate_of("hankel_dsl", &dsl)]).unwrap_or_else(|e| panic!("{e}"));
+    let lines = |of: &dyn Fn(f32, f32) -> Vec<f32>| {
+        let mut lines = Vec::new();
+        for x in values() {
+            for y in values() {
+                let words = of(x, y).into_iter().map(|v| format!("{:08x}", v.to_bits()));
+                lines.push(words.collect::<Vec<_>>().join(" "));
+            }
+        }
+        lines.join("\n")
+    };
+    let expected = lines(&here);
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let list = |suffix: &str| {
+        let all: Vec<String> = values().iter().map(|v| format!("{v:?}{suffix}")).collect();
+        all.join(", ")
+    };
+    std::fs::write(at("hankel_sample.h"), text(&libraries, "c")).unwrap();
+    let printed: Vec<String> = calls
+        .iter()
+        .map(|(name, of_two)| {
+            let args = if *of_two { "v[i], v[j]" } else { "v[i]" };
+            let space = if *name == calls[0].0 { "" } else { " " };
+            format!("printf(\"{space}%08x\", hankel_bits_of(hankel_{name}({args})));")
+        })
+        .collect();
+    let program = format!(
+        "#include \"hankel_sample.h\"\n#include <stdio.h>\nint main(void) {{\n    const float v[] = {{ {} }};\n    \
+         const int n = sizeof v / sizeof *v;\n    for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) {{\n        {}\n        \
+         printf(\"\\n\");\n    }}\n    return 0;\n}}\n",
+        list("f"),
+        printed.join("\n        ")
+    );
+    std::fs::write(at("program.c"), program).unwrap();
+    let mut cc = Command::new("cc");
+    cc.args(["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-o"]);
+    run(cc.args([at("c"), at("program.c")]).arg("-lm"));
+    same("C", &run(&mut Command::new(at("c"))), &expected);
+
+    std::fs::write(at("hankel_sample.rs"), text(&libraries, "rust")).unwrap();
+    let written: Vec<String> = calls
+        .iter()
+        .map(|(name, of_two)| format!("{name}({})", if *of_two { "x, y" } else { "x" }))
+        .collect();
+    let program = format!(
+        "mod hankel_sample;\nuse hankel_sample::*;\nfn main() {{\n    let v = [{}];\n    for x in v {{\n        for y in v {{\n            \
+         let all = [{}];\n            println!(\"{{}}\", all.map(|w| format!(\"{{:08x}}\", w.to_bits())).join(\" \"));\n        }}\n    }}\n}}\n",
+        list("_f32"),
+        written.join(", ")
+    );
+    std::fs::write(at("program.rs"), program).unwrap();
+    let mut rustc = Command::new("rustc");
+    rustc.args(["--edition", "2024", "-O", "-A", "dead_code", "-o"]);
+    run(rustc.args([at("rust"), at("program.rs")]));
+    same("Rust", &run(&mut Command::new(at("rust"))), &expected);
 }

@@ -178,7 +178,7 @@ fn constants_stay_overridable_where_the_language_can() {
     assert_eq!(constant.overridable_in, [Language::Spirv, Language::Wgsl]);
     // Frozen, it is a value everywhere.
     let mut request = support::request();
-    request.options.constants.insert("taps".into(), 5);
+    request.options.constants.insert("taps".into(), 5.into());
     let generated = generate(&request, &support::modules()).unwrap();
     for file in [
         "wgsl/resample.wgsl",
@@ -193,7 +193,7 @@ fn constants_stay_overridable_where_the_language_can() {
             .overridable_in
             .is_empty()
     );
-    request.options.constants.insert("tips".into(), 5);
+    request.options.constants.insert("tips".into(), 5.into());
     let error = generate(&request, &support::modules()).unwrap_err();
     assert!(
         error.to_string().contains("`tips`") && error.to_string().contains("taps"),

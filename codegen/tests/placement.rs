@@ -12,6 +12,7 @@ use hankel_codegen::check::{Budget, check};
 use hankel_codegen::manifest::{Manifest, StageName};
 use hankel_codegen::placement::Placement;
 use hankel_codegen::{Error, Language, Step};
+use hankel_dsl::native::describe::ConstantValue;
 use rspirv::dr::Operand;
 use rspirv::spirv::{Decoration, Op};
 
@@ -519,7 +520,7 @@ fn constants_stay_open_if_that_is_asked_for() {
     assert!(msl.contains(declared), "{msl}");
     assert_eq!(msl.matches("3u").count(), 1, "{msl}");
     // With a value it is a value.
-    request.options.constants.insert("taps".into(), 5);
+    request.options.constants.insert("taps".into(), 5.into());
     let generated = generate(&request, &support::modules()).unwrap();
     let hlsl = text(&generated, "hlsl/resample.hlsl");
     assert!(hlsl.contains("* 5") && !hlsl.contains("taps"), "{hlsl}");
@@ -530,7 +531,7 @@ fn constants_stay_open_if_that_is_asked_for() {
 #[test]
 fn variants_live_beside_their_kernel() {
     let mut request = support::request();
-    let values: BTreeMap<String, u32> = [("taps".into(), 5)].into();
+    let values: BTreeMap<String, ConstantValue> = [("taps".into(), 5.into())].into();
     request
         .options
         .variants
@@ -572,7 +573,7 @@ fn variants_live_beside_their_kernel() {
         };
         assert_eq!(file.entry_point, expected);
     }
-    assert_eq!(entry.constants[0].value, 5);
+    assert_eq!(entry.constants[0].value, 5.into());
     let c = text(&generated, "include/hankel.h");
     assert!(c.contains("HANKEL_RESAMPLE_WIDE_HLSL_FILE \"hlsl/resample_wide.hlsl\""));
     // From finished modules, which have the kernel's own name, the same.
@@ -585,7 +586,7 @@ fn variants_live_beside_their_kernel() {
 
     let error = |suffix: &str, constant: &str| {
         let mut request = support::request();
-        let values = [(constant.to_owned(), 1)].into();
+        let values = [(constant.to_owned(), 1.into())].into();
         request.options.variants.insert(suffix.into(), values);
         generate(&request, &support::modules())
             .unwrap_err()

@@ -299,13 +299,15 @@ impl Table {
         let mut arguments = Vec::new();
         let mut elements: Vec<(&str, usize, Leaf)> = Vec::new();
         let mut uniforms: Vec<(&Param, usize, Leaf)> = Vec::new();
-        let mut constants: Vec<(&str, u32)> = Vec::new();
+        let mut constants: Vec<(&str, Scalar, u32)> = Vec::new();
         for param in &kernel.params {
             let (layout, is_element) = match &param.role {
                 Role::Element { layout, .. } => (layout, true),
                 Role::Uniform { layout, .. } => (layout, false),
-                Role::Constant { default, .. } => {
-                    constants.push((&param.name, *default));
+                Role::Constant {
+                    default, scalar, ..
+                } => {
+                    constants.push((&param.name, *scalar, *default));
                     continue;
                 }
                 Role::Index => continue,
@@ -369,12 +371,12 @@ impl Table {
                 place: Place::Uniform(*index, leaf.offset),
             })
             .collect();
-        for (i, (name, default)) in constants.into_iter().enumerate() {
+        for (i, (name, scalar, default)) in constants.into_iter().enumerate() {
             settings.push(Setting {
                 name: name.into(),
                 full: name.into(),
-                scalar: Scalar::U32,
-                default: Number::U32(default),
+                scalar,
+                default: Number::read(scalar, &default.to_le_bytes()),
                 summary: String::new(),
                 place: Place::Constant(i),
             });
@@ -424,9 +426,11 @@ impl Table {
                 (Place::Uniform(argument, offset), _) => {
                     value.write(&mut bytes[argument][offset..]);
                 }
-                // Constants are u32.
-                (Place::Constant(_), Number::U32(n)) => constants.push(n),
-                (Place::Constant(_), _) => {}
+                (Place::Constant(_), _) => {
+                    let mut word = [0; 4];
+                    value.write(&mut word);
+                    constants.push(u32::from_le_bytes(word));
+                }
             }
         }
         Ok((bytes, constants))

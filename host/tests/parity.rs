@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use hankel_dsl::native::describe::{Domain, Kernel, Length, Role, Rounding};
+use hankel_dsl::native::describe::{Domain, Kernel, Length, Role, Rounding, Scalar};
 use hankel_dsl::native::inputs::{Given, Request};
 use hankel_dsl::native::{Arg, CallError, Mode};
 use hankel_host::crates::KernelEntry;
@@ -352,7 +352,11 @@ fn lengths_and_constants_are_what_their_attributes_say() {
         plus: 1,
     });
     kernel.params.push(table);
-    let way = Role::Constant { id: 0, default: 2 };
+    let way = Role::Constant {
+        id: 0,
+        scalar: Scalar::U32,
+        default: 2,
+    };
     let mut way = param("way", way);
     way.inputs.domain = Some(Domain::Values {
         values: vec![0.0, 1.0, 2.0],

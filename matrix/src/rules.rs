@@ -1,5 +1,6 @@
 //! What each column may differ by, and what it cannot take.
 
+use hankel_codegen::translate::refused_by_naga;
 use hankel_dsl::native::describe::{Kernel, Scalar, Tolerance};
 use hankel_host::device::slots::{self, Use};
 use hankel_host::flat;
@@ -32,6 +33,10 @@ pub fn of(kernel: &Kernel, column: Column, flushes: bool, flushed_reference: boo
 /// What a column's compiler is known to lack that `kernel`, whose text is `code`, needs.
 #[must_use]
 pub fn lacking(kernel: &Kernel, column: Column, code: &[u8]) -> Option<String> {
+    if column == Column::SpirvNaga {
+        let what = refused_by_naga(code)?;
+        return Some(format!("{what} (naga does not read them from SPIR-V)"));
+    }
     if column != Column::HlslGlslang {
         return None;
     }

@@ -2,7 +2,8 @@ use hankel_codegen::Language;
 use hankel_codegen::manifest::KernelEntry;
 use hankel_codegen::translate::Options;
 use hankel_dsl::native::describe::{
-    BuiltIn, Interpolation, Kernel, Output, Precision, Role, Rounding, SamplerKind, Stage, Type,
+    BuiltIn, ConstantValue, Interpolation, Kernel, Output, Precision, Role, Rounding, SamplerKind,
+    Stage, Type,
 };
 
 use crate::args::{Format, List};
@@ -167,7 +168,15 @@ fn bindings(kernel: &Kernel) {
                 };
                 format!("binding {binding}: sampler{does}")
             }
-            Role::Constant { id, default } => format!("constant {id}, default {default}"),
+            Role::Constant {
+                id,
+                scalar,
+                default,
+            } => format!(
+                "constant {id}, {}, default {}",
+                scalar.name(),
+                ConstantValue::of_word(*scalar, *default)
+            ),
             Role::Attribute { location, ty } => format!("attribute {location}: {}", spell(ty)),
             Role::Varying {
                 location,

@@ -57,10 +57,20 @@ fn file_name<'de, D: Deserializer<'de>>(from: D) -> Result<String, D::Error> {
 }
 
 /// What messages are known: words that they contain, and what to write instead.
-const KNOWN: [(&[&str], &str); 27] = [
+const KNOWN: [(&[&str], &str); 29] = [
     (
         &["memset invalid on bool pattern"],
         "an array of one truth value, `[false; N]`, cannot be made: write `[0_u32; N]`, or keep them as the bits of a `u32`",
+    ),
+    (
+        &["unsupported unsized"],
+        "a constant that is a slice, `const T: &[f32] = &[…]`, and of which rust-gpu tells no line: write an array, \
+         `const T: [f32; 3] = […]`, and `for x in T`, or `&T`",
+    ),
+    (
+        &["`const_data_from_alloc` result"],
+        "an enum whose first variant holds less than another one: first the variant that holds most, \
+         `enum Light { Spot { at: Vec3, toward: Vec3 }, Point { at: Vec3 } }`",
     ),
     (
         &["cannot offset a pointer"],

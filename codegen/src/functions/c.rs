@@ -176,6 +176,7 @@ impl Dialect for C<'_> {
             Builtin::ToI32 => cast("int32_t"),
             Builtin::BitsOf => called(&self.own("bits_of"), args),
             Builtin::FromBits => called(&self.own("from_bits"), args),
+            Builtin::Native(native) => called(&format!("{}f", native.name()), args),
         }
     }
 

@@ -2,7 +2,7 @@
 //! with `highp` at every float, so that a host's `precision mediump float;` changes nothing; and the
 //! same as an include file of Godot 4. Where the version has the word, locals are `precise`.
 
-use super::ir::{Builtin, Function, Id, Library, Literal, Scalar, Signature, Type};
+use super::ir::{Builtin, Function, Id, Library, Literal, Native, Scalar, Signature, Type};
 use super::print::{
     Dialect, Naming, Piece, atom, called, choice, components, digits, documented, function,
     members, provenance, rounds, signed,
@@ -151,6 +151,8 @@ impl Dialect for Glsl<'_> {
             Builtin::ToI32 => "int",
             Builtin::BitsOf => "floatBitsToUint",
             Builtin::FromBits => "uintBitsToFloat",
+            Builtin::Native(Native::Atan2) => "atan",
+            Builtin::Native(native) => native.name(),
         };
         called(name, args)
     }

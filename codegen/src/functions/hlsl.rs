@@ -87,6 +87,7 @@ impl Dialect for Hlsl<'_> {
             Builtin::ToI32 => "int",
             Builtin::BitsOf => "asuint",
             Builtin::FromBits => "asfloat",
+            Builtin::Native(native) => native.name(),
         };
         called(name, args)
     }

@@ -214,6 +214,76 @@ pub enum Builtin {
     BitsOf,
     /// The float that has these bits.
     FromBits,
+    /// A function of the device's own, of floats.
+    Native(Native),
+}
+
+/// The device's own functions, as exact as each language says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Native {
+    /// Sine.
+    Sin,
+    /// Cosine.
+    Cos,
+    /// Tangent.
+    Tan,
+    /// Arc sine.
+    Asin,
+    /// Arc cosine.
+    Acos,
+    /// Arc tangent.
+    Atan,
+    /// The angle of an ordinate and an abscissa.
+    Atan2,
+    /// The power of e.
+    Exp,
+    /// The power of 2.
+    Exp2,
+    /// Natural logarithm.
+    Ln,
+    /// Logarithm to base 2.
+    Log2,
+    /// A power.
+    Pow,
+}
+
+impl Native {
+    /// By its name in `hankel_dsl::math::native`.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "sin" => Self::Sin,
+            "cos" => Self::Cos,
+            "tan" => Self::Tan,
+            "asin" => Self::Asin,
+            "acos" => Self::Acos,
+            "atan" => Self::Atan,
+            "atan2" => Self::Atan2,
+            "exp" => Self::Exp,
+            "exp2" => Self::Exp2,
+            "ln" => Self::Ln,
+            "log2" => Self::Log2,
+            "pow" => Self::Pow,
+            _ => return None,
+        })
+    }
+
+    /// Its name in most shading languages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sin => "sin",
+            Self::Cos => "cos",
+            Self::Tan => "tan",
+            Self::Asin => "asin",
+            Self::Acos => "acos",
+            Self::Atan => "atan",
+            Self::Atan2 => "atan2",
+            Self::Exp => "exp",
+            Self::Exp2 => "exp2",
+            Self::Ln => "log",
+            Self::Log2 => "log2",
+            Self::Pow => "pow",
+        }
+    }
 }
 
 /// A statement.
@@ -231,8 +301,19 @@ pub enum Stmt {
     If(Expr, Vec<Stmt>, Vec<Stmt>),
     /// Counts the local, an `i32` or `u32`, from the first number to below the second.
     For(Id, Expr, Expr, Vec<Stmt>),
+    /// Leaves the innermost loop, or its turn; only the last statement of a block.
+    Leave(Leave),
     /// Ends the function; only its last statement.
     Return(Expr),
+}
+
+/// What a statement leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leave {
+    /// The loop: `break`.
+    Loop,
+    /// Its turn: `continue`.
+    Turn,
 }
 
 /// A local or parameter.
@@ -390,7 +471,7 @@ pub fn replace(e: &Expr, with: &dyn Fn(&Expr) -> Option<Expr>) -> Expr {
 pub fn expressions(body: &[Stmt], with: &mut dyn FnMut(&Expr)) {
     for stmt in body {
         match stmt {
-            Stmt::Comment(_) => {}
+            Stmt::Comment(_) | Stmt::Leave(_) => {}
             Stmt::Let(_, e) | Stmt::Var(_, e) | Stmt::Assign(_, e) | Stmt::Return(e) => with(e),
             Stmt::If(c, a, b) => {
                 with(c);

@@ -173,21 +173,25 @@ impl Evaluator<'_> {
                     "u" => (Scalar::U32, Builtin::ToU32),
                     _ => (Scalar::F32, Builtin::ToF32),
                 };
-                if is_float && to != Scalar::F32 {
-                    return Err(self.refuse(
-                        frame,
-                        span,
-                        "from floats, use `to_i32` of what is clamped",
-                    ));
-                }
-                let all = all
-                    .into_iter()
-                    .map(|v| match v {
+                let mut converted = Vec::with_capacity(all.len());
+                for value in all {
+                    converted.push(match value {
+                        Value::Scalar(e) if is_float && to != Scalar::F32 => {
+                            Value::Scalar(self.saturated(e, to))
+                        }
                         Value::Scalar(e) => Value::Scalar(builtin(which, vec![e])),
                         other => other,
-                    })
-                    .collect();
-                Ok(Value::Vector(to, all))
+                    });
+                }
+                Ok(Value::Vector(to, converted))
+            }
+            (swizzle, []) if places(swizzle, all.len()).is_some() => {
+                let own = components(&self.part(own, "component"));
+                let places = places(swizzle, all.len()).unwrap_or_default();
+                Ok(Value::Vector(
+                    scalar,
+                    places.into_iter().map(|i| own[i].clone()).collect(),
+                ))
             }
             _ => Err(self.refuse(frame, span, format!("a vector's `{name}` has no form here"))),
         }
@@ -350,4 +354,12 @@ impl Evaluator<'_> {
             }
         }
     }
+}
+
+/// The components that a swizzle takes of a vector of so many: of `zx`, 2 and 0.
+fn places(swizzle: &str, size: usize) -> Option<Vec<usize>> {
+    if !(2..=4).contains(&swizzle.len()) {
+        return None;
+    }
+    swizzle.chars().map(|c| "xyzw"[..size].find(c)).collect()
 }

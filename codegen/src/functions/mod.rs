@@ -26,6 +26,7 @@
 pub mod api;
 pub mod c;
 pub mod crates;
+mod ends;
 pub mod evaluate;
 mod expand;
 mod fold;

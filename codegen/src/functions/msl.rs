@@ -88,6 +88,7 @@ impl Dialect for Msl<'_> {
             Builtin::ToI32 => "int",
             Builtin::BitsOf => "as_type<uint>",
             Builtin::FromBits => "as_type<float>",
+            Builtin::Native(native) => return called(&format!("metal::{}", native.name()), args),
         };
         called(name, args)
     }

@@ -432,7 +432,8 @@ fn comments(body: &mut [Stmt], with: &dyn Fn(&mut String)) {
                 comments(b, with);
             }
             Stmt::For(_, _, _, body) => comments(body, with),
-            Stmt::Let(..) | Stmt::Var(..) | Stmt::Assign(..) | Stmt::Return(_) => {}
+            Stmt::Let(..) | Stmt::Var(..) | Stmt::Assign(..) | Stmt::Leave(_) | Stmt::Return(_) => {
+            }
         }
     }
 }

@@ -1,8 +1,9 @@
 //! What all languages are printed by: a language says how its types, literals, operators and
 //! statements look, the rest is the same everywhere.
 
+use super::ends::early;
 use super::ir::{
-    Binary, Builtin, COLUMNS, Constant, Expr, Function, Id, Kind, Library, Literal, Scalar,
+    Binary, Builtin, COLUMNS, Constant, Expr, Function, Id, Kind, Leave, Library, Literal, Scalar,
     Signature, Stmt, Struct, Type, Unary,
 };
 use super::names::pascal;
@@ -120,6 +121,14 @@ pub trait Dialect {
         )
     }
 
+    /// Leaves the innermost loop, or its turn.
+    fn leave(&self, what: Leave) -> &'static str {
+        match what {
+            Leave::Loop => "break;",
+            Leave::Turn => "continue;",
+        }
+    }
+
     /// The end of a loop.
     fn end_of_loop(&self) -> &'static str {
         "}"
@@ -140,9 +149,19 @@ pub trait Dialect {
         "}"
     }
 
-    /// A structure that is made and given back.
+    /// The result, in the last line.
     fn give(&self, _: &Type, value: &Piece) -> String {
         format!("return {};", value.0)
+    }
+
+    /// Whether a branch can return.
+    fn returns_early(&self) -> bool {
+        true
+    }
+
+    /// The same before the last line.
+    fn give_early(&self, ty: &Type, value: &Piece) -> String {
+        self.give(ty, value)
     }
 
     /// The end of a function.
@@ -313,7 +332,11 @@ pub fn function(dialect: &dyn Dialect, function: &Function) -> String {
         lines.extend(wrapped(line, dialect.indent()));
     }
     let printer = Printer { dialect, function };
-    printer.block(&function.body, 1, &mut lines);
+    if dialect.returns_early() {
+        printer.block(&early(&function.body), 1, &mut lines);
+    } else {
+        printer.block(&function.body, 1, &mut lines);
+    }
     lines.push(dialect.end(function));
     let mut text = String::new();
     for line in lines {
@@ -336,7 +359,7 @@ impl Printer<'_> {
     fn block(&self, body: &[Stmt], depth: usize, lines: &mut Vec<String>) {
         let indent = self.dialect.indent().repeat(depth);
         let d = self.dialect;
-        for stmt in body {
+        for (i, stmt) in body.iter().enumerate() {
             let text = match stmt {
                 Stmt::Comment(text) => {
                     lines.push(format!("{indent}{}", d.comment(&ascii(text))));
@@ -345,7 +368,11 @@ impl Printer<'_> {
                 Stmt::Let(id, e) => d.constant_local(&self.name(*id), &e.ty, &self.expression(e)),
                 Stmt::Var(id, e) => d.variable(&self.name(*id), &e.ty, &self.expression(e)),
                 Stmt::Assign(id, e) => d.assign(&self.name(*id), &self.expression(e)),
-                Stmt::Return(e) => d.give(&e.ty, &self.expression(e)),
+                Stmt::Leave(what) => d.leave(*what).to_owned(),
+                Stmt::Return(e) if depth == 1 && i + 1 == body.len() => {
+                    d.give(&e.ty, &self.expression(e))
+                }
+                Stmt::Return(e) => d.give_early(&e.ty, &self.expression(e)),
                 Stmt::If(c, a, b) => {
                     push(d, lines, &indent, &d.condition(&self.expression(c)));
                     self.block(a, depth + 1, lines);

@@ -1,6 +1,8 @@
 //! Rust for the processor, without dependencies: vectors are arrays, matrices arrays of columns.
 
-use super::ir::{Binary, Builtin, Function, Id, Library, Literal, Scalar, Signature, Type, Unary};
+use super::ir::{
+    Binary, Builtin, Function, Id, Library, Literal, Native, Scalar, Signature, Type, Unary,
+};
 use super::print::{
     Bond, Dialect, Naming, Piece, atom, bracketed, called, column, component, components, digits,
     documented, function, list, members, operator, provenance, signed,
@@ -128,6 +130,9 @@ impl Dialect for Rust<'_> {
             Builtin::ToI32 => cast("i32"),
             Builtin::BitsOf => of_type("to_bits"),
             Builtin::FromBits => called("f32::from_bits", args),
+            Builtin::Native(Native::Ln) => of_type("ln"),
+            Builtin::Native(Native::Pow) => of_type("powf"),
+            Builtin::Native(native) => of_type(native.name()),
         }
     }
 
@@ -170,6 +175,10 @@ impl Dialect for Rust<'_> {
 
     fn give(&self, _: &Type, value: &Piece) -> String {
         value.0.clone()
+    }
+
+    fn give_early(&self, _: &Type, value: &Piece) -> String {
+        format!("return {};", value.0)
     }
 
     fn member(&self, of: &Piece, ty: &Type, name: &str) -> Piece {

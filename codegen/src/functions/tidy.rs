@@ -69,7 +69,7 @@ fn read_by_others(body: &[Stmt]) -> HashMap<Id, usize> {
                 });
             };
             match stmt {
-                Stmt::Comment(_) => {}
+                Stmt::Comment(_) | Stmt::Leave(_) => {}
                 Stmt::Let(_, e) | Stmt::Var(_, e) | Stmt::Assign(_, e) | Stmt::Return(e) => with(e),
                 Stmt::If(c, a, b) => {
                     with(c);
@@ -106,7 +106,7 @@ fn drop_within(body: &mut Vec<Stmt>, counts: &HashMap<Id, usize>) -> bool {
                 changed |= drop_within(inner, counts);
                 is_empty(inner)
             }
-            Stmt::Comment(_) | Stmt::Return(_) => false,
+            Stmt::Comment(_) | Stmt::Leave(_) | Stmt::Return(_) => false,
         };
         if gone {
             changed = true;
@@ -149,7 +149,7 @@ fn assigns(stmt: &Stmt, ids: &mut HashSet<Id>) {
             ids.insert(*id);
             inner.iter().for_each(|s| assigns(s, ids));
         }
-        Stmt::Comment(_) | Stmt::Let(..) | Stmt::Return(_) => {}
+        Stmt::Comment(_) | Stmt::Let(..) | Stmt::Leave(_) | Stmt::Return(_) => {}
     }
 }
 
@@ -324,7 +324,7 @@ fn count_in(e: &Expr, id: Id) -> usize {
 
 fn direct_uses(stmt: &Stmt, id: Id) -> usize {
     match stmt {
-        Stmt::Comment(_) => 0,
+        Stmt::Comment(_) | Stmt::Leave(_) => 0,
         Stmt::Let(_, e) | Stmt::Var(_, e) | Stmt::Assign(_, e) | Stmt::Return(e) => count_in(e, id),
         Stmt::If(c, ..) => count_in(c, id),
         Stmt::For(_, from, to, _) => count_in(from, id) + count_in(to, id),
@@ -346,7 +346,7 @@ fn total(stmt: &Stmt) -> usize {
             _ => size(e),
         },
         Stmt::For(_, from, to, _) => size(from) + size(to),
-        Stmt::Comment(_) => 0,
+        Stmt::Comment(_) | Stmt::Leave(_) => 0,
     }
 }
 
@@ -356,7 +356,7 @@ fn substitute(stmt: &mut Stmt, id: Id, by: &Expr) {
         _ => None,
     };
     match stmt {
-        Stmt::Comment(_) => {}
+        Stmt::Comment(_) | Stmt::Leave(_) => {}
         Stmt::Let(_, e) | Stmt::Var(_, e) | Stmt::Assign(_, e) | Stmt::Return(e) => {
             *e = replace(e, &with);
         }
@@ -417,7 +417,7 @@ fn structures_alone(body: &mut Vec<Stmt>, locals: &mut Vec<Local>) {
                 structures_alone(b, locals);
             }
             Stmt::For(_, _, _, inner) => structures_alone(inner, locals),
-            Stmt::Comment(_) => {}
+            Stmt::Comment(_) | Stmt::Leave(_) => {}
         }
         out.extend(before);
         out.push(stmt);

@@ -9,7 +9,9 @@
 
 use std::collections::HashSet;
 
-use super::ir::{Binary, Builtin, Function, Id, Library, Literal, Scalar, Signature, Type, Unary};
+use super::ir::{
+    Binary, Builtin, Function, Id, Leave, Library, Literal, Native, Scalar, Signature, Type, Unary,
+};
 use super::names::camel;
 use super::print::{
     Dialect, Naming, Piece, WIDTH, atom, block_comment, called, column, components, digits,
@@ -18,15 +20,23 @@ use super::print::{
 use super::wgsl::looks_up;
 
 /// What texts import from `three/tsl`, if they use it.
-const IMPORTS: [&str; 31] = [
+const IMPORTS: [&str; 44] = [
     "Fn",
+    "Break",
+    "Continue",
     "If",
     "Loop",
     "abs",
+    "acos",
+    "asin",
+    "atan",
     "bool",
     "bvec2",
     "bvec3",
     "bvec4",
+    "cos",
+    "exp",
+    "exp2",
     "float",
     "floatBitsToUint",
     "floor",
@@ -34,14 +44,19 @@ const IMPORTS: [&str; 31] = [
     "ivec2",
     "ivec3",
     "ivec4",
+    "log",
+    "log2",
     "mat2",
     "mat3",
     "mat4",
     "max",
     "min",
+    "pow",
     "select",
+    "sin",
     "sqrt",
     "struct",
+    "tan",
     "uint",
     "uintBitsToFloat",
     "uvec2",
@@ -400,6 +415,8 @@ impl Dialect for Tsl<'_> {
             Builtin::ToI32 => "int",
             Builtin::BitsOf => "floatBitsToUint",
             Builtin::FromBits => "uintBitsToFloat",
+            Builtin::Native(Native::Atan2) => "atan",
+            Builtin::Native(native) => native.name(),
         };
         called(name, args)
     }
@@ -478,6 +495,18 @@ impl Dialect for Tsl<'_> {
                 "Loop({{ {range}, condition: '<', name: '{function}_{name}' }}, (each) => {{\n    \
                  const {name} = each.{function}_{name}.toConst();"
             ),
+        }
+    }
+
+    /// A function of JavaScript makes the branch, and its `return` would be that function's.
+    fn returns_early(&self) -> bool {
+        false
+    }
+
+    fn leave(&self, what: Leave) -> &'static str {
+        match what {
+            Leave::Loop => "Break();",
+            Leave::Turn => "Continue();",
         }
     }
 

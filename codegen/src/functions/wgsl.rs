@@ -112,6 +112,7 @@ impl Dialect for Wgsl<'_> {
             Builtin::ToI32 => "i32",
             Builtin::BitsOf => "bitcast<u32>",
             Builtin::FromBits => "bitcast<f32>",
+            Builtin::Native(native) => native.name(),
         };
         called(name, args)
     }

@@ -3,6 +3,7 @@
 //! Such a language gets numbers of 32 bits, of which each result is rounded to 16. Rounding is by GLSL's `packHalf2x16` and `unpackHalf2x16`. A sum, a product or a quotient of 32 bits that is rounded
 //! is the one of 16 bits: `kernels/dsl/src/half`.
 
+use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 
 use half::f16;
@@ -24,6 +25,8 @@ struct Halves {
     types: HashMap<Word, Word>,
     /// Pairs of 32 bits that are made of two halves.
     unpacked: HashSet<Word>,
+    /// Constants, and what was made of them alone.
+    constants: RefCell<HashSet<Word>>,
 }
 
 /// Makes constants of 16 bits of those of 32 that are converted. Says whether there were any.
@@ -92,6 +95,13 @@ impl Halves {
                 .filter(|it| is_call(it, GLOp::UnpackHalf2x16))
                 .filter_map(|it| it.result_id)
                 .collect(),
+            constants: RefCell::new(
+                globals
+                    .iter()
+                    .filter(|it| matches!(op(it), Op::Constant | Op::ConstantComposite))
+                    .filter_map(|it| it.result_id)
+                    .collect(),
+            ),
         })
     }
 
@@ -148,8 +158,23 @@ impl Halves {
                 (wide, vec![wider])
             }
         };
-        made.extend(rounded(editor, set, float, (wide, count), (ty, result)));
+        if count > 1 && self.is_constant(it) {
+            self.constants.borrow_mut().insert(result);
+            made.extend(rounded_one_by_one(editor, set, (wide, count), (ty, result)));
+        } else {
+            made.extend(rounded(editor, set, float, (wide, count), (ty, result)));
+        }
         Some(made)
+    }
+
+    /// Whether an instruction's operands are constants alone.
+    fn is_constant(&self, it: &Instruction) -> bool {
+        let constants = self.constants.borrow();
+        let mut values = it.operands.iter().filter_map(|operand| match operand {
+            Operand::IdRef(value) if self.types.contains_key(value) => Some(value),
+            _ => None,
+        });
+        values.all(|value| constants.contains(value))
     }
 }
 
@@ -213,6 +238,30 @@ fn rounded(
             steps.part(Op::VectorShuffle, ty, &[first, second], &parts);
         }
     }
+    steps.ending_in(result)
+}
+
+/// The same one by one. Of a pair of constants, Mesa 22.3.6 loses the second number where glslang has written the GLSL.
+fn rounded_one_by_one(
+    editor: &mut Editor<'_>,
+    set: Word,
+    (wide, count): (Word, u32),
+    (ty, result): (Word, Word),
+) -> Vec<Instruction> {
+    let float = editor.float_type_of(32);
+    let pair = editor.vector_type_of(float.id, 2);
+    let (word, zero) = (editor.word_type(), editor.float(float, 0.0));
+    let mut steps = Sequence::new(editor, set);
+    let parts: Vec<Word> = (0..count)
+        .map(|place| {
+            let one = steps.part(Op::CompositeExtract, float.id, &[wide], &[place]);
+            let two = steps.then(Op::CompositeConstruct, pair, &[one, zero]);
+            let bits = steps.call(GLOp::PackHalf2x16, word, &[two]);
+            let two = steps.call(GLOp::UnpackHalf2x16, pair, &[bits]);
+            steps.part(Op::CompositeExtract, float.id, &[two], &[0])
+        })
+        .collect();
+    steps.then(Op::CompositeConstruct, ty, &parts);
     steps.ending_in(result)
 }
 

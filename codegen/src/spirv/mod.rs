@@ -3,8 +3,10 @@
 pub mod bounds;
 pub(crate) mod branches;
 pub(crate) mod canonical;
+pub(crate) mod constants;
 pub(crate) mod divide;
 pub(crate) mod edit;
+pub(crate) mod empty;
 pub mod exact;
 pub(crate) mod fingerprint;
 pub(crate) mod halves;
@@ -88,28 +90,44 @@ pub fn store(module: &Module) -> Vec<u32> {
     module.assemble()
 }
 
-/// Makes a specialisation constant a plain one.
-pub(crate) fn freeze_constant(module: &mut Module, spec_id: u32, value: u32) {
-    let is_spec_id = |note: &Instruction| {
-        op(note) == Op::Decorate
-            && note.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId))
-            && literal(note, 2) == Some(spec_id)
-    };
-    let Some(target) = module
+/// Whether an annotation gives that `SpecId`.
+fn has_spec_id(note: &Instruction, spec_id: u32) -> bool {
+    op(note) == Op::Decorate
+        && note.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId))
+        && literal(note, 2) == Some(spec_id)
+}
+
+/// The specialisation constant with that `SpecId`.
+pub(crate) fn spec_constant(module: &Module, spec_id: u32) -> Option<Word> {
+    let note = module
         .annotations
         .iter()
-        .find(|note| is_spec_id(note))
-        .and_then(|note| id(note, 0))
-    else {
+        .find(|note| has_spec_id(note, spec_id))?;
+    id(note, 0)
+}
+
+/// Makes a specialisation constant a plain one, of 32 bits; a truth value is 0 or 1.
+pub(crate) fn freeze_constant(module: &mut Module, spec_id: u32, value: u32) {
+    let Some(target) = spec_constant(module, spec_id) else {
         return;
     };
-    module.annotations.retain(|note| !is_spec_id(note));
+    module
+        .annotations
+        .retain(|note| !has_spec_id(note, spec_id));
     for instruction in &mut module.types_global_values {
-        if instruction.result_id == Some(target) && op(instruction) == Op::SpecConstant {
-            let operands = vec![Operand::LiteralBit32(value)];
-            let ty = instruction.result_type;
-            *instruction = Instruction::new(Op::Constant, ty, Some(target), operands);
+        if instruction.result_id != Some(target) {
+            continue;
         }
+        let (kind, operands) = match op(instruction) {
+            Op::SpecConstant => (Op::Constant, vec![Operand::LiteralBit32(value)]),
+            Op::SpecConstantTrue | Op::SpecConstantFalse if value != 0 => {
+                (Op::ConstantTrue, Vec::new())
+            }
+            Op::SpecConstantTrue | Op::SpecConstantFalse => (Op::ConstantFalse, Vec::new()),
+            _ => continue,
+        };
+        let ty = instruction.result_type;
+        *instruction = Instruction::new(kind, ty, Some(target), operands);
     }
 }
 

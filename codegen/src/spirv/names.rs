@@ -61,14 +61,7 @@ pub fn apply(module: &mut Module, kernel: &Kernel) -> Result<(), Failure> {
                 }
             }
             Role::Constant { id, .. } => {
-                let constant = module.annotations.iter().find_map(|note| {
-                    let wanted =
-                        note.operands.get(1) == Some(&Operand::Decoration(Decoration::SpecId));
-                    (wanted && literal(note, 2) == Some(*id))
-                        .then(|| super::id(note, 0))
-                        .flatten()
-                });
-                if let Some(constant) = constant {
+                if let Some(constant) = super::spec_constant(module, *id) {
                     names.set(constant, &param.name);
                 }
             }

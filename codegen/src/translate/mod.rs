@@ -36,7 +36,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::str::FromStr;
 
-use hankel_dsl::native::describe::{BuiltIn, Kernel, Output, Role, Rounding, Stage};
+use hankel_dsl::native::describe::{BuiltIn, ConstantValue, Kernel, Output, Role, Rounding, Stage};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{
@@ -53,6 +53,17 @@ use crate::placement::Placement;
 use crate::spirv::uniform::{self, Group, Memory};
 use crate::{Error, Language, VERSION, spirv};
 use reading::Dropped;
+
+/// What a final module has that naga does not read, though the texts that are made of it say it: for those who give
+/// SPIR-V to naga, as wgpu does.
+pub fn refused_by_naga(spirv: &[u8]) -> Option<&'static str> {
+    let words: Vec<u32> = spirv
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+        .collect();
+    let module = spirv::load(&words, "").ok()?;
+    reading::refused(&module)
+}
 
 /// What to do about an index that is out of range, beyond the kernel's own guard.
 ///
@@ -193,12 +204,12 @@ pub struct Options {
     /// Metal's version.
     pub msl_version: MslVersion,
     /// Specialisation constants that get a fixed value, by name, in every language.
-    pub constants: BTreeMap<String, u32>,
+    pub constants: BTreeMap<String, ConstantValue>,
     /// Whether the others stay open in HLSL, GLSL (by a macro) and MSL (as function constants), too.
     pub open_constants: bool,
     /// Kernels that are written once more with constants fixed: by the end of the copy's name, the
     /// constants' values. A kernel has the variants all of whose constants it has.
-    pub variants: BTreeMap<String, BTreeMap<String, u32>>,
+    pub variants: BTreeMap<String, BTreeMap<String, ConstantValue>>,
     /// Where bindings are.
     pub placement: Placement,
 }

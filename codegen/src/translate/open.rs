@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use naga::valid::ModuleInfo;
-use naga::{Arena, Constant, Expression, Function, Module, Span};
+use naga::{Arena, Constant, Expression, Function, Module, ScalarKind, Span, TypeInner};
 
 use super::{Job, text, validate};
 use crate::Language;
@@ -84,29 +84,37 @@ impl Job<'_> {
             return Ok(source);
         }
         let before = match self.language {
-            Language::Hlsl => "static const uint ",
-            Language::Msl => "constant uint ",
-            _ => "const uint ",
+            Language::Hlsl => "static const",
+            Language::Msl => "constant",
+            _ => "const",
         };
-        let mut all = self.ir.module.overrides.iter().map(|(_, it)| it);
+        let module = &self.ir.module;
+        let mut all = module
+            .overrides
+            .iter()
+            .map(|(_, it)| (it, word_for(&module.types[it.ty].inner)))
+            .peekable();
         let mut opened = String::with_capacity(source.len());
         for line in source.lines() {
             let declared = line
                 .strip_prefix(before)
+                .zip(all.peek())
+                .and_then(|(it, (_, ty))| it.strip_prefix(' ')?.strip_prefix(ty)?.strip_prefix(' '))
                 .and_then(|it| it.strip_suffix(';'))
                 .and_then(|it| it.split_once(" = "));
             match declared.zip(declared.and_then(|_| all.next())) {
-                Some(((name, value), it)) => {
+                Some(((name, value), (it, ty))) => {
                     let known = it.name.as_deref().unwrap_or(name);
                     opened.push_str(&match self.language {
                         Language::Msl => {
-                            function_constant(&source, name, value, it.id.unwrap_or_default())
+                            let id = it.id.unwrap_or_default();
+                            function_constant(&source, ty, name, value, id)
                         }
                         _ => {
                             let given = macro_name(&self.kernel.name, known);
                             format!(
                                 "#ifndef {given}\n#define {given} {value}\n#endif\n\
-                                 {before}{name} = uint({given});\n"
+                                 {before} {ty} {name} = {ty}({given});\n"
                             )
                         }
                     });
@@ -119,7 +127,7 @@ impl Job<'_> {
         }
         match all.next() {
             None => Ok(opened),
-            Some(missing) => Err(Failure {
+            Some((missing, _)) => Err(Failure {
                 construct: missing.name.clone(),
                 message: "the text does not declare this constant as it is expected".into(),
                 ..self.failure(&std::fmt::Error)
@@ -130,13 +138,26 @@ impl Job<'_> {
 
 /// A function constant with a default, in the words of Metal's specification: a function constant
 /// itself has none.
-fn function_constant(source: &str, name: &str, value: &str, id: u16) -> String {
+fn function_constant(source: &str, ty: &str, name: &str, value: &str, id: u16) -> String {
     let mut given = format!("{name}_given");
     while text::has_name(source, &given) {
         given.push('_');
     }
     format!(
-        "constant uint {given} [[function_constant({id})]];\n\
-         constant uint {name} = is_function_constant_defined({given}) ? {given} : {value};\n"
+        "constant {ty} {given} [[function_constant({id})]];\n\
+         constant {ty} {name} = is_function_constant_defined({given}) ? {given} : {value};\n"
     )
+}
+
+/// A scalar type's name in HLSL, GLSL and MSL.
+fn word_for(ty: &TypeInner) -> &'static str {
+    match ty {
+        TypeInner::Scalar(scalar) => match scalar.kind {
+            ScalarKind::Float => "float",
+            ScalarKind::Sint => "int",
+            ScalarKind::Bool => "bool",
+            _ => "uint",
+        },
+        _ => "uint",
+    }
 }

@@ -6,6 +6,7 @@
 //! | --- | --- | --- |
 //! | a type of two whole numbers for coordinates into arrays of textures | naga 30.0.1 panics | `naga-arrayed-fetch` |
 //! | a copy of what an operation of a subgroup takes from another block | naga 30.0.1 panics | `naga-subgroup-operand` |
+//! | a copy of what an atomic operation takes from another block | naga 30.0.1 makes an invalid module | `naga-atomic-operand` |
 //! | a mask of samples as a number, which is an array in SPIR-V | naga 30.0.1 refuses it | `naga-sample-mask` |
 //! | depths that are never compared as floats in GLSL | a sampler that compares, which cannot read them | |
 //! | the remainder of signed numbers in GLSL | `%`, which GLSL leaves undefined below zero | `naga-glsl-remainder` |
@@ -89,6 +90,72 @@ fn dropped(module: &Module, instruction: &Instruction) -> Option<String> {
         "naga compares at level 0 whichever level is given, and so would every text; WGSL and \
          GLSL ES have no comparison at a level"
             .into()
+    })
+}
+
+/// What naga's reader refuses of a final module, which its writers are given otherwise: for those who read SPIR-V with
+/// naga, as wgpu does.
+pub fn refused(module: &Module) -> Option<&'static str> {
+    let types: HashMap<Word, Word> = module
+        .all_inst_iter()
+        .filter_map(|it| Some((it.result_id?, it.result_type?)))
+        .collect();
+    let ty = |value: Word| global(module, *types.get(&value)?);
+    // `tests/upstream/naga-layers`.
+    let sizes: HashMap<Word, u32> = module
+        .functions
+        .iter()
+        .flat_map(|it| it.all_inst_iter())
+        .filter(|it| matches!(op(it), Op::ImageQuerySizeLod | Op::ImageQuerySize))
+        .filter(|it| {
+            let image = id(it, 0).and_then(ty);
+            image.and_then(|image| literal(image, 3)) == Some(1)
+        })
+        .filter_map(|it| Some((it.result_id?, literal(global(module, it.result_type?)?, 1)?)))
+        .collect();
+    let reads_layers = |it: &Instruction| {
+        let of = |place| id(it, place).and_then(|size| sizes.get(&size)).copied();
+        match op(it) {
+            Op::CompositeExtract => of(0).is_some_and(|n| literal(it, 1) == Some(n - 1)),
+            Op::VectorShuffle => of(0).is_some_and(|n| {
+                (2..it.operands.len()).any(|place| literal(it, place) == Some(n - 1))
+            }),
+            _ => false,
+        }
+    };
+    // `tests/upstream/naga-depth-gather`.
+    let gathers_depths = |it: &Instruction| {
+        let sampled = id(it, 0).and_then(ty).and_then(|sampled| id(sampled, 0));
+        op(it) == Op::ImageGather
+            && sampled
+                .and_then(|image| global(module, image))
+                .and_then(|image| literal(image, 2))
+                == Some(1)
+    };
+    let mut all = module.functions.iter().flat_map(|it| it.all_inst_iter());
+    let of_instruction = all.find_map(|it| {
+        if reads_layers(it) {
+            Some("the number of a texture's layers")
+        } else if gathers_depths(it) {
+            Some("gathered depths")
+        } else {
+            None
+        }
+    });
+    of_instruction.or_else(|| {
+        module.annotations.iter().find_map(|note| {
+            let decoration = note.operands.get(1)?;
+            if *decoration == Operand::Decoration(Decoration::BuiltIn) {
+                // `tests/upstream/naga-sample-mask`.
+                let is_mask = note.operands.get(2) == Some(&Operand::BuiltIn(BuiltIn::SampleMask));
+                return is_mask.then_some("masks of samples");
+            }
+            // `tests/upstream/naga-centroid`.
+            let evaluated = [Decoration::Centroid, Decoration::Sample].map(Operand::Decoration);
+            evaluated
+                .contains(decoration)
+                .then_some("varyings at centroids and samples")
+        })
     })
 }
 
@@ -184,10 +251,10 @@ pub fn coordinate_types(module: &mut Module) {
     }
 }
 
-/// naga reads what an operation of a subgroup takes after it has ended the list of expressions that it would add a load to:
-/// of a value from another block it needs one. A copy in the same block is such a load. It is part of the final SPIR-V, as
-/// above.
-pub fn subgroup_operands(module: &mut Module) {
+/// naga reads what an operation of a subgroup, or an atomic one, takes after it has ended the list of expressions that it
+/// would add a load to: of a value from another block it needs one. A copy in the same block is such a load. It is part of
+/// the final SPIR-V, as above.
+pub fn late_operands(module: &mut Module) {
     let Some(header) = &mut module.header else {
         return;
     };
@@ -204,9 +271,8 @@ pub fn subgroup_operands(module: &mut Module) {
                 .collect();
             let mut instructions = Vec::with_capacity(block.instructions.len());
             for mut it in block.instructions.drain(..) {
-                if is_of_subgroup(op(&it)) {
-                    // The scope is first.
-                    for operand in it.operands.iter_mut().skip(1) {
+                if let Some(first) = first_late_operand(op(&it)) {
+                    for operand in it.operands.iter_mut().skip(first) {
                         let Operand::IdRef(value) = operand else {
                             continue;
                         };
@@ -231,8 +297,18 @@ pub fn subgroup_operands(module: &mut Module) {
     }
 }
 
-fn is_of_subgroup(op: Op) -> bool {
-    (Op::GroupNonUniformElect as u32..=Op::GroupNonUniformQuadSwap as u32).contains(&(op as u32))
+/// Of an operation of a subgroup the scope is first, of an atomic one the pointer, the scope and the semantics.
+fn first_late_operand(op: Op) -> Option<usize> {
+    let number = op as u32;
+    if (Op::GroupNonUniformElect as u32..=Op::GroupNonUniformQuadSwap as u32).contains(&number) {
+        Some(1)
+    } else if (Op::AtomicExchange as u32..=Op::AtomicXor as u32).contains(&number)
+        || op == Op::AtomicFAddEXT
+    {
+        Some(3)
+    } else {
+        None
+    }
 }
 
 /// The module with masks of samples as numbers, of which naga knows no arrays; none if it has no mask.

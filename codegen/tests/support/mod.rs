@@ -180,7 +180,14 @@ pub fn resample() -> Kernel {
         compute([8, 8, 1], 2),
         vec![
             param("index", Role::Index),
-            param("taps", Role::Constant { id: 7, default: 3 }),
+            param(
+                "taps",
+                Role::Constant {
+                    id: 7,
+                    scalar: Scalar::U32,
+                    default: 3,
+                },
+            ),
             param("source", texture(0, TextureKind::Texture2d)),
             param(
                 "linear",

@@ -16,8 +16,8 @@ use std::fmt;
 use fastrand::Rng;
 use hankel_dsl::native::channel::Stored;
 use hankel_dsl::native::describe::{
-    Channels, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role, SamplerKind,
-    Scalar, Stage, TexelFormat, TextureKind,
+    Channels, ConstantValue, Domain, Inputs, Kernel, Layout, Length, Output, Param, Range, Role,
+    SamplerKind, Scalar, Stage, TexelFormat, TextureKind,
 };
 use hankel_dsl::native::inputs::{Given, Request, Value};
 use hankel_dsl::native::{Address, Compare, Filter, Sampler, fragment};
@@ -182,17 +182,27 @@ pub enum InputError {
 pub fn constants(kernel: &Kernel) -> Vec<Vec<u32>> {
     let mut all: Vec<Vec<u32>> = vec![Vec::new()];
     for param in &kernel.params {
-        let Role::Constant { default, .. } = param.role else {
+        let Role::Constant {
+            default, scalar, ..
+        } = param.role
+        else {
             continue;
+        };
+        let word = |x: f64| match scalar {
+            Scalar::Bool => u32::from(x != 0.0),
+            Scalar::I32 => (x as i32).cast_unsigned(),
+            Scalar::F32 => (x as f32).to_bits(),
+            _ => x as u32,
         };
         let mut values = vec![default];
         match &param.inputs.domain {
             Some(Domain::Values { values: listed }) => {
-                values.extend(listed.iter().map(|v| *v as u32));
+                values.extend(listed.iter().map(|v| word(*v)));
             }
             Some(Domain::Range { least, most } | Domain::Magnitude { least, most }) => {
-                values.extend([*least as u32, *most as u32]);
+                values.extend([word(*least), word(*most)]);
             }
+            _ if scalar == Scalar::Bool => values.extend([0, 1]),
             _ => {}
         }
         // The default comes first.
@@ -214,15 +224,17 @@ pub fn constants(kernel: &Kernel) -> Vec<Vec<u32>> {
 
 /// Makes other values the defaults of a kernel's specialisation constants, in their order; gives
 /// the constants' names with the values.
-pub fn set_constants(kernel: &mut Kernel, values: &[u32]) -> BTreeMap<String, u32> {
+pub fn set_constants(kernel: &mut Kernel, values: &[u32]) -> BTreeMap<String, ConstantValue> {
     let mut values = values.iter();
     let mut set = BTreeMap::new();
     for param in &mut kernel.params {
-        if let Role::Constant { default, .. } = &mut param.role
+        if let Role::Constant {
+            default, scalar, ..
+        } = &mut param.role
             && let Some(value) = values.next()
         {
             *default = *value;
-            set.insert(param.name.clone(), *value);
+            set.insert(param.name.clone(), ConstantValue::of_word(*scalar, *value));
         }
     }
     set

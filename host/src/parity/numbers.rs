@@ -190,6 +190,11 @@ impl<'a> Numbers<'a> {
         });
     }
 
+    /// Whether some elements may lie in any order.
+    pub fn has_unordered(&self) -> bool {
+        self.outputs.iter().any(|out| out.unordered)
+    }
+
     /// Calls `f` with every number of what was written: element, name, distance.
     fn each(
         &self,

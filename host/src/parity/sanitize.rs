@@ -29,6 +29,8 @@ pub enum Fault {
         numbers: u64,
         /// The first of them; none if another number of bytes was written.
         first: Option<Box<Difference>>,
+        /// Whether a parameter is marked as `unordered`.
+        unordered: bool,
     },
     /// Subgroups of another size give another result.
     SubgroupSize {
@@ -55,6 +57,7 @@ impl fmt::Display for Fault {
                 order,
                 numbers,
                 first,
+                unordered,
             } => {
                 write!(
                     f,
@@ -67,10 +70,12 @@ impl fmt::Display for Fault {
                         d.value, d.invocation, d.expected, d.got
                     )?;
                 }
-                write!(
-                    f,
+                f.write_str(if *unordered {
+                    ". Of a parameter that is `unordered`, it is not only the places that depend on it: which elements \
+                     are written does, too"
+                } else {
                     ". If only the places of the elements depend on it, mark that parameter as `unordered`"
-                )
+                })
             }
             Self::SubgroupSize {
                 size,
@@ -155,6 +160,7 @@ pub fn check<E: fmt::Display>(
                 order,
                 numbers: found.beyond,
                 first: found.first.map(Box::new),
+                unordered: numbers.has_unordered(),
             });
         }
     }

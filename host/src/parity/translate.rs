@@ -4,6 +4,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use hankel_dsl::native::describe::{ConstantValue, Scalar};
 use naga::back::PipelineConstants;
 use naga::back::pipeline_constants::process_overrides;
 use naga::back::spv;
@@ -13,7 +14,7 @@ use crate::device::vulkan::words;
 use crate::device::{Arithmetic, route};
 
 /// SPIR-V read and written anew by naga, with the specialisation constants of `constants`, by their
-/// numbers, set to these values, and the others to their defaults.
+/// numbers, set to these values of 32 bits, and the others to their defaults.
 ///
 /// # Errors
 /// naga's words.
@@ -22,10 +23,6 @@ pub fn spirv_to_spirv(
     constants: &[(u32, u32)],
     arithmetic: Arithmetic,
 ) -> Result<Vec<u32>, String> {
-    let constants = constants
-        .iter()
-        .map(|(id, value)| (id.to_string(), f64::from(*value)))
-        .collect();
     guarded(|| {
         let options = naga::front::spv::Options {
             adjust_coordinate_space: false,
@@ -35,6 +32,26 @@ pub fn spirv_to_spirv(
         let module = naga::front::spv::Frontend::new(code.iter().copied(), &options)
             .parse()
             .map_err(|e| format!("naga cannot read its SPIR-V: {e}"))?;
+        let scalar_of = |id: u32| {
+            let mut all = module.overrides.iter();
+            let found = all.find(|(_, it)| it.id.map(u32::from) == Some(id));
+            match found.map(|(_, it)| &module.types[it.ty].inner) {
+                Some(naga::TypeInner::Scalar(scalar)) => match scalar.kind {
+                    naga::ScalarKind::Float => Scalar::F32,
+                    naga::ScalarKind::Sint => Scalar::I32,
+                    naga::ScalarKind::Bool => Scalar::Bool,
+                    _ => Scalar::U32,
+                },
+                _ => Scalar::U32,
+            }
+        };
+        let constants = constants
+            .iter()
+            .map(|&(id, word)| {
+                let value = ConstantValue::of_word(scalar_of(id), word);
+                (id.to_string(), value.number())
+            })
+            .collect();
         write(&module, &constants, arithmetic)
     })
 }

@@ -694,7 +694,14 @@ pub fn mixed() -> Sample {
                     layout: row,
                 },
             ),
-            param("shift", Role::Constant { id: 0, default: 0 }),
+            param(
+                "shift",
+                Role::Constant {
+                    id: 0,
+                    scalar: Scalar::U32,
+                    default: 0,
+                },
+            ),
         ],
         vec![Output::Buffer {
             binding: 2,

@@ -128,6 +128,7 @@ mod memory;
 #[cfg(not(target_arch = "spirv"))]
 pub mod native;
 mod real;
+mod specialised;
 mod stage;
 mod storage;
 mod storage_texture;
@@ -157,6 +158,8 @@ pub use hankel_macros::apart;
 pub use hankel_macros::{Element, cooperative, function, kernel, kernels, library};
 pub use memory::{Buffer, array_element, array_element_mut};
 pub use real::{Mask, Real, to_i32};
+#[doc(hidden)]
+pub use specialised::Specialised;
 #[cfg(target_arch = "spirv")]
 #[doc(hidden)]
 pub use spirv_std;

@@ -173,7 +173,7 @@ impl Kernel {
         let stores = self.host_stores(variant);
         quote! {
             #prelude
-            exec::for_each(mode, __extent, |__at, __number| {
+            exec::for_each(__mode, __extent, |__at, __number| {
                 #place
                 #(let mut #owns = #names.get(__number);)*
                 #take
@@ -219,7 +219,7 @@ impl Kernel {
         let subgroups = self.uses_subgroups();
         quote! {
             #prelude
-            workgroup::for_each_group(mode, __extent, [#(#threads),*], #subgroups, |__group| {
+            workgroup::for_each_group(__mode, __extent, [#(#threads),*], #subgroups, |__group| {
                 #(#memories)*
                 __group.run(|__it| {
                     #(#handles)*

@@ -314,8 +314,21 @@ impl Kernel {
                         let kind = kind.variant();
                         quote!(Sampler { binding: #b, sampler: #kind })
                     }
-                    Role::Constant { id, default } => {
-                        quote!(Constant { id: #id, default: #default })
+                    Role::Constant { id, default, ty } => {
+                        let scalar = format_ident!(
+                            "{}",
+                            match ty.to_string().as_str() {
+                                "i32" => "I32",
+                                "f32" => "F32",
+                                "bool" => "Bool",
+                                _ => "U32",
+                            }
+                        );
+                        quote!(Constant {
+                            id: #id,
+                            scalar: describe::Scalar::#scalar,
+                            default: #default,
+                        })
                     }
                     Role::Index => quote!(Index),
                     Role::BuiltIn(built_in) => {
@@ -461,7 +474,9 @@ impl Kernel {
                     let kind = kind.variant();
                     quote!(let #name = args.sampler(#text, #kind)?;)
                 }
-                Role::Constant { .. } => quote!(let #name = args.constant();),
+                Role::Constant { ty, .. } => {
+                    quote!(let #name = <#ty as ::hankel_dsl::Specialised>::of_word(args.constant());)
+                }
                 Role::Index | Role::BuiltIn(_) | Role::Shared { .. } => TokenStream::new(),
             }
         });
@@ -488,7 +503,7 @@ impl Kernel {
         };
         quote! {
             fn run(call: &mut native::Call<'_>) -> Result<(), native::CallError> {
-                let (mode, _session) = native::sanitize::begin(#mode);
+                let (__mode, _session) = native::sanitize::begin(#mode);
                 #takes
                 #body
             }
@@ -591,7 +606,7 @@ impl Kernel {
         let map = if self.real.is_some() {
             self.lane_map(variant, &call, &out)
         } else {
-            quote!(exec::map1(mode, output, |__i| #call))
+            quote!(exec::map1(__mode, output, |__i| #call))
         };
         quote! {
             let output = args.slice_mut::<#out>("output")?;
@@ -613,7 +628,7 @@ impl Kernel {
             )
         });
         if !spreads || self.scalar {
-            return quote!(exec::map1(mode, output, |__i| #call));
+            return quote!(exec::map1(__mode, output, |__i| #call));
         }
         let fields = self.params.iter().map(|p| {
             let name = &p.name;
@@ -626,6 +641,7 @@ impl Kernel {
                     let ty = self.concrete(ty, variant);
                     quote!(#name: &'a [#ty],)
                 }
+                Role::Constant { ty, .. } => quote!(#name: #ty,),
                 _ => quote!(#name: u32,),
             }
         });
@@ -685,7 +701,7 @@ impl Kernel {
                     <#out as layout::Lanewise<#scalar>>::store::<L>(&__value, __out);
                 }
             }
-            exec::map1_lanes(mode, output, &Body { #(#names,)* __marker: core::marker::PhantomData })
+            exec::map1_lanes(__mode, output, &Body { #(#names,)* __marker: core::marker::PhantomData })
         }
     }
 
@@ -732,9 +748,9 @@ impl Kernel {
         });
         let map = match self.stage {
             Stage::Fragment => {
-                quote!(fragment::map_fragments(mode, (#(#names,)*), |__i, __fragment| #value))
+                quote!(fragment::map_fragments(__mode, (#(#names,)*), |__i, __fragment| #value))
             }
-            _ => quote!(exec::map_tuple(mode, (#(#names,)*), |__i| #value)),
+            _ => quote!(exec::map_tuple(__mode, (#(#names,)*), |__i| #value)),
         };
         quote! {
             #(#takes)*

@@ -115,7 +115,7 @@ impl Kernel {
             let index = self.index_type();
             quote! {
                 let output = args.image::<#ty>("output", __formats[0])?;
-                exec::#map(mode, output, |__i: #index| #call)
+                exec::#map(__mode, output, |__i: #index| #call)
             }
         } else {
             let outputs = self.outputs.iter().enumerate().map(|(i, ty)| {
@@ -136,7 +136,7 @@ impl Kernel {
                 #(#outputs)*
                 let (__extent, __count) = (#first.size(), #first.count());
                 #(#sizes)*
-                exec::for_each_of(mode, __extent, __count, |__at, __number| {
+                exec::for_each_of(__mode, __extent, __count, |__at, __number| {
                     #take
                     #stores
                 })
@@ -147,7 +147,7 @@ impl Kernel {
                 call: &mut native::Call<'_>,
                 __formats: [Option<describe::TexelFormat>; #count],
             ) -> Result<(), native::CallError> {
-                let (mode, _session) = native::sanitize::begin(call.mode);
+                let (__mode, _session) = native::sanitize::begin(call.mode);
                 #takes
                 #run
             }

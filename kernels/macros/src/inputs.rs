@@ -399,7 +399,10 @@ impl Inputs {
             dimensions, cube, ..
         } = holder
         else {
-            return error(*span, "only a texture has a size in texels");
+            return error(
+                *span,
+                "only a texture that is read has a size in texels by itself: what is written has the size of the range",
+            );
         };
         if size.len() != dimensions {
             return error(

@@ -214,9 +214,11 @@ pub enum Role {
         access: Option<Type>,
     },
     Sampler(SamplerKind),
+    /// The default is its 32 bits.
     Constant {
         id: u32,
         default: u32,
+        ty: Ident,
     },
     Index,
     BuiltIn(BuiltIn),
@@ -492,7 +494,7 @@ impl Role {
 }
 
 /// Variables of the generated code.
-const RESERVED: [&str; 4] = ["invocation", "args", "call", "mode"];
+const RESERVED: [&str; 3] = ["invocation", "args", "call"];
 
 const ROLES: &str = "uniform, push, element, storage, atomic, texture, sampler, constant, index, local_id, local_index, group_id, group_count, subgroup_size, subgroup_invocation_id, subgroup_id, subgroup_count, shared, attribute, varying, vertex_index, instance_index, frag_coord, front_facing, sample_index, sample_mask, primitive_index";
 
@@ -1001,17 +1003,34 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
         },
         "constant" => {
             let (mut id, mut default) = (None, None);
+            let scalar = last_segment(ty).map(|s| s.ident.clone()).filter(|name| {
+                ["u32", "i32", "f32", "bool"]
+                    .iter()
+                    .any(|scalar| name == scalar)
+            });
+            let Some(scalar) = scalar else {
+                return Err(syn::Error::new(
+                    ty.span(),
+                    "a specialisation constant is a `u32`, `i32`, `f32` or `bool`",
+                ));
+            };
             role.parse_nested_meta(|meta| {
-                let value: LitInt = meta.value()?.parse()?;
+                let value = meta.value()?;
                 match meta.path.get_ident() {
-                    Some(i) if i == "id" => id = Some(value.base10_parse()?),
-                    Some(i) if i == "default" => default = Some(value.base10_parse()?),
+                    Some(i) if i == "id" => id = Some(value.parse::<LitInt>()?.base10_parse()?),
+                    Some(i) if i == "default" => {
+                        default = Some(word_of(&value.parse()?, &scalar)?);
+                    }
                     _ => return Err(meta.error("expected `id` or `default`")),
                 }
                 Ok(())
             })?;
             match (id, default) {
-                (Some(id), Some(default)) => Role::Constant { id, default },
+                (Some(id), Some(default)) => Role::Constant {
+                    id,
+                    default,
+                    ty: scalar,
+                },
                 _ => {
                     return Err(syn::Error::new(
                         role.span(),
@@ -1036,6 +1055,43 @@ fn parse_param(arg: &mut FnArg) -> syn::Result<Param> {
         inputs,
         push,
     })
+}
+
+/// The 32 bits of a specialisation constant's default.
+fn word_of(value: &Expr, ty: &Ident) -> syn::Result<u32> {
+    let (negative, literal) = match value {
+        Expr::Unary(syn::ExprUnary {
+            op: syn::UnOp::Neg(_),
+            expr,
+            ..
+        }) => (true, expr.as_ref()),
+        other => (false, other),
+    };
+    let Expr::Lit(syn::ExprLit { lit, .. }) = literal else {
+        return Err(syn::Error::new(value.span(), "the default is a literal"));
+    };
+    let wrong = || syn::Error::new(value.span(), format!("this is no `{ty}`"));
+    let word = match (ty.to_string().as_str(), lit) {
+        ("bool", syn::Lit::Bool(b)) if !negative => Some(u32::from(b.value)),
+        ("u32", syn::Lit::Int(i)) if !negative => i.base10_parse().ok(),
+        ("i32", syn::Lit::Int(i)) => {
+            let size: i64 = i.base10_parse()?;
+            let number = i32::try_from(if negative { -size } else { size });
+            number.ok().map(i32::cast_unsigned)
+        }
+        ("f32", syn::Lit::Float(_) | syn::Lit::Int(_)) => {
+            let digits = match lit {
+                syn::Lit::Float(f) => f.base10_digits().to_owned(),
+                syn::Lit::Int(i) => i.base10_digits().to_owned(),
+                _ => return Err(wrong()),
+            };
+            let size: f32 = digits.parse().map_err(|_| wrong())?;
+            size.is_finite()
+                .then(|| (if negative { -size } else { size }).to_bits())
+        }
+        _ => None,
+    };
+    word.ok_or_else(wrong)
 }
 
 /// Whether a role's attribute says `unordered`.

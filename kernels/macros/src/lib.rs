@@ -53,7 +53,7 @@ use syn::parse_macro_input;
 /// | `#[texture] x: Texture2d<'_>` | also `Texture1d`, `Texture2dArray`, `Texture2dMultisampled`, `Texture3d`, `TextureCube`, `TextureCubeArray`; depths: `DepthTexture2d`, `DepthTexture2dArray`, `DepthTexture2dMultisampled`, `DepthTextureCube`, `DepthTextureCubeArray`; all but those of depths may hold integers: `Texture2d<'_, u32>`, `TextureCube<'_, i32>` |
 /// | `#[texture] x: StorageTexture2d<'_, Rgba16Float>` | a texture of which any texel may be written; also `StorageTexture1d`, `StorageTexture2dArray`, `StorageTexture3d`; formats are types of `format`; a third argument says `Read` or `ReadWrite`, types of `access` |
 /// | `#[sampler] x: Sampler` | a sampler; `ComparisonSampler` compares depths, `NonFilteringSampler` reads depths and integers as they are |
-/// | `#[constant(id = N, default = V)] x: u32` | a specialisation constant |
+/// | `#[constant(id = N, default = V)] x: u32` (`i32`, `f32`, `bool`) | a specialisation constant |
 /// | `#[index] x: u32` | the invocation's index: `u32`, `UVec2` or `UVec3` |
 /// | `#[local_id]`, `#[group_id]`, `#[group_count]` | the invocation's place in its workgroup, its workgroup, how many workgroups the range needs: types as of the index |
 /// | `#[local_index] x: u32` | the invocation's number in its workgroup |
@@ -191,14 +191,14 @@ pub fn apart(args: TokenStream, item: TokenStream) -> TokenStream {
 /// `R: Real`, the texts are of `f32`. Its body is written in a part of Rust that has a form in every
 /// language; `hankel build --form functions` refuses the rest with file, line and reason:
 ///
-/// - `let` with patterns, assignments, `if`, `match` on what is known, blocks, closures;
-/// - arithmetic, comparisons, the methods of `Real`, conversions that lose nothing, bits of `u32`;
+/// - `let` with patterns, assignments, `if`, early `return`s, `match` on numbers, blocks, closures;
+/// - arithmetic, comparisons, the methods of `Real`, conversions, bits of `u32`, the functions of `math` and `math::native`;
 /// - of vectors `dot`, `length`, `distance`, `normalize`, `cross`, `lerp`, `min`, `max`, `clamp`, `abs`, `floor`,
-///   `truncate`, `extend`; of matrices `*`, `from_cols`, `transpose`, `transform_point3`, `transform_vector3`,
+///   `truncate`, `extend`, swizzles (`v.zyx()`); of matrices `*`, `from_cols`, `transpose`, `transform_point3`, `transform_vector3`,
 ///   `project_point3`, and columns by their names;
 /// - structures, tuples and arrays, indexed by what is known; methods and functions of any crate whose
 ///   sources are at hand, which are put in place unless they have `#[function]`, too;
-/// - `unroll!` and `while i < end { …; i += 1; }`; macros of one's own.
+/// - `for` over ranges and arrays with `break` and `continue`, `while i < end { …; i += 1; }`, `unroll!`; macros of one's own.
 #[proc_macro_attribute]
 pub fn function(args: TokenStream, item: TokenStream) -> TokenStream {
     let item = parse_macro_input!(item as syn::ItemFn);

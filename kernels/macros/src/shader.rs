@@ -174,7 +174,7 @@ impl Kernel {
                 Role::Sampler(_) => {
                     quote!(#[spirv(descriptor_set = 0, binding = #here)] #name: &::hankel_dsl::spirv_std::Sampler,)
                 }
-                Role::Constant { id, default } => {
+                Role::Constant { id, default, .. } => {
                     quote!(#[spirv(spec_constant(id = #id, default = #default))] #name: u32,)
                 }
                 Role::Attribute(ty) => quote!(#name: #ty,),
@@ -252,8 +252,9 @@ impl Kernel {
                     let own = own(p);
                     quote!(&mut #own)
                 }
-                Role::Uniform(_) | Role::Constant { .. } | Role::Attribute(_) => {
-                    quote!(#name)
+                Role::Uniform(_) | Role::Attribute(_) => quote!(#name),
+                Role::Constant { ty, .. } => {
+                    quote!(<#ty as ::hankel_dsl::Specialised>::of_word(#name))
                 }
                 Role::Varying(passed) => passed.wrap(&quote!(#name)),
                 Role::Storage(_) => quote!(::hankel_dsl::Buffer::new(#name)),

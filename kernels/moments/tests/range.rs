@@ -161,3 +161,34 @@ fn hausdorff_bounds_of_small_depths() {
         );
     }
 }
+
+/// The unit of length changes nothing, not even a rounding: other units are powers of two.
+#[test]
+fn plain_bounds_do_not_depend_on_the_unit_of_length() {
+    fn check<const N: usize>(powers: &[i32]) {
+        let rows = [
+            (even(1.0, 1.0), 0.4),
+            (of_points(&[(-0.5, 0.25), (0.75, 0.5), (0.25, 1.0)]), 0.5),
+            (
+                of_points(&[(-0.9, 0.2), (-0.3, 0.2), (0.1, 0.2), (0.6, 0.2), (0.8, 0.2)]),
+                0.0,
+            ),
+        ];
+        for (m, eta) in rows {
+            let here = bound::<f32, N>(f32s(m), eta);
+            assert!(here.lower > 0.0 || here.upper < m[0] as f32, "{here:?}");
+            for &power in powers {
+                let length = 2_f64.powi(power);
+                let m = std::array::from_fn(|k| m[k] * length.powi(k as i32));
+                let there = bound::<f32, N>(f32s(m), eta * length as f32);
+                assert_eq!(here, there, "N = {N}, depths times 2^{power}");
+            }
+        }
+    }
+    check::<1>(&[-40, -26, -10, -3, 2, 5, 26]);
+    check::<2>(&[-25, -12, -4, 3, 9, 13]);
+    check::<3>(&[-17, -9, -5, 2, 8, 12]);
+    check::<4>(&[-12, -8, -3, 4, 10]);
+    check::<5>(&[-9, -5, -3, 2, 8]);
+    check::<6>(&[-8, -5, -3, 2, 7]);
+}

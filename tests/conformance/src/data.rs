@@ -295,6 +295,50 @@ pub fn own_half_vectors(#[element] pair: Halves) -> OwnHalves {
     }
 }
 
+/// A number that constants of every type change.
+#[kernel(
+    compute,
+    threads(64),
+    parity(non_finite, why = "squares of absurd numbers overflow")
+)]
+pub fn specialised(
+    #[element] x: f32,
+    #[constant(id = 0, default = 0.5)]
+    #[values(0.5, -2.0)]
+    scale: f32,
+    #[constant(id = 1, default = -3)]
+    #[values(-3, 7)]
+    offset: i32,
+    #[constant(id = 2, default = true)] squared: bool,
+) -> f32 {
+    let y = x * scale + offset as f32;
+    if squared { y * y } else { y }
+}
+
+/// Directions and mixtures of halves.
+#[kernel(
+    compute,
+    threads(64),
+    inputs = inputs::own_halves,
+    parity(
+        ulp = 65536,
+        absolute = 0.03125,
+        why = "five results of 16 bits in a row, each within 2 ulp; those of sums that cancel, of numbers below 8"
+    )
+)]
+pub fn half_directions(#[element] pair: Halves) -> OwnHalves {
+    let (a, b) = (Half2::from(pair.a), Half2::from(pair.b));
+    let (least, most) = (Half4::splat(Half::new(-2.0)), Half4::splat(Half::new(2.0)));
+    let all = Half4::new(a.x, a.y, b.x, b.y).clamp(least, most);
+    let three = Half3::new(all.x, all.y, Half::new(1.5));
+    let direction = three.normalize();
+    OwnHalves {
+        operators: all.lerp(Half::new(0.5) * most, Half::new(0.25)).into(),
+        functions: Vec3::from(direction).extend(f32::from(three.length())),
+        others: (all / Half::new(4.0)).into(),
+    }
+}
+
 #[cfg(not(target_arch = "spirv"))]
 mod inputs {
     //! Halves that are numbers.

@@ -140,6 +140,24 @@ pub fn counted(#[index] i: u32, #[uniform] count: &u32, #[storage] out: StorageM
     out.set(mirrored, i * 3);
 }
 
+/// How many bits are set, counted one by one, and the most of a number: atomic operations on what a loop has computed.
+#[kernel(compute, threads(64))]
+pub fn bits_set(
+    #[element] x: u32,
+    #[atomic]
+    #[length(2)]
+    counters: Atomics<'_>,
+) {
+    let mut count = 0;
+    let mut rest = x;
+    while rest > 0 {
+        count += rest & 1;
+        rest >>= 1;
+    }
+    counters.add(0, count);
+    counters.max(1, count);
+}
+
 /// Two textures and a buffer at once.
 #[kernel(compute, threads(8, 8), outputs(rgba32float, r32uint, buffer))]
 pub fn several(#[index] at: UVec2) -> (Vec4, u32, UVec2) {

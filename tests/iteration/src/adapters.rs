@@ -3,6 +3,24 @@
 use hankel_dsl::glam::{UVec2, UVec4};
 use hankel_dsl::kernel;
 
+/// The least and the greatest of what adapters make of arrays by value.
+#[kernel(compute, threads(64))]
+pub fn adapted(#[element] x: UVec4) -> UVec4 {
+    let a = x.to_array();
+    UVec4::new(
+        a.into_iter().map(|t| t ^ 21).min().unwrap_or(1),
+        a.into_iter()
+            .filter(|t| *t > 7)
+            .reduce(u32::max)
+            .unwrap_or(2),
+        a.into_iter()
+            .filter_map(|t| t.checked_sub(5))
+            .min()
+            .unwrap_or(3),
+        a.into_iter().map(|t| t & 0xff).max().unwrap_or(4),
+    )
+}
+
 /// Both parts of an array, and the patterns that a slice may have.
 #[kernel(compute, threads(64))]
 pub fn halves(#[element] x: UVec4, #[element] at: u32) -> UVec4 {

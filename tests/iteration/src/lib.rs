@@ -24,6 +24,7 @@ use integers::*;
 use loops::*;
 
 hankel_dsl::kernels![
+    adapted,
     walked,
     changed,
     numbered_rows,

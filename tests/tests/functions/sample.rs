@@ -8,7 +8,7 @@
 use hankel_codegen::functions;
 use hankel_codegen::functions::ir::Library;
 use hankel_codegen::functions::source::CrateText;
-use hankel_dsl::glam::{Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
+use hankel_dsl::glam::{Mat3, Mat4, UVec2, UVec4, Vec2, Vec3, Vec3Swizzles, Vec4};
 use hankel_dsl::native::describe::Type;
 use hankel_dsl::native::function::{Function, Words};
 use hankel_dsl::{Real, function, to_i32};
@@ -72,6 +72,77 @@ both! {
             i += 1;
         }
         sum
+    }
+
+    /// Loops with `for`: over what is known and what is not, left and continued, within each other.
+    #[function]
+    pub fn counted(x: f32, turns: u32) -> f32 {
+        const WEIGHTS: [f32; 6] = [0.5, 0.25, 0.125, 0.0625, 0.03125, 0.03125];
+        let mut sum = 0.0;
+        for (i, weight) in WEIGHTS.iter().enumerate() {
+            sum += (x + i as f32) * weight;
+        }
+        for row in -3..=3 {
+            if row == 0 {
+                continue;
+            }
+            for i in 0..turns & 7 {
+                sum = sum * 0.5 + (row * 2) as f32;
+                if sum > 4.0 {
+                    break;
+                }
+                sum -= i as f32;
+            }
+        }
+        let mut steps = 0;
+        for _ in 0..20 {
+            if sum * sum < 2.0 {
+                break;
+            } else {
+                sum *= 0.5;
+            }
+            steps += 1;
+        }
+        sum + steps as f32
+    }
+
+    /// Ends before the last line, and numbers that are told apart.
+    #[function]
+    pub fn ended(x: f32, kind: u32) -> f32 {
+        if !(x.abs() < 1e6) {
+            return -1.0;
+        }
+        let scale = match kind & 15 {
+            0 => 1.0,
+            1 | 2 => x,
+            3..=5 => {
+                if x < 0.0 {
+                    return x * 0.25;
+                }
+                x + 1.0
+            }
+            n if n > 12 => n as f32,
+            _ => 0.5,
+        };
+        let mut y = x * scale;
+        if y > 1.0 {
+            y -= 1.0;
+            if y > 1.0 {
+                return 1.0;
+            }
+        } else if y < -1.0 {
+            return y + scale;
+        }
+        y * y
+    }
+
+    /// Conversions, and components in another order.
+    #[function]
+    pub fn converted(x0: f32, word: u32) -> UVec4 {
+        let v = Vec3::new(x0, x0 * 1e10, -x0).zyx();
+        let whole = (x0 * 3.5) as i32;
+        let far = v.as_uvec3();
+        UVec4::new(v.y as u32, whole as u32, far.x ^ far.z, u32::from(x0 < 0.5) + (word < 7) as u32)
     }
 
     /// Bits and whole numbers.
@@ -149,7 +220,8 @@ both! {
 hankel_dsl::library!(sample {
     api: 1,
     functions: [
-        structures, branches, bits, projected, turned, matrices, vectors, mean
+        structures, branches, counted, ended, converted, bits, projected, turned, matrices,
+        vectors, mean
     ]
 });
 
@@ -192,7 +264,7 @@ pub fn has(function: &Function) -> bool {
 
 /// The sample, translated.
 pub fn library() -> Library {
-    let list = "hankel_dsl::library!(sample { api: 1, functions: [structures, branches, bits, projected, turned, \
+    let list = "hankel_dsl::library!(sample { api: 1, functions: [structures, branches, counted, ended, converted, bits, projected, turned, \
                 matrices, vectors, mean] });";
     let krate = CrateText {
         name: "sample".into(),

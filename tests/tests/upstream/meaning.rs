@@ -236,7 +236,20 @@ fn naga_panics_at_an_operation_of_a_subgroup_on_a_value_from_a_loop() {
     });
     assert!(
         read.is_err(),
-        "mended: drop the workaround in codegen/src/translate/reading.rs, `subgroup_operands`"
+        "mended: drop the workaround in codegen/src/translate/reading.rs, `late_operands`"
+    );
+}
+
+#[test]
+fn naga_makes_an_invalid_module_of_an_atomic_operation_on_a_value_from_a_loop() {
+    let options = naga::front::spv::Options::default();
+    let module = naga::front::spv::parse_u8_slice(&assembled("naga-atomic-operand"), &options)
+        .expect("naga reads the module");
+    let (flags, all) = (ValidationFlags::all(), Capabilities::all());
+    let valid = Validator::new(flags, all).validate(&module);
+    assert!(
+        valid.is_err(),
+        "mended: drop the workaround in codegen/src/translate/reading.rs, `late_operands`"
     );
 }
 

@@ -45,10 +45,19 @@ impl Evaluator<'_> {
             ("i32", Value::Scalar(e)) if e.ty == Type::I32 || e.ty == Type::U32 => {
                 Value::Scalar(builtin(Builtin::ToI32, vec![e]))
             }
-            ("u32" | "i32", Value::Scalar(e)) if e.ty == Type::F32 => {
-                let reason = "`as` from a float differs between languages out of range: clamp, and \
-                              use `to_i32`";
-                return Err(self.refuse(frame, span, reason));
+            ("u32", Value::Scalar(e)) if e.ty == Type::F32 => {
+                Value::Scalar(self.saturated(e, Scalar::U32))
+            }
+            ("i32", Value::Scalar(e)) if e.ty == Type::F32 => {
+                Value::Scalar(self.saturated(e, Scalar::I32))
+            }
+            ("u32", Value::Scalar(e)) if e.ty == Type::BOOL => {
+                let [one, none] = [1, 0].map(|v| literal(Literal::U32(v)));
+                Value::Scalar(builtin(Builtin::Select, vec![e, one, none]))
+            }
+            ("i32", Value::Scalar(e)) if e.ty == Type::BOOL => {
+                let [one, none] = [1, 0].map(|v| literal(Literal::I32(v)));
+                Value::Scalar(builtin(Builtin::Select, vec![e, one, none]))
             }
             ("usize" | "u64" | "i64" | "u128" | "i128" | "isize", _) if known_int.is_some() => {
                 Value::Int(known_int.unwrap_or(0))
@@ -58,6 +67,34 @@ impl Evaluator<'_> {
                 return Err(self.refuse(frame, span, reason));
             }
         })
+    }
+
+    /// A float as an integer, as Rust defines it: what is out of range is the nearest integer, and NaN is 0. Languages
+    /// differ there.
+    pub(in crate::functions) fn saturated(&mut self, x: Expr, to: Scalar) -> Expr {
+        let x = self.kept("number", x, Rank::Part);
+        let (which, most, limit) = match to {
+            Scalar::U32 => (Builtin::ToU32, Literal::U32(u32::MAX), 4_294_967_296.0),
+            _ => (Builtin::ToI32, Literal::I32(i32::MAX), 2_147_483_648.0),
+        };
+        let least = match to {
+            Scalar::U32 => float(0.0),
+            _ => float(-limit),
+        };
+        // Neither a number nor in range.
+        let none = match to {
+            Scalar::U32 => literal(Literal::U32(0)),
+            _ => {
+                let is_below = binary(Binary::Less, &x, &float(0.0));
+                let [least, none] = [i32::MIN, 0].map(|v| literal(Literal::I32(v)));
+                builtin(Builtin::Select, vec![is_below, least, none])
+            }
+        };
+        let is_above = binary(Binary::GreaterEqual, &x, &float(limit));
+        let is_inside = binary(Binary::Greater, &x, &least);
+        let whole = builtin(which, vec![x]);
+        let inside = builtin(Builtin::Select, vec![is_inside, whole, none]);
+        builtin(Builtin::Select, vec![is_above, literal(most), inside])
     }
 
     pub(super) fn whole_number(
@@ -106,6 +143,10 @@ impl Evaluator<'_> {
                 Ok(Value::Scalar(builtin(Builtin::FromBits, vec![e.clone()])))
             }
             ("f64", ..) => Err(self.refuse(frame, span, "`f64` is for constants only")),
+            ("u32" | "i32", "from", [value @ Value::Scalar(e)]) if e.ty == Type::BOOL => {
+                let ty = syn::Ident::new(head, span);
+                self.cast(frame, value.clone(), &syn::parse_quote!(#ty), span)
+            }
             _ => self.number_method(frame, name, args, span),
         }
     }
@@ -121,7 +162,7 @@ impl Evaluator<'_> {
         if let ("to_bits", [Value::Double(x)]) = (name, args.as_slice()) {
             return Ok(Value::Int(i128::from(x.to_bits())));
         }
-        if let (Some(Value::Int(a)), rest) = (args.first(), &args[1..]) {
+        if let [Value::Int(a), rest @ ..] = args.as_slice() {
             let b = rest.first().and_then(Value::as_int);
             match (name, b) {
                 ("saturating_sub", Some(b)) => return Ok(Value::Int((a - b).max(0))),

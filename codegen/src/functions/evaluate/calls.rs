@@ -7,11 +7,12 @@ use std::rc::Rc;
 use proc_macro2::Span;
 use syn::spanned::Spanned;
 
+use super::returns::with_one_end;
 use super::types::last_name;
 use super::variables::element;
 use super::{Done, Evaluator, Frame, Stop, is_function, return_type};
-use crate::functions::fold::{self, local};
-use crate::functions::ir::{Id, Kind, Rank, Stmt, Type};
+use crate::functions::fold::{self, binary, builtin, local};
+use crate::functions::ir::{Binary, Builtin, Id, Kind, Native, Rank, Stmt, Type};
 use crate::functions::linear::{matrix_name, vector_name};
 use crate::functions::source::{Item, Method, ModuleId, segments};
 use crate::functions::value::{Closure, Generic, Value};
@@ -94,7 +95,15 @@ impl Evaluator<'_> {
         for (pat, value) in closure.source.inputs.iter().zip(args) {
             self.bind(&mut inner, pat, value, Rank::Argument)?;
         }
-        match self.expr(&mut inner, &closure.source.body) {
+        match closure.source.body.as_ref() {
+            syn::Expr::Block(b) => self.body(&mut inner, &b.block),
+            other => self.expr(&mut inner, other),
+        }
+    }
+
+    /// Runs the body of a function or closure.
+    pub(super) fn body(&mut self, frame: &mut Frame, body: &syn::Block) -> Done<Value> {
+        match self.block(frame, &with_one_end(body)) {
             Err(Stop::Return(value)) => Ok(value),
             other => other,
         }
@@ -182,6 +191,13 @@ impl Evaluator<'_> {
                 if in_dsl && name == "to_i32" {
                     return self.whole_number(frame, args, span);
                 }
+                if in_dsl
+                    && self.tree.modules[home]
+                        .path
+                        .ends_with(&["math".into(), "native".into()])
+                {
+                    return self.native(frame, &name, args, span);
+                }
                 if is_function(&source.attrs) || self.is_elementary(home, &source) {
                     return self.kept_call(frame, home, &source, args, span);
                 }
@@ -202,15 +218,36 @@ impl Evaluator<'_> {
         }
     }
 
-    /// Whether a function is one of the DSL's elementary functions of one number, which are long: each is
-    /// written once, whoever calls it.
+    /// A function of `math::native`.
+    fn native(&self, frame: &Frame, name: &str, args: Vec<Value>, span: Span) -> Done<Value> {
+        let mut all = Vec::with_capacity(args.len());
+        for value in &args {
+            all.push(self.put_together(frame, value, &Type::F32, span)?);
+        }
+        match (Native::named(name), all.as_slice()) {
+            (Some(native), _) => Ok(Value::Scalar(builtin(Builtin::Native(native), all))),
+            (None, [a, b, c]) if name == "fma" => {
+                let product = binary(Binary::Multiply, a, b);
+                Ok(Value::Scalar(binary(Binary::Add, &product, c)))
+            }
+            _ => {
+                let reason =
+                    format!("not every language has `native::{name}`: take `math::{name}`");
+                Err(self.refuse(frame, span, reason))
+            }
+        }
+    }
+
+    /// Whether a function is one of the DSL's elementary functions, which are long: each is written once, whoever
+    /// calls it.
     fn is_elementary(&self, home: ModuleId, source: &syn::ItemFn) -> bool {
         let path = &self.tree.modules[home].path;
         path.len() == 3
+            && path[2] != "native"
             && path[..2] == ["hankel_dsl", "math"]
             && matches!(source.vis, syn::Visibility::Public(_))
             && source.attrs.iter().any(|a| a.path().is_ident("must_use"))
-            && source.sig.inputs.len() == 1
+            && is_over_elementary(&source.sig.generics)
             && matches!(&source.sig.output, syn::ReturnType::Type(_, ty) if matches!(**ty, syn::Type::Path(_)))
     }
 
@@ -300,12 +337,20 @@ impl Evaluator<'_> {
                 }
             }
         }
-        let value = match self.block(inner, body) {
-            Err(Stop::Return(value)) | Ok(value) => value,
-            Err(stop) => return Err(stop),
-        };
-        let value = self.read(value);
-        self.typed(inner, value, return_type(sig), span)
+        let done = self.body(inner, body).and_then(|value| {
+            let value = self.read(value);
+            self.typed(inner, value, return_type(sig), span)
+        });
+        // Of another crate's function, whoever calls it knows the place of the call.
+        let crate_of = |frame: &Frame| &self.tree.modules[frame.module].path[0];
+        match done {
+            Err(Stop::Refused(refusal)) if crate_of(inner) != crate_of(outer) => {
+                let (name, home) = (&sig.ident, crate_of(inner));
+                let reason = format!("`{name}` of {home}: {} ({})", refusal.reason, refusal.place);
+                Err(self.refuse(outer, span, reason))
+            }
+            done => done,
+        }
     }
 
     #[allow(clippy::too_many_arguments, reason = "what a call is made of")]
@@ -388,6 +433,14 @@ impl Evaluator<'_> {
             }
         }
     }
+}
+
+/// Whether a function has a number type with bits: `<R: Elementary>`.
+fn is_over_elementary(generics: &syn::Generics) -> bool {
+    let is_elementary = |bound: &syn::TypeParamBound| matches!(bound, syn::TypeParamBound::Trait(t) if t.path.is_ident("Elementary"));
+    generics
+        .type_params()
+        .any(|p| p.bounds.iter().any(is_elementary))
 }
 
 fn parameter_name(param: &syn::GenericParam) -> String {

@@ -1,20 +1,16 @@
-//! Control flow: branches, `match`, loops and `unroll!`. What is known is run here; what is not stays a branch or a
-//! loop, and the variables that are assigned in it change from there on.
+//! Branches and `match`. What is known is run here; what is not stays a branch, and the variables that are assigned in
+//! it change from there on.
 
 use std::collections::{BTreeSet, HashMap};
 
 use proc_macro2::{Span, TokenStream, TokenTree};
 use syn::spanned::Spanned;
 
-use super::types::int_literal;
 use super::{Done, Evaluator, Frame, Stop};
-use crate::functions::fold::{builtin, float, literal, local};
-use crate::functions::ir::{Builtin, Kind, Literal, Rank, Scalar, Stmt, Type};
-use crate::functions::source::segments;
+use crate::functions::fold::{builtin, float, literal, local, unary};
+use crate::functions::ir::{Builtin, Kind, Leave, Literal, Rank, Scalar, Stmt, Type, Unary};
+use crate::functions::source::{Item, segments};
 use crate::functions::value::Value;
-
-/// Turns of a loop whose body is run here at most.
-const MOST_TURNS: usize = 4096;
 
 impl Evaluator<'_> {
     pub(super) fn branch(&mut self, frame: &mut Frame, i: &syn::ExprIf) -> Done<Value> {
@@ -39,17 +35,29 @@ impl Evaluator<'_> {
         let condition = self.kept("condition", condition, Rank::Part);
         self.let_change(frame, &names);
 
-        self.blocks.push(Vec::new());
-        let then = self.block(frame, &i.then_branch);
-        let then_block = self.blocks.pop().unwrap_or_default();
-        let then = self.no_return(frame, then, i.span())?;
-        self.blocks.push(Vec::new());
-        let other = match &i.else_branch {
-            Some((_, e)) => self.expr(frame, e),
-            None => Ok(Value::Unit),
+        let (then_block, then) = self.side(frame, i.span(), |own, frame| {
+            own.block(frame, &i.then_branch)
+        })?;
+        let (other_block, other) =
+            self.side(frame, i.span(), |own, frame| match &i.else_branch {
+                Some((_, e)) => own.expr(frame, e),
+                None => Ok(Value::Unit),
+            })?;
+        // What comes after a side that leaves the loop belongs to the other side.
+        let (then, other) = match (then, other) {
+            (Ok(then), Ok(other)) => (then, other),
+            (Err(_), other) => {
+                self.emit(Stmt::If(condition, then_block, Vec::new()));
+                other_block.into_iter().for_each(|s| self.emit(s));
+                return other.map_err(Stop::Leave);
+            }
+            (Ok(then), Err(_)) => {
+                let fails = unary(Unary::Not, &condition);
+                self.emit(Stmt::If(fails, other_block, Vec::new()));
+                then_block.into_iter().for_each(|s| self.emit(s));
+                return Ok(then);
+            }
         };
-        let other_block = self.blocks.pop().unwrap_or_default();
-        let other = self.no_return(frame, other, i.span())?;
 
         let (mut then, other) = self.alike(frame, then, other, i.span())?;
         let mut a = Vec::new();
@@ -134,11 +142,31 @@ impl Evaluator<'_> {
         })
     }
 
-    fn no_return(&self, frame: &Frame, done: Done<Value>, span: Span) -> Done<Value> {
+    /// What one side of a branch does and gives, or how it leaves the loop around.
+    fn side(
+        &mut self,
+        frame: &mut Frame,
+        span: Span,
+        run: impl FnOnce(&mut Self, &mut Frame) -> Done<Value>,
+    ) -> Done<(Vec<Stmt>, Result<Value, Leave>)> {
+        self.blocks.push(Vec::new());
+        let done = run(self, frame);
+        let mut block = self.blocks.pop().unwrap_or_default();
+        match self.no_return(frame, done, span) {
+            Ok(value) => Ok((block, Ok(value))),
+            Err(Stop::Leave(what)) => {
+                block.push(Stmt::Leave(what));
+                Ok((block, Err(what)))
+            }
+            Err(stop) => Err(stop),
+        }
+    }
+
+    pub(super) fn no_return(&self, frame: &Frame, done: Done<Value>, span: Span) -> Done<Value> {
         match done {
             Err(Stop::Return(_)) => {
-                let reason = "a `return` that only happens sometimes has no form here: give a value \
-                              from both branches";
+                let reason = "a `return` inside of a loop has no form here: keep the value in a variable, \
+                              `break`, and give it at the end";
                 Err(self.refuse(frame, span, reason))
             }
             other => other,
@@ -151,10 +179,7 @@ impl Evaluator<'_> {
             Value::Variant(name) => Err(name.clone()),
             other => match other.as_int() {
                 Some(i) => Ok(i),
-                None => {
-                    let reason = "`match` is for what is known when the text is written";
-                    return Err(self.refuse(frame, m.expr.span(), reason));
-                }
+                None => return self.chosen_arm(frame, m, value),
             },
         };
         for arm in &m.arms {
@@ -187,217 +212,121 @@ impl Evaluator<'_> {
         Err(self.refuse(frame, m.span(), "no arm fits"))
     }
 
-    pub(super) fn repeated(&mut self, frame: &mut Frame, w: &syn::ExprWhile) -> Done<Value> {
-        let mut names = BTreeSet::new();
-        let body = &w.body;
-        assigned(quote::quote!(#body), &mut names);
-        let condition = self.value(frame, &w.cond)?;
-        let counter = counter(w);
-        // A loop over what is known is run here; one over what is not stays a loop.
-        let others_known = names
-            .iter()
-            .filter(|n| Some(n.as_str()) != counter.as_ref().map(|c| c.name.as_str()))
-            .filter_map(|n| frame.find(n))
-            .all(|slot| self.slots[slot].value.is_known());
-        let is_known = condition.as_bool().is_some();
-        let used = counter.as_ref().is_some_and(|c| c.used);
-        if is_known && (others_known || used || counter.is_none()) {
-            for _ in 0..MOST_TURNS {
-                let condition = self.value(frame, &w.cond)?;
-                match condition.as_bool() {
-                    Some(false) => return Ok(Value::Unit),
-                    Some(true) => {
-                        self.block(frame, &w.body)?;
-                    }
-                    None => break,
+    /// A `match` on a number that is not known, as a chain of branches.
+    fn chosen_arm(&mut self, frame: &mut Frame, m: &syn::ExprMatch, value: Value) -> Done<Value> {
+        let Value::Scalar(e) = value else {
+            let reason = "`match` is for numbers, and for what is known when the text is written";
+            return Err(self.refuse(frame, m.expr.span(), reason));
+        };
+        let kept = self.kept("matched", e, Rank::Part);
+        // No name of the source has two underscores and that.
+        let name = syn::Ident::new("__matched", m.expr.span());
+        let mut chain: Option<syn::Expr> = None;
+        for arm in m.arms.iter().rev() {
+            let body = &arm.body;
+            let (mut condition, binding) = match self.fits(frame, &arm.pat, &name) {
+                Some(fits) => fits,
+                None => {
+                    let reason =
+                        "this pattern has no form here: take numbers, `|`, ranges, a name or `_`";
+                    return Err(self.refuse(frame, arm.pat.span(), reason));
+                }
+            };
+            let body: syn::Expr = syn::parse_quote_spanned!(arm.pat.span()=> { #binding #body });
+            if let Some((_, guard)) = &arm.guard {
+                let guarded: syn::Expr =
+                    syn::parse_quote_spanned!(guard.span()=> ({ #binding #guard }));
+                condition = Some(match condition {
+                    Some(fits) => syn::parse_quote_spanned!(guard.span()=> (#fits) && #guarded),
+                    None => guarded,
+                });
+            }
+            // Rust has seen that some arm fits, so that the last one needs no condition.
+            chain = Some(match (chain, condition) {
+                (None, _) | (_, None) => body,
+                (Some(rest), Some(fits)) => {
+                    syn::parse_quote_spanned!(arm.pat.span()=> if #fits #body else { #rest })
+                }
+            });
+        }
+        let Some(chain) = chain else {
+            return Err(self.refuse(frame, m.span(), "no arm fits"));
+        };
+        frame.scopes.push(HashMap::new());
+        self.declare(frame, "__matched", Value::Scalar(kept));
+        let done = self.expr(frame, &chain);
+        frame.scopes.pop();
+        done
+    }
+
+    /// When a pattern fits the number of that name, if it may not, and what it binds.
+    fn fits(
+        &self,
+        frame: &Frame,
+        pat: &syn::Pat,
+        name: &syn::Ident,
+    ) -> Option<(Option<syn::Expr>, TokenStream)> {
+        let span = pat.span();
+        let nothing = TokenStream::new();
+        Some(match pat {
+            syn::Pat::Wild(_) => (None, nothing),
+            syn::Pat::Paren(p) => self.fits(frame, &p.pat, name)?,
+            syn::Pat::Lit(lit) => match &lit.lit {
+                syn::Lit::Bool(b) if b.value => (Some(syn::parse_quote!(#name)), nothing),
+                syn::Lit::Bool(_) => (Some(syn::parse_quote!(!#name)), nothing),
+                _ => (
+                    Some(syn::parse_quote_spanned!(span=> #name == #lit)),
+                    nothing,
+                ),
+            },
+            syn::Pat::Path(p) => (Some(syn::parse_quote_spanned!(span=> #name == #p)), nothing),
+            syn::Pat::Range(r) => {
+                let from = r.start.as_ref().map(|from| quote::quote!(#name >= #from));
+                let to = r.end.as_ref().map(|to| match r.limits {
+                    syn::RangeLimits::HalfOpen(_) => quote::quote!(#name < #to),
+                    syn::RangeLimits::Closed(_) => quote::quote!(#name <= #to),
+                });
+                let both = match (from, to) {
+                    (Some(from), Some(to)) => quote::quote!(#from && #to),
+                    (from, to) => from.or(to)?,
+                };
+                (Some(syn::parse_quote_spanned!(span=> #both)), nothing)
+            }
+            syn::Pat::Or(or) => {
+                let mut all: Option<syn::Expr> = None;
+                for case in &or.cases {
+                    let (Some(fits), _) = self.fits(frame, case, name)? else {
+                        return Some((None, nothing));
+                    };
+                    all = Some(match all {
+                        Some(before) => syn::parse_quote_spanned!(span=> #before || #fits),
+                        None => fits,
+                    });
+                }
+                (Some(all?), nothing)
+            }
+            syn::Pat::Ident(i) if i.subpat.is_none() => {
+                let ident = &i.ident;
+                let names = [ident.to_string()];
+                if matches!(
+                    self.tree.resolve(frame.module, &names),
+                    Some((_, Item::Const(_)))
+                ) {
+                    (
+                        Some(syn::parse_quote_spanned!(span=> #name == #ident)),
+                        nothing,
+                    )
+                } else {
+                    (None, quote::quote!(let #ident = #name;))
                 }
             }
-            return Err(self.refuse(frame, w.span(), "this loop does not end while it is known"));
-        }
-        let Some(counter) = counter else {
-            let reason = "a loop counts: `let mut i = 0; while i < end { …; i += 1; }`";
-            return Err(self.refuse(frame, w.span(), reason));
-        };
-        names.remove(&counter.name);
-        let Some(slot) = frame.find(&counter.name) else {
-            return Err(self.refuse(frame, w.span(), "the counter is not found"));
-        };
-        let end = self.value(frame, &counter.end)?;
-        let from = self.slots[slot].value.clone();
-        let (from, end) = match (from, end) {
-            (Value::Scalar(a), Value::Scalar(b)) => (a, b),
-            (Value::Scalar(a), b @ Value::Int(_)) => {
-                let b = self.put_together(frame, &b, &a.ty, w.span())?;
-                (a, b)
-            }
-            (a @ Value::Int(_), Value::Scalar(b)) => {
-                let a = self.put_together(frame, &a, &b.ty, w.span())?;
-                (a, b)
-            }
-            (Value::Int(a), Value::Int(b)) => {
-                let number = |i: i128| {
-                    int_literal(i, Scalar::U32)
-                        .map(literal)
-                        .ok_or_else(|| self.refuse(frame, w.span(), "the counter is out of range"))
-                };
-                (number(a)?, number(b)?)
-            }
-            _ => return Err(self.refuse(frame, w.span(), "a counter is a whole number")),
-        };
-        if !matches!(from.ty, Type::Scalar(Scalar::U32 | Scalar::I32)) || from.ty != end.ty {
-            return Err(self.refuse(frame, w.span(), "a counter is a `u32` or `i32`"));
-        }
-        let end = self.kept("end", end, Rank::Part);
-        let from = self.kept("start", from, Rank::Part);
-        self.let_change(frame, &names);
-        let id = self.new_local(&counter.name, from.ty.clone(), Rank::Variable);
-        self.changing.insert(id);
-        self.slots[slot].value = Value::Scalar(local(id, from.ty.clone()));
-        self.blocks.push(Vec::new());
-        frame.scopes.push(HashMap::new());
-        let stmts = &w.body.stmts[..w.body.stmts.len() - 1];
-        let done = self.statements(frame, stmts);
-        frame.scopes.pop();
-        let block = self.blocks.pop().unwrap_or_default();
-        self.no_return(frame, done, w.span())?;
-        // After the loop nobody reads a counter; if somebody does, it is found out.
-        self.slots[slot].value = Value::Text;
-        self.emit(Stmt::For(id, from, end, block));
-        Ok(Value::Unit)
-    }
-
-    pub(super) fn unroll(&mut self, frame: &mut Frame, mac: &syn::Macro) -> Done<Value> {
-        let span = mac.path.span();
-        let turns: Turns = self.parsed(frame, mac.tokens.clone(), span)?;
-        let from = self.value(frame, &turns.from)?.as_int();
-        let to = self.value(frame, &turns.to)?.as_int();
-        let (Some(from), Some(to)) = (from, to) else {
-            return Err(self.refuse(frame, span, "the range of `unroll!` is not known"));
-        };
-        let name = turns.index.to_string();
-        // Without an index nothing tells one turn from another: it stays a loop.
-        if name.starts_with('_') && to - from > 2 {
-            let mut names = BTreeSet::new();
-            let block = &turns.body;
-            assigned(quote::quote!(#block), &mut names);
-            let known = names
-                .iter()
-                .filter_map(|n| frame.find(n))
-                .all(|slot| self.slots[slot].value.is_known());
-            if !known {
-                self.let_change(frame, &names);
-                let id = self.new_local("turn", Type::U32, Rank::Variable);
-                self.changing.insert(id);
-                self.blocks.push(Vec::new());
-                let done = self.block(frame, &turns.body);
-                let block = self.blocks.pop().unwrap_or_default();
-                self.no_return(frame, done, span)?;
-                let number = |i: i128| literal(Literal::U32(i as u32));
-                self.emit(Stmt::For(id, number(from), number(to), block));
-                return Ok(Value::Unit);
-            }
-        }
-        for i in from..to {
-            frame.scopes.push(HashMap::new());
-            self.declare(frame, &name, Value::Int(i));
-            let done = self.block(frame, &turns.body);
-            frame.scopes.pop();
-            done?;
-        }
-        Ok(Value::Unit)
-    }
-}
-
-/// The range and body of an `unroll!`.
-struct Turns {
-    index: proc_macro2::Ident,
-    from: syn::Expr,
-    to: syn::Expr,
-    body: syn::Block,
-}
-
-impl syn::parse::Parse for Turns {
-    fn parse(input: syn::parse::ParseStream<'_>) -> syn::Result<Self> {
-        let index = input.parse()?;
-        input.parse::<syn::Token![in]>()?;
-        let range: syn::Expr = input.call(syn::Expr::parse_without_eager_brace)?;
-        let syn::Expr::Range(syn::ExprRange {
-            start: Some(from),
-            end: Some(to),
-            ..
-        }) = range
-        else {
-            return Err(syn::Error::new(range.span(), "`unroll!` takes a range"));
-        };
-        input.parse::<syn::Token![,]>()?;
-        if input.peek(syn::Ident) {
-            input.parse::<syn::Ident>()?;
-            input.parse::<syn::LitInt>()?;
-            input.parse::<syn::Token![,]>()?;
-        }
-        // A loop in a shader: functions have no arrays, so that here it is none.
-        if input.peek(syn::Token![loop]) {
-            input.parse::<syn::Token![loop]>()?;
-            input.parse::<syn::Token![if]>()?;
-            input.parse::<syn::Expr>()?;
-            input.parse::<syn::Token![,]>()?;
-        }
-        Ok(Self {
-            index,
-            from: *from,
-            to: *to,
-            body: input.parse()?,
+            _ => return None,
         })
     }
 }
 
-/// What counts in a loop.
-struct Counter {
-    name: String,
-    end: syn::Expr,
-    /// The body reads it, but for counting.
-    used: bool,
-}
-
-/// `while i < end { …; i += 1; }`
-fn counter(w: &syn::ExprWhile) -> Option<Counter> {
-    let syn::Expr::Binary(condition) = w.cond.as_ref() else {
-        return None;
-    };
-    let (syn::BinOp::Lt(_), syn::Expr::Path(p)) = (condition.op, condition.left.as_ref()) else {
-        return None;
-    };
-    let name = p.path.get_ident()?.to_string();
-    let (last, before) = w.body.stmts.split_last()?;
-    let syn::Stmt::Expr(syn::Expr::Binary(step), _) = last else {
-        return None;
-    };
-    let (syn::BinOp::AddAssign(_), syn::Expr::Path(q), syn::Expr::Lit(one)) =
-        (step.op, step.left.as_ref(), step.right.as_ref())
-    else {
-        return None;
-    };
-    if q.path.get_ident()? != &name || quote::quote!(#one).to_string() != "1" {
-        return None;
-    }
-    let used = before.iter().any(|s| mentions(quote::quote!(#s), &name));
-    Some(Counter {
-        name,
-        end: (*condition.right).clone(),
-        used,
-    })
-}
-
-fn mentions(tokens: TokenStream, name: &str) -> bool {
-    tokens.into_iter().any(|t| match t {
-        TokenTree::Ident(i) => i == name,
-        TokenTree::Group(g) => mentions(g.stream(), name),
-        _ => false,
-    })
-}
-
 /// The names that are assigned somewhere in the tokens, or lent out to be changed.
-fn assigned(tokens: TokenStream, names: &mut BTreeSet<String>) {
+pub(super) fn assigned(tokens: TokenStream, names: &mut BTreeSet<String>) {
     let all: Vec<TokenTree> = tokens.into_iter().collect();
     let punct = |i: usize| match all.get(i) {
         Some(TokenTree::Punct(p)) => Some(p.as_char()),

@@ -6,9 +6,9 @@ use std::rc::Rc;
 use proc_macro2::Span;
 use syn::spanned::Spanned;
 
-use super::{Done, Evaluator, Frame, Stop};
+use super::{Done, Evaluator, Frame, Stop, loops};
 use crate::functions::fold::{float, literal};
-use crate::functions::ir::{Literal, Scalar};
+use crate::functions::ir::{Leave, Literal, Scalar};
 use crate::functions::linear::{matrix_constant, matrix_name, vector_name};
 use crate::functions::source::{Item, segments};
 use crate::functions::value::{Closure, Generic, Step, Value};
@@ -114,11 +114,27 @@ impl Evaluator<'_> {
                 Err(Stop::Return(value))
             }
             syn::Expr::Unsafe(u) => Err(self.refuse(frame, u.span(), "`unsafe` has no form here")),
-            syn::Expr::ForLoop(f) => Err(self.refuse(
+            syn::Expr::ForLoop(f) => self.counted(frame, f),
+            syn::Expr::Break(b) => match (&b.label, &b.expr) {
+                (None, None) => Err(Stop::Leave(Leave::Loop)),
+                _ => Err(self.refuse(
+                    frame,
+                    b.span(),
+                    "only the innermost loop is left, without a value",
+                )),
+            },
+            syn::Expr::Continue(c) => match &c.label {
+                None => Err(Stop::Leave(Leave::Turn)),
+                Some(_) => {
+                    Err(self.refuse(frame, c.span(), "only the innermost loop is continued"))
+                }
+            },
+            syn::Expr::Range(r) => Err(self.refuse(
                 frame,
-                f.span(),
-                "`for` has no form here: count with `while`, or use `unroll!`",
+                r.span(),
+                "a range is what `for` goes over, by itself or with `rev`, `step_by`, `enumerate` and `zip`",
             )),
+            syn::Expr::Loop(l) => Err(self.refuse(frame, l.span(), loops::ENDLESS)),
             other => Err(self.refuse(frame, other.span(), "this expression has no form here")),
         }
     }
@@ -174,18 +190,17 @@ impl Evaluator<'_> {
             }
         }
         if let [first, second] = names.as_slice() {
-            if frame.generics.get(first) == Some(&Generic::Real) || first == "f32" {
-                match second.as_str() {
-                    "IS_WIDE" => return Ok(Value::bool(false)),
-                    "EPSILON" => return Ok(Value::Scalar(float(f32::EPSILON))),
-                    _ => {}
+            let is_own = first == "Self" && frame.own.as_deref() == Some("f32");
+            let is_real = is_own || frame.generics.get(first) == Some(&Generic::Real);
+            let ty = if is_real { "f32" } else { first };
+            match (ty, second.as_str()) {
+                ("f32", "IS_WIDE") => return Ok(Value::bool(false)),
+                ("f32", "EPSILON") => return Ok(Value::Scalar(float(f32::EPSILON))),
+                (ty, name) => {
+                    if let Some(number) = limit_of(ty, name) {
+                        return Ok(number);
+                    }
                 }
-            }
-            if first == "f64" && second == "EPSILON" {
-                return Ok(Value::Double(f64::EPSILON));
-            }
-            if first == "u32" && second == "MAX" {
-                return Ok(Value::Scalar(literal(Literal::U32(u32::MAX))));
             }
             if let Some((scalar, size)) = vector_name(first) {
                 let each = |v: f32| match scalar {
@@ -225,9 +240,7 @@ impl Evaluator<'_> {
                 Ok(Value::Path(frame.module, Rc::new(p.clone())))
             }
             _ => match names.join("::").as_str() {
-                "core::f64::consts::PI" => Ok(Value::Double(std::f64::consts::PI)),
-                "core::f64::consts::LOG2_E" => Ok(Value::Double(std::f64::consts::LOG2_E)),
-                "core::f32::consts::PI" => Ok(Value::Scalar(float(std::f32::consts::PI))),
+                path if constant_of(path).is_some() => Ok(constant_of(path).unwrap_or(Value::Unit)),
                 // A variant of an enumeration, or a function that the call knows.
                 _ if names.len() > 1 => Ok(Value::Variant(names.join("::"))),
                 name => Err(self.refuse(frame, p.span(), format!("`{name}` is not found"))),
@@ -294,4 +307,44 @@ impl Evaluator<'_> {
         }
         Ok(Value::Struct(identity, fields))
     }
+}
+
+/// A number type's limit, by its name.
+fn limit_of(ty: &str, name: &str) -> Option<Value> {
+    Some(match (ty, name) {
+        ("f32", "MAX") => Value::Scalar(float(f32::MAX)),
+        ("f32", "MIN") => Value::Scalar(float(f32::MIN)),
+        ("f32", "MIN_POSITIVE") => Value::Scalar(float(f32::MIN_POSITIVE)),
+        ("f64", "EPSILON") => Value::Double(f64::EPSILON),
+        ("f64", "MAX") => Value::Double(f64::MAX),
+        ("f64", "MIN_POSITIVE") => Value::Double(f64::MIN_POSITIVE),
+        ("u32", "MAX") => Value::Scalar(literal(Literal::U32(u32::MAX))),
+        ("u32", "MIN") => Value::Scalar(literal(Literal::U32(0))),
+        ("i32", "MAX") => Value::Scalar(literal(Literal::I32(i32::MAX))),
+        ("i32", "MIN") => Value::Scalar(literal(Literal::I32(i32::MIN))),
+        _ => return None,
+    })
+}
+
+/// A constant of the standard library, by its path.
+fn constant_of(path: &str) -> Option<Value> {
+    macro_rules! constants {
+        ($($name:ident)*) => {
+            match path.strip_prefix("core::").or(path.strip_prefix("std::"))? {
+                $(
+                    concat!("f32::consts::", stringify!($name)) => {
+                        Value::Scalar(float(std::f32::consts::$name))
+                    }
+                    concat!("f64::consts::", stringify!($name)) => {
+                        Value::Double(std::f64::consts::$name)
+                    }
+                )*
+                _ => return None,
+            }
+        };
+    }
+    Some(constants!(
+        PI TAU E SQRT_2 FRAC_1_SQRT_2 FRAC_1_PI FRAC_2_PI FRAC_2_SQRT_PI FRAC_PI_2 FRAC_PI_3 FRAC_PI_4
+        FRAC_PI_6 FRAC_PI_8 LN_2 LN_10 LOG2_E LOG2_10 LOG10_E LOG10_2
+    ))
 }

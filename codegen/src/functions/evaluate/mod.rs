@@ -7,7 +7,9 @@
 //! the parameters, runs the body as a block, and emits a `return`. Its methods are in files of their own:
 //!
 //! - `statements`: blocks, `let` and patterns, and the source's own macros, which become blocks;
-//! - `control`: `if`, `match`, `while` and `unroll!`;
+//! - `control`: `if` and `match`;
+//! - `loops`: `for`, `while` and `unroll!`;
+//! - `returns`: an early `return`, written as the value of a branch;
 //! - `expressions`: every other expression; those of some length are passed on to
 //!   - `operators`: unary and binary operators,
 //!   - `calls`: functions, methods and closures, run in place or kept as calls,
@@ -19,7 +21,9 @@ mod builtins;
 mod calls;
 mod control;
 mod expressions;
+mod loops;
 mod operators;
+mod returns;
 mod statements;
 mod types;
 mod variables;
@@ -31,7 +35,7 @@ use proc_macro2::Span;
 use syn::spanned::Spanned;
 
 use super::fold::{self, local};
-use super::ir::{Constant, Function, Id, Literal, Local, Param, Rank, Stmt, Struct, Type};
+use super::ir::{Constant, Function, Id, Leave, Literal, Local, Param, Rank, Stmt, Struct, Type};
 use super::refusal::Refusal;
 use super::source::{ModuleId, Tree, docs};
 use super::value::{Generic, Value};
@@ -40,6 +44,7 @@ use super::value::{Generic, Value};
 pub(super) enum Stop {
     Refused(Refusal),
     Return(Value),
+    Leave(Leave),
 }
 
 impl From<Refusal> for Stop {
@@ -70,6 +75,7 @@ impl Frame {
 }
 
 /// A variable of the source.
+#[derive(Clone)]
 struct Slot {
     name: String,
     value: Value,
@@ -78,6 +84,7 @@ struct Slot {
 }
 
 /// Translates functions of a tree, one at a time.
+#[derive(Clone)]
 pub struct Evaluator<'a> {
     tree: &'a Tree,
     slots: Vec<Slot>,
@@ -144,10 +151,10 @@ impl<'a> Evaluator<'a> {
         match self.whole(&mut frame, source) {
             Ok(function) => Ok(function),
             Err(Stop::Refused(refusal)) => Err(refusal),
-            Err(Stop::Return(_)) => Err(Refusal::at(
+            Err(Stop::Return(_) | Stop::Leave(_)) => Err(Refusal::at(
                 &self.tree.modules[module].file,
                 source.sig.span(),
-                "a `return` that only happens sometimes has no form here: give a value at the end",
+                "this function leaves what it is not in",
             )),
         }
     }
@@ -170,12 +177,6 @@ impl<'a> Evaluator<'a> {
             };
             let ty = self.interface(frame, &typed.ty)?;
             let name = pat.ident.to_string();
-            if name.ends_with(|c: char| c.is_ascii_digit()) {
-                let reason = format!(
-                    "parameter `{name}` ends in a digit, which naga_oil refuses: rename it"
-                );
-                return Err(self.refuse(frame, pat.span(), reason));
-            }
             let id = self.new_local(&name, ty.clone(), Rank::Variable);
             let value = match &ty {
                 Type::Lookup(_) => Value::Lookup(id),
@@ -194,10 +195,7 @@ impl<'a> Evaluator<'a> {
             }
             syn::ReturnType::Type(_, ty) => self.interface(frame, ty)?,
         };
-        let value = match self.block(frame, &source.block) {
-            Err(Stop::Return(value)) | Ok(value) => value,
-            Err(stop) => return Err(stop),
-        };
+        let value = self.body(frame, &source.block)?;
         let value = self.typed(frame, value, return_type(sig), source.block.span())?;
         let value = self.put_together(frame, &value, &result, source.block.span())?;
         self.emit(Stmt::Return(value));
@@ -238,7 +236,9 @@ impl<'a> Evaluator<'a> {
         let value = match value {
             Ok(value) => value,
             Err(Stop::Refused(refusal)) => return Err(refusal),
-            Err(Stop::Return(_)) => return Err(refuse("a constant returns nothing")),
+            Err(Stop::Return(_) | Stop::Leave(_)) => {
+                return Err(refuse("a constant returns nothing"));
+            }
         };
         let of_scalar = |v: &Value| match v {
             Value::Scalar(e) => fold::known(e),

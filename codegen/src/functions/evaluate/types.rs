@@ -248,7 +248,11 @@ impl Evaluator<'_> {
         let mut members = Vec::new();
         for field in &source.fields {
             let Some(ident) = &field.ident else {
-                let reason = format!("`{name}` has no names for its members");
+                let reason = format!(
+                    "`{name}` cannot be passed or returned: its members have no names. Take \
+                     `f32`, `u32`, `i32`, `bool`, a vector or a matrix of them, or a structure \
+                     with named members; compute in `f32` instead of `Half`"
+                );
                 return Err(self.refuse(frame, span, reason));
             };
             let member_name = ident.to_string();

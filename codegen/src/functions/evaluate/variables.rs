@@ -9,7 +9,7 @@ use syn::spanned::Spanned;
 use super::types::int_literal;
 use super::{Done, Evaluator, Frame, Slot};
 use crate::functions::fold::{float, literal, local};
-use crate::functions::ir::{Expr, Id, Kind, Local, Rank, Stmt, Type};
+use crate::functions::ir::{Expr, Id, Kind, Local, Rank, Scalar, Stmt, Type};
 use crate::functions::source::segments;
 use crate::functions::value::{Place, Step, Value};
 
@@ -189,8 +189,15 @@ impl Evaluator<'_> {
         for slot in slots {
             let name = self.slots[slot].name.clone();
             let mut value = self.slots[slot].value.clone();
-            if let Value::Fraction(_, single) = value {
-                value = Value::Scalar(float(single));
+            // A number whose type is not said has Rust's own.
+            match value {
+                Value::Fraction(_, single) => value = Value::Scalar(float(single)),
+                Value::Int(i) => {
+                    if let Some(number) = int_literal(i, Scalar::I32) {
+                        value = Value::Scalar(literal(number));
+                    }
+                }
+                _ => {}
             }
             let mut all = Vec::new();
             value.each_scalar(&name, &mut |part, e| all.push((part.to_owned(), e.clone())));

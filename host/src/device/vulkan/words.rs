@@ -41,6 +41,8 @@ pub const SIGNED_ZERO_INF_NAN_PRESERVE: (u32, u32) = (4466, 4461);
 /// Capability `Float64`.
 const FLOAT_64: u32 = 10;
 /// `OpSpecConstant`.
+const SPEC_CONSTANT_TRUE: u16 = 48;
+const SPEC_CONSTANT_FALSE: u16 = 49;
 const SPEC_CONSTANT: u16 = 50;
 /// `OpFunction`.
 const FUNCTION: u16 = 54;
@@ -180,11 +182,19 @@ pub fn specialise(words: &[u32], values: &[(u32, u32)]) -> Result<Vec<u32>, Stri
         }) else {
             continue;
         };
-        for i in all.iter().filter(|i| i.opcode == SPEC_CONSTANT) {
-            if let [_, result, _] = i.operands
-                && *result == target
-            {
-                changed[i.at + 3] = value;
+        for i in &all {
+            match (i.opcode, i.operands) {
+                (SPEC_CONSTANT, [_, result, _]) if *result == target => changed[i.at + 3] = value,
+                // A truth value is the instruction itself.
+                (SPEC_CONSTANT_TRUE | SPEC_CONSTANT_FALSE, [_, result]) if *result == target => {
+                    let opcode = if value == 0 {
+                        SPEC_CONSTANT_FALSE
+                    } else {
+                        SPEC_CONSTANT_TRUE
+                    };
+                    changed[i.at] = 3 << 16 | u32::from(opcode);
+                }
+                _ => {}
             }
         }
     }
@@ -439,6 +449,21 @@ mod tests {
         assert_eq!(
             (&w[..at], &w[at + 1..]),
             (&module()[..at], &module()[at + 1..])
+        );
+    }
+
+    #[test]
+    fn a_truth_value_is_changed_by_its_number() {
+        let mut w = module();
+        let at = w.len() - 6;
+        w.splice(at - 4..at, [3 << 16 | u32::from(SPEC_CONSTANT_TRUE), 9, 7]);
+        let opcode = |value: u32| {
+            let w = specialise(&w, &[(3, value)]).unwrap();
+            w[at - 4] as u16
+        };
+        assert_eq!(
+            [0, 1].map(opcode),
+            [SPEC_CONSTANT_FALSE, SPEC_CONSTANT_TRUE]
         );
     }
 

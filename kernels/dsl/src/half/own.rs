@@ -144,6 +144,14 @@ impl Half {
 
 compared!(Half);
 
+/// Exact.
+impl From<Half> for f32 {
+    #[inline(always)]
+    fn from(x: Half) -> Self {
+        x.get()
+    }
+}
+
 impl Neg for Half {
     type Output = Self;
     #[inline(always)]
@@ -242,6 +250,34 @@ macro_rules! vectors {
                     };
             }
 
+            /// Each part from `least`'s to `most`'s, which must not be below it.
+            #[inline(always)]
+            #[must_use]
+            pub fn clamp(self, least: Self, most: Self) -> Self {
+                self.max(least).min(most)
+            }
+
+            /// From `self`, where `share` is 0, to `other`, where it is 1.
+            #[inline(always)]
+            #[must_use]
+            pub fn lerp(self, other: Self, share: Half) -> Self {
+                self + (other - self) * share
+            }
+
+            /// Length: the root of the sum of the squares, which is infinite from 65520 on.
+            #[inline(always)]
+            #[must_use]
+            pub fn length(self) -> Half {
+                self.dot(self).sqrt()
+            }
+
+            /// The vector by its length, which must not be 0.
+            #[inline(always)]
+            #[must_use]
+            pub fn normalize(self) -> Self {
+                self / self.length()
+            }
+
             /// The dot product.
             #[inline(always)]
             #[must_use]
@@ -278,6 +314,22 @@ macro_rules! vectors {
                     [a = self, b = factor],
                     Self { $x: a.$x * b $(, $part: a.$part * b)+ }
                 )
+            }
+        }
+
+        impl Mul<$vector> for Half {
+            type Output = $vector;
+            #[inline(always)]
+            fn mul(self, v: $vector) -> $vector {
+                v * self
+            }
+        }
+
+        impl Div<Half> for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, divisor: Half) -> Self {
+                self / Self::splat(divisor)
             }
         }
 

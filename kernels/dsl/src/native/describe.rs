@@ -431,11 +431,13 @@ pub enum Role {
         /// What it does.
         sampler: SamplerKind,
     },
-    /// A specialisation constant (`u32`).
+    /// A specialisation constant.
     Constant {
         /// `SpecId`.
         id: u32,
-        /// The value unless specialised.
+        /// `u32`, `i32`, `f32` or `bool`.
+        scalar: Scalar,
+        /// The 32 bits of the value unless specialised: a truth value is 0 or 1.
         default: u32,
     },
     /// The invocation's own index; in the fragment form of an image pass the pixel. Bound to nothing.
@@ -991,6 +993,99 @@ impl Scalar {
         match self {
             Self::F64 | Self::U64 | Self::I64 => 8,
             Self::F32 | Self::U32 | Self::I32 | Self::Bool => 4,
+        }
+    }
+}
+
+/// The value of a specialisation constant, as people write it: `2`, `0.5`, `true`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ConstantValue {
+    /// A truth value.
+    Bool(bool),
+    /// A whole number.
+    Integer(i64),
+    /// A number with a fraction.
+    Float(f64),
+}
+
+impl From<u32> for ConstantValue {
+    fn from(n: u32) -> Self {
+        Self::Integer(n.into())
+    }
+}
+
+// No value is NaN: neither JSON nor `parse` has one.
+impl Eq for ConstantValue {}
+
+impl ConstantValue {
+    /// The value of 32 bits.
+    #[must_use]
+    pub fn of_word(scalar: Scalar, word: u32) -> Self {
+        match scalar {
+            Scalar::Bool => Self::Bool(word != 0),
+            Scalar::I32 => Self::Integer(word.cast_signed().into()),
+            Scalar::F32 => Self::Float(f32::from_bits(word).into()),
+            _ => Self::Integer(word.into()),
+        }
+    }
+
+    /// Its 32 bits as a constant of that type; none if it is not one. A truth value may be 0 or 1, too, and a number
+    /// with a fraction a whole one.
+    #[must_use]
+    pub fn word(self, scalar: Scalar) -> Option<u32> {
+        match (scalar, self) {
+            (Scalar::Bool, Self::Bool(b)) => Some(b.into()),
+            (Scalar::Bool, Self::Integer(n @ (0 | 1))) => u32::try_from(n).ok(),
+            (Scalar::U32, Self::Integer(n)) => u32::try_from(n).ok(),
+            (Scalar::I32, Self::Integer(n)) => i32::try_from(n).ok().map(i32::cast_unsigned),
+            (Scalar::F32, Self::Integer(n)) => Some((n as f32).to_bits()),
+            (Scalar::F32, Self::Float(x)) => {
+                let single = x as f32;
+                single.is_finite().then(|| single.to_bits())
+            }
+            _ => None,
+        }
+    }
+
+    /// As a number.
+    #[must_use]
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Bool(b) => b.into(),
+            Self::Integer(n) => n as f64,
+            Self::Float(x) => x,
+        }
+    }
+}
+
+impl core::str::FromStr for ConstantValue {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(b) = text.parse() {
+            return Ok(Self::Bool(b));
+        }
+        if let Ok(n) = text.parse() {
+            return Ok(Self::Integer(n));
+        }
+        match text.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(Self::Float(x)),
+            _ => Err(std::format!(
+                "a specialisation constant is a number, `true` or `false`, which `{text}` is not"
+            )),
+        }
+    }
+}
+
+impl core::fmt::Display for ConstantValue {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Bool(b) => b.fmt(f),
+            Self::Integer(n) => n.fmt(f),
+            // An `f32`'s digits, if it is one.
+            Self::Float(x) if f64::from(*x as f32) == *x => write!(f, "{:?}", *x as f32),
+            Self::Float(x) => write!(f, "{x:?}"),
         }
     }
 }

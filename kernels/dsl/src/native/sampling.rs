@@ -14,6 +14,7 @@
 use glam::{UVec4, Vec3, Vec4};
 
 use super::call::{Address, Filter, Sampler, TextureRef, level_size, texture_bytes};
+use super::sanitize;
 
 /// A level of a layer of a texture.
 #[derive(Clone, Copy)]
@@ -139,6 +140,8 @@ fn face(r: Vec3) -> (u32, [f32; 2]) {
     } else {
         (1, r.z, -r.y, a.x)
     };
+    // The middle of a face where there is no direction.
+    let major = if major == 0.0 { 1.0 } else { major };
     (face, [s / major, t / major])
 }
 
@@ -306,6 +309,7 @@ fn levels(
     detail: f32,
     of: &impl Fn(Vec4) -> Vec4,
 ) -> Vec4 {
+    look_for_direction(place);
     let between = if detail <= 0.0 {
         sampler.magnify
     } else {
@@ -327,6 +331,16 @@ fn levels(
                 one(fine) * (1.0 - weight) + one(fine + 1) * weight
             }
         }
+    }
+}
+
+/// The sanitizer says where a direction is none, so that it has no face ("Cube Map Face Selection"): a device may read
+/// anything then. Subnormal numbers may count as 0.
+fn look_for_direction(place: Place) {
+    if let Place::Cube { direction, .. } = place
+        && direction.abs().max_element() < f32::MIN_POSITIVE
+    {
+        sanitize::no_direction();
     }
 }
 
@@ -370,6 +384,7 @@ pub fn gather_integers(
     place: Place,
     channel: usize,
 ) -> UVec4 {
+    look_for_direction(place);
     let taps = Taps::new(t, sampler, place, 0, true);
     let texel = |step: [i64; 3]| {
         let (level, at) = taps.place(step)?;
@@ -392,6 +407,7 @@ fn gathered(
     place: Place,
     of: &impl Fn(Vec4) -> Vec4,
 ) -> Vec4 {
+    look_for_direction(place);
     let [a, b, c, d] = Taps::new(t, sampler, place, 0, true).square(0, of);
     Vec4::new(c.x, d.x, b.x, a.x)
 }

@@ -403,6 +403,22 @@ fn looked_for_texel(
     ));
 }
 
+/// A cube is sampled in no direction.
+#[cold]
+#[inline(never)]
+pub(crate) fn no_direction() {
+    if SESSIONS.load(Relaxed) == 0 {
+        return;
+    }
+    if let Some(reader) = SESSION.with_borrow(|session| Some(session.as_ref()?.at)) {
+        refuse(format!(
+            "{} samples a cube in the direction (0, 0, 0), for which a device may read anything: give it another one, \
+             `if v == Vec3::ZERO {{ Vec3::Z }} else {{ v }}`",
+            invocation(reader)
+        ));
+    }
+}
+
 #[cold]
 #[inline(never)]
 fn looked<T>(

@@ -30,8 +30,8 @@ pub(crate) struct Recurrence<R, A> {
     /// The squared mean's share of it.
     pub rest: R,
     /// The unit of length, near the root of the mean square distance: a power of two in twice the
-    /// digits. Otherwise 1 for N up to 2, where no high powers occur and a rounding less counts, and
-    /// else the root itself.
+    /// digits. Otherwise that of the depths for N up to 2, where no high powers occur and a rounding
+    /// less counts, and else the root itself.
     pub unit: R,
     /// `m_0`, or 0 if it is not a positive number.
     pub total: R,
@@ -109,12 +109,17 @@ fn far<R: Real, const N: usize>() -> R {
 #[inline(always)]
 fn per_root<R: Real>(total: R) -> R {
     let one: R = lit!(1.0);
-    let is_elsewhere = total.lt(lit!(0.25)) | total.gt(lit!(4.0));
+    let is_elsewhere = has_other_total(total);
     let mut root = one;
     if is_elsewhere.any() {
         root = R::select(is_elsewhere, per_root_of_any(total), one);
     }
     root
+}
+
+#[inline(always)]
+fn has_other_total<R: Real>(total: R) -> R::Mask {
+    total.lt(lit!(0.25)) | total.gt(lit!(4.0))
 }
 
 /// [`per_root`] of a total that may be far from 1.
@@ -262,6 +267,52 @@ fn depth_unit<R: Real, const N: usize>(mean_square: R) -> R {
     }
 }
 
+/// Units in which moments and what is computed of them are within the number type's range: powers of two.
+struct Units<R> {
+    /// [`per_root`] of the total.
+    per_root: R,
+    /// The unit of length.
+    length: R,
+    /// Its reciprocal.
+    per_length: R,
+}
+
+/// Units in which the total is near 1, and depths have a mean square near 1. In twice the digits each row has its unit of
+/// length; in plain arithmetic one whose depths have about the size of a shadow map's keeps 1, and nothing is computed.
+#[inline(always)]
+fn units<R: Real, A: Arithmetic<R>, const N: usize>(total: R, mean_square: R) -> Units<R> {
+    let one: R = lit!(1.0);
+    let mut units = Units {
+        per_root: one,
+        length: one,
+        per_length: one,
+    };
+    // Below it, pivots would be less than the least that they are lifted to.
+    let least = if const { N > 4 } {
+        total * lit!(two_to(-5))
+    } else {
+        total * lit!(two_to(-8))
+    };
+    let has_another = mean_square.lt(least) | mean_square.gt(total * lit!(two_to(8)));
+    let is_elsewhere = has_another | has_other_total(total);
+    if const { A::TWICE } || is_elsewhere.any() {
+        let per_root = per_root(total);
+        let scaled_total = (total * per_root * per_root).max(lit!(1e-12));
+        let near = depth_unit::<R, N>(mean_square * per_root * per_root / scaled_total);
+        let length = if const { A::TWICE } {
+            near
+        } else {
+            R::select(has_another, near, one)
+        };
+        units = Units {
+            per_root,
+            length,
+            per_length: one / length,
+        };
+    }
+    units
+}
+
 impl<R: Real, A: Arithmetic<R>> Recurrence<R, A> {
     /// The first N steps for moments `m_0` to `m_2N`, of any value, and query point `eta`.
     ///
@@ -290,8 +341,11 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
     let largest = largest::<R>();
     let far = far::<R, N>();
     let total = finite(m[0], beyond()).max(zero);
-    // Two factors: each moment times one of them is between what it is and what it becomes, and so within range.
-    let per_root = per_root(total);
+    let Units {
+        per_root,
+        length,
+        per_length,
+    } = units::<R, A, N>(total, finite(m[2], beyond()));
     // The square of a distance to it has a root that `power_of_two` finds.
     let reach = far.min(lit!(1e12));
     let mut eta = finite(eta, beyond()).clamp(-reach, reach);
@@ -305,22 +359,13 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
         R::epsilon() * (R::epsilon() * (scaled_total * lit!(1e-3)))
     };
     current[0] = A::of(scaled_total);
-    // In a length near the root of the mean square depth, even moments are 1 and more.
-    let mut length = one;
-    let mut per_length = one;
-    if const { A::TWICE } {
-        let mean_square = finite(m[2], beyond()) * per_root * per_root / scaled_total;
-        length = depth_unit::<R, N>(mean_square);
-        per_length = one / length;
-    }
+    // Two factors: each moment times one of them is between what it is and what it becomes, and so within range.
     let (mut odd, mut even) = (per_root, per_root);
     unroll!(k in 1..(2 * N + 1), max 13, {
-        if const { A::TWICE } {
-            if const { k % 2 == 1 } {
-                odd *= per_length;
-            } else {
-                even *= per_length;
-            }
+        if const { k % 2 == 1 } {
+            odd *= per_length;
+        } else {
+            even *= per_length;
         }
         current[k] = A::of(finite(finite(m[k], beyond()) * odd * even, largest));
     });
@@ -335,8 +380,8 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
         };
         current[1] = A::of(finite(current[1].rounded(), most));
         current[2] = A::of(finite(current[2].rounded(), most_square));
-        eta = (eta * per_length).clamp(-reach, reach);
     }
+    eta = (eta * per_length).clamp(-reach, reach);
     let moved = eta * length;
     let query = A::of(eta);
     let raw = current;
@@ -449,7 +494,6 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
             b[k + 1] = b[k + 1].scaled(per_square).within(zero, most);
         });
         square *= per_square;
-        unit *= length;
     } else if const { N > 2 } {
         unroll!(k in 0..N, max 7, {
             a[k] = A::of(a[k].rounded() / unit);
@@ -459,6 +503,7 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
     } else {
         unit = one;
     }
+    unit *= length;
     Recurrence {
         a,
         b,
