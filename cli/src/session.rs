@@ -625,7 +625,7 @@ fn placement(args: &Placed) -> Result<Placement> {
 
 /// `SUFFIX:CONSTANT=VALUE,…`, by the suffix.
 fn variants(texts: &[String]) -> Result<BTreeMap<String, BTreeMap<String, ConstantValue>>> {
-    const HELP: &str = "Write --variant _NAME:CONSTANT=NUMBER, with a comma between constants; the suffix \
+    const HELP: &str = "Write --variant _NAME:CONSTANT=VALUE, with a comma between constants; the suffix \
                         has lower-case letters, digits and `_`.";
     /// A name of a file may have 255 bytes.
     const MOST_LETTERS: usize = 64;
@@ -662,7 +662,11 @@ fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, Constant
             .split_once('=')
             .ok_or_else(|| wrong("there is no `=`".into()))?;
         let (name, text) = (name.trim(), text.trim());
-        let value: ConstantValue = text.parse().map_err(wrong)?;
+        let value: ConstantValue = text.parse().map_err(|_| {
+            wrong(format!(
+                "a specialisation constant is a whole number, a fraction, `true` or `false`, which `{text}` is not"
+            ))
+        })?;
         if let Some(before) = values.insert(name.to_owned(), value) {
             return Err(wrong(format!("`{name}` was set to {before} already")));
         }

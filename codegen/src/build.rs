@@ -152,7 +152,7 @@ impl Request {
                     return Err(Error::ConstantType {
                         name: name.clone(),
                         value: value.to_string(),
-                        scalar: scalar.name(),
+                        scalar,
                     });
                 }
             }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use hankel_dsl::native::describe::Scalar;
 use hankel_system::overlooked::RecordError;
 
 use crate::diagnostics::Diagnostic;
@@ -219,14 +220,14 @@ pub enum Error {
         known: Vec<String>,
     },
     /// A specialisation constant's value is not of its type.
-    #[error("constant `{name}` is a `{scalar}`, which `{value}` is not")]
+    #[error("constant `{name}` is {}, which `{value}` is not", kind_of(*scalar))]
     ConstantType {
         /// The constant.
         name: String,
         /// What was given.
         value: String,
         /// Its type.
-        scalar: &'static str,
+        scalar: Scalar,
     },
     /// A variant that cannot be made.
     #[error("variant `{suffix}`: {problem}")]
@@ -449,9 +450,7 @@ impl Error {
             Self::Variant { .. } => "Choose another suffix, or constants of one kernel: \
                  `hankel list --bindings` shows them."
                 .into(),
-            Self::ConstantType { .. } => {
-                "Give a whole number for `u32` and `i32`, a number for `f32`, `true` or `false` for `bool`.".into()
-            }
+            Self::ConstantType { .. } => "Give a value of its type.".into(),
             Self::UnknownConstant { .. } => "Give the constant's name in the kernel.".into(),
             Self::Function(_) => {
                 "Write it in the part of Rust that `#[function]`'s documentation names.".into()
@@ -529,6 +528,16 @@ impl Failure {
             }
         }
         .into()
+    }
+}
+
+/// What a specialisation constant of a type is.
+fn kind_of(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::I32 => "a whole number from -2147483648 to 2147483647",
+        Scalar::F32 => "a number within the range of `f32`",
+        Scalar::Bool => "`true` or `false`",
+        _ => "a whole number from 0 to 4294967295",
     }
 }
 

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use hankel_dsl::native::describe::{
     self, ConstantValue, Kernel, Output, Role, SamplerKind, Scalar, Stage,
 };
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::build::Request;
@@ -87,7 +87,7 @@ pub struct WriteOptions {
     /// Metal's version.
     pub msl_version: String,
     /// Specialisation constants that were given a value for good.
-    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    #[schemars(schema_with = "constants_schema")]
     pub constants: BTreeMap<String, ConstantValue>,
     /// The others stay open in HLSL, GLSL and MSL, too.
     #[serde(skip_serializing_if = "core::ops::Not::not", default)]
@@ -95,7 +95,7 @@ pub struct WriteOptions {
     /// Kernels that were written once more with constants fixed: by the end of the copy's name, the
     /// constants' values.
     #[serde(skip_serializing_if = "BTreeMap::is_empty", default)]
-    #[schemars(with = "BTreeMap<String, BTreeMap<String, serde_json::Value>>")]
+    #[schemars(schema_with = "variants_schema")]
     pub variants: BTreeMap<String, BTreeMap<String, ConstantValue>>,
     /// Where bindings are, if not where they are by default.
     #[serde(skip_serializing_if = "Placement::is_default", default)]
@@ -423,16 +423,37 @@ pub struct Constant {
     )]
     pub scalar: String,
     /// The value unless specialised.
-    #[schemars(with = "serde_json::Value")]
+    #[schemars(schema_with = "constant_schema")]
     pub default: ConstantValue,
     /// Languages whose file lets it be specialised; the others have a value in it.
     pub overridable_in: Vec<Language>,
     /// The value in the others.
-    #[schemars(with = "serde_json::Value")]
+    #[schemars(schema_with = "constant_schema")]
     pub value: ConstantValue,
     /// HLSL and GLSL: the macro whose value it has there, if whoever includes the text defines it.
     #[serde(rename = "macro", skip_serializing_if = "Option::is_none", default)]
     pub macro_name: Option<String>,
+}
+
+/// A specialisation constant's value.
+fn constant_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": ["boolean", "number"] })
+}
+
+/// Values by the constants' names.
+fn constants_schema(generator: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": "object",
+        "additionalProperties": constant_schema(generator),
+    })
+}
+
+/// These by the ends of names.
+fn variants_schema(generator: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": "object",
+        "additionalProperties": constants_schema(generator),
+    })
 }
 
 /// The type of most constants, which entries do not name.
