@@ -934,3 +934,18 @@ fn elementary_functions_mean_what_they_mean_here() {
     run(rustc.args([at("rust"), at("program.rs")]));
     same("Rust", &run(&mut Command::new(at("rust"))), &expected);
 }
+
+/// Branches that go on double what follows: that has an end.
+#[test]
+fn early_ends_do_not_grow_without_end() {
+    let branch = "if x > 0.0 { if y > 0.0 { return y; } x += 1.0; } else { x -= 1.0; }\n";
+    let body = |count: usize| {
+        format!(
+            "#[function]\npub fn f(a: f32, y: f32) -> f32 {{\nlet mut x = a;\n{}x\n}}",
+            branch.repeat(count)
+        )
+    };
+    assert!(one(&body(3)).is_ok());
+    let refusal = one(&body(40)).unwrap_err();
+    assert!(refusal.reason.contains("too many branches"), "{refusal}");
+}

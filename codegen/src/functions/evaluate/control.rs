@@ -165,8 +165,8 @@ impl Evaluator<'_> {
     pub(super) fn no_return(&self, frame: &Frame, done: Done<Value>, span: Span) -> Done<Value> {
         match done {
             Err(Stop::Return(_)) => {
-                let reason = "a `return` inside of a loop has no form here: keep the value in a variable, \
-                              `break`, and give it at the end";
+                let reason = "a `return` inside of a loop, or within too many branches, has no form here: keep \
+                              the value in a variable, `break`, and give it at the end";
                 Err(self.refuse(frame, span, reason))
             }
             other => other,

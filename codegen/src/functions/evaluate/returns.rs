@@ -13,11 +13,15 @@ pub(super) fn with_one_end(body: &syn::Block) -> Cow<'_, syn::Block> {
     if !returns(body) {
         return Cow::Borrowed(body);
     }
+    let mut copied = 0;
     Cow::Owned(syn::Block {
         brace_token: body.brace_token,
-        stmts: ended(body.stmts.clone()),
+        stmts: ended(body.stmts.clone(), &mut copied),
     })
 }
+
+/// Statements that are written once more, at most: each branch with two sides that go on doubles what follows.
+const MOST_COPIED: usize = 1000;
 
 /// Whether there is a `return`.
 fn returns(tokens: &impl ToTokens) -> bool {
@@ -32,7 +36,7 @@ fn returns(tokens: &impl ToTokens) -> bool {
 }
 
 /// The statements of a body, without early ends.
-fn ended(stmts: Vec<syn::Stmt>) -> Vec<syn::Stmt> {
+fn ended(stmts: Vec<syn::Stmt>, copied: &mut usize) -> Vec<syn::Stmt> {
     let mut out = Vec::with_capacity(stmts.len());
     let mut all = stmts.into_iter();
     while let Some(stmt) = all.next() {
@@ -50,7 +54,7 @@ fn ended(stmts: Vec<syn::Stmt>) -> Vec<syn::Stmt> {
         };
         if let Some((e, local)) = branch
             && returns(e)
-            && let Some(e) = absorbed(e, local, all.as_slice())
+            && let Some(e) = absorbed(e, local, all.as_slice(), copied)
         {
             out.push(syn::Stmt::Expr(e, None));
             return out;
@@ -62,8 +66,13 @@ fn ended(stmts: Vec<syn::Stmt>) -> Vec<syn::Stmt> {
 
 /// A branch that may return with what follows it within its sides: `let` of its value, and the rest. None where that
 /// cannot be.
-fn absorbed(e: &syn::Expr, local: Option<&syn::Local>, rest: &[syn::Stmt]) -> Option<syn::Expr> {
-    let side = |e: &syn::Expr| side(statements(e), local, rest);
+fn absorbed(
+    e: &syn::Expr,
+    local: Option<&syn::Local>,
+    rest: &[syn::Stmt],
+    copied: &mut usize,
+) -> Option<syn::Expr> {
+    let mut side = |e: &syn::Expr| side(statements(e), local, rest, copied);
     Some(match e {
         syn::Expr::If(i) => {
             let mut i = i.clone();
@@ -118,9 +127,14 @@ fn side(
     mut stmts: Vec<syn::Stmt>,
     local: Option<&syn::Local>,
     rest: &[syn::Stmt],
+    copied: &mut usize,
 ) -> Option<Vec<syn::Stmt>> {
     if ends(&stmts) {
-        return Some(ended(stmts));
+        return Some(ended(stmts, copied));
+    }
+    *copied += rest.len();
+    if *copied > MOST_COPIED {
+        return None;
     }
     let bound = local.map(|l| names_of(&l.pat)).unwrap_or_default();
     let mut hidden = BTreeSet::new();
@@ -152,7 +166,7 @@ fn side(
         *semicolon = Some(syn::token::Semi::default());
     }
     stmts.extend_from_slice(rest);
-    Some(ended(stmts))
+    Some(ended(stmts, copied))
 }
 
 /// Whether the last statement returns on every way.
