@@ -662,11 +662,7 @@ fn constants(option: &str, pairs: &[String]) -> Result<BTreeMap<String, Constant
             .split_once('=')
             .ok_or_else(|| wrong("there is no `=`".into()))?;
         let (name, text) = (name.trim(), text.trim());
-        let value: ConstantValue = text.parse().map_err(|_| {
-            wrong(format!(
-                "a specialisation constant is a whole number, a fraction, `true` or `false`, which `{text}` is not"
-            ))
-        })?;
+        let value: ConstantValue = text.parse().map_err(wrong)?;
         if let Some(before) = values.insert(name.to_owned(), value) {
             return Err(wrong(format!("`{name}` was set to {before} already")));
         }

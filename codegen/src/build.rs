@@ -151,7 +151,7 @@ impl Request {
                 {
                     return Err(Error::ConstantType {
                         name: name.clone(),
-                        value: value.to_string(),
+                        value: *value,
                         scalar,
                     });
                 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use hankel_dsl::native::describe::Scalar;
+use hankel_dsl::native::describe::{ConstantValue, Scalar};
 use hankel_system::overlooked::RecordError;
 
 use crate::diagnostics::Diagnostic;
@@ -220,12 +220,12 @@ pub enum Error {
         known: Vec<String>,
     },
     /// A specialisation constant's value is not of its type.
-    #[error("constant `{name}` is {}, which `{value}` is not", kind_of(*scalar))]
+    #[error("constant `{name}` is {}, which `{value}` is not", ConstantValue::kind(*scalar))]
     ConstantType {
         /// The constant.
         name: String,
         /// What was given.
-        value: String,
+        value: ConstantValue,
         /// Its type.
         scalar: Scalar,
     },
@@ -473,12 +473,6 @@ impl Error {
     }
 }
 
-/// Whether spirv-val's words are about textures or samplers that are values.
-fn is_of_textures(failure: &Failure) -> bool {
-    let construct = failure.construct.as_deref().unwrap_or_default();
-    construct.contains("_ptr_UniformConstant") || failure.message.contains("OpTypeImage-06924")
-}
-
 impl Failure {
     /// What the user can do about it.
     pub fn advice(&self) -> String {
@@ -531,14 +525,10 @@ impl Failure {
     }
 }
 
-/// What a specialisation constant of a type is.
-fn kind_of(scalar: Scalar) -> &'static str {
-    match scalar {
-        Scalar::I32 => "a whole number from -2147483648 to 2147483647",
-        Scalar::F32 => "a number within the range of `f32`",
-        Scalar::Bool => "`true` or `false`",
-        _ => "a whole number from 0 to 4294967295",
-    }
+/// Whether spirv-val's words are about textures or samplers that are values.
+fn is_of_textures(failure: &Failure) -> bool {
+    let construct = failure.construct.as_deref().unwrap_or_default();
+    construct.contains("_ptr_UniformConstant") || failure.message.contains("OpTypeImage-06924")
 }
 
 fn list(names: &[String]) -> String {

@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hankel_dsl::native::describe::{self, ConstantValue, Kernel, Role, Stage, Type};
+use hankel_dsl::native::describe::{self, ConstantValue, Kernel, Stage, Type};
 use rspirv::dr::Operand;
 use rspirv::spirv::{Decoration, Op};
 use schemars::JsonSchema;
@@ -266,7 +266,8 @@ pub struct Shader {
     /// The kernel that it is.
     pub kernel: String,
     /// The values of the kernel's specialisation constants that it was frozen with.
-    pub constants: BTreeMap<String, u32>,
+    #[schemars(schema_with = "manifest::constants_schema")]
+    pub constants: BTreeMap<String, ConstantValue>,
     /// `compute`, `vertex` or `fragment`.
     pub stage: StageName,
     /// Compute: invocations of a workgroup along x, y, z.
@@ -484,7 +485,7 @@ pub struct Frozen {
     /// The kernel.
     pub kernel: String,
     /// The values, by name.
-    pub constants: BTreeMap<String, u32>,
+    pub constants: BTreeMap<String, ConstantValue>,
 }
 
 /// A frame before its shaders are written.
@@ -727,17 +728,7 @@ fn jobs(request: &Request, draft: &Draft) -> Result<Vec<Variant>> {
         let mut options = request.options.clone();
         options.variants.clear();
         options.open_constants = false;
-        options.constants = of
-            .params
-            .iter()
-            .filter_map(|param| match param.role {
-                Role::Constant { scalar, .. } => {
-                    let word = *frozen.constants.get(&param.name)?;
-                    Some((param.name.clone(), ConstantValue::of_word(scalar, word)))
-                }
-                _ => None,
-            })
-            .collect();
+        options.constants = frozen.constants.clone();
         options.placement = options.placement.of_copy(&of.name, name);
         let is_fragment = of.stage == Stage::Fragment;
         if is_fragment {

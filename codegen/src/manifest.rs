@@ -415,7 +415,7 @@ pub struct Constant {
     pub name: String,
     /// `SpecId` in SPIR-V, `@id` in WGSL, `function_constant` in MSL.
     pub id: u32,
-    /// Its type: `u32`, `i32`, `f32` or `bool`.
+    /// Its type: `i32`, `f32` or `bool`; `u32` where the entry has none.
     #[serde(
         rename = "type",
         default = "unsigned",
@@ -441,7 +441,7 @@ fn constant_schema(_: &mut SchemaGenerator) -> Schema {
 }
 
 /// Values by the constants' names.
-fn constants_schema(generator: &mut SchemaGenerator) -> Schema {
+pub(crate) fn constants_schema(generator: &mut SchemaGenerator) -> Schema {
     json_schema!({
         "type": "object",
         "additionalProperties": constant_schema(generator),

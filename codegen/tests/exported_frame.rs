@@ -42,7 +42,10 @@ fn draft() -> Draft {
     });
     let frozen = |kernel: &str, constants: &[(&str, u32)]| Frozen {
         kernel: kernel.into(),
-        constants: constants.iter().map(|(n, v)| ((*n).into(), *v)).collect(),
+        constants: constants
+            .iter()
+            .map(|(n, v)| ((*n).into(), (*v).into()))
+            .collect(),
     };
     Draft {
         frame: Frame::from_json(frame.to_string().as_bytes()).unwrap(),

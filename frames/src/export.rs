@@ -10,7 +10,7 @@ use hankel_codegen::frame::{
 };
 use hankel_codegen::manifest::Versions;
 use hankel_dsl::glam::Vec4;
-use hankel_dsl::native::describe::{Kernel, Role, Scalar, Stage, Type};
+use hankel_dsl::native::describe::{ConstantValue, Kernel, Role, Scalar, Stage, Type};
 use hankel_dsl::native::{Address, Compare, Filter, Sampler};
 use hankel_host::device::slots::{self, Use};
 use hankel_host::device::{Blend, Cull, DepthTest, TextureShape, Topology};
@@ -153,23 +153,26 @@ impl<'g> Export<'g> {
         let mut shaders = BTreeMap::new();
         for (number, all) in values {
             let kernel = &graph.kernels()[number].kernel;
-            let names = || {
-                let constant = |role: &Role| matches!(role, Role::Constant { .. });
-                let params = kernel.params.iter().filter(move |p| constant(&p.role));
-                params.map(|p| p.name.clone())
-            };
+            let params = kernel.params.iter().filter_map(|p| match p.role {
+                Role::Constant { scalar, .. } => Some((&p.name, scalar)),
+                _ => None,
+            });
             for constants in &all {
-                let pairs: Vec<_> = names().zip(constants.iter().copied()).collect();
-                // A kernel that is called with several values has a shader for each.
+                let given = params.clone().zip(constants.iter().copied());
+                // A kernel that is called with several values has a shader for each. Of a number that is no part of a
+                // name, the bits are.
                 let mut name = kernel.name.clone();
                 if all.len() > 1 {
-                    for (constant, value) in &pairs {
-                        name.push_str(&format!("_{constant}_{value}"));
+                    for ((constant, _), word) in given.clone() {
+                        name.push_str(&format!("_{constant}_{word}"));
                     }
                 }
+                let values = given.map(|((constant, scalar), word)| {
+                    (constant.clone(), ConstantValue::of_word(scalar, word))
+                });
                 let frozen = Frozen {
                     kernel: kernel.name.clone(),
-                    constants: pairs.into_iter().collect(),
+                    constants: values.collect(),
                 };
                 shaders.insert(name.clone(), frozen);
                 calls.insert((number, constants.to_vec()), name);

@@ -131,6 +131,17 @@ fn arguments_are_given_by_name_and_once() {
     );
     refused(
         g.compute("resolve", "resolve_symmetric")
+            .arg("depth", four)
+            .constant("samples", 0.5_f32)
+            .image([64, 64]),
+        &[
+            place,
+            "`samples`: it is a whole number from 0",
+            "`0.5` is not",
+        ],
+    );
+    refused(
+        g.compute("resolve", "resolve_symmetric")
             .arg("depth", one)
             .image([64, 64]),
         &[

@@ -103,6 +103,18 @@ pub fn unwritten(#[shared] tile: Shared<'_, u32, 4>, #[element] x: Option<u32>) 
 pub fn order(#[element] x: u32, #[atomic] n: Atomics<'_>) -> u32 {
     n.add(0, 1) + (x & 0)
 }
+/// Which elements are kept shows the order, wherever they lie.
+#[kernel(compute, threads(64))]
+pub fn kept(
+    #[element] x: u32,
+    #[atomic] #[length(1)] n: Atomics<'_>,
+    #[storage(unordered)] #[length(16)] kept: StorageMut<'_, u32>,
+) {
+    let i = n.add(0, 1);
+    if i < 16 {
+        kept.set(i, x);
+    }
+}
 /// Wraps for large numbers.
 #[kernel(compute, threads(64))]
 pub fn wraps(#[element] x: u32) -> u32 {
@@ -158,7 +170,7 @@ pub fn late(#[varying] x: f32, #[atomic] count: Atomics<'_>) -> f32 {
     dpdx(x)
 }
 hankel_dsl::kernels![
-    fine, race, branch, unwritten, order, wraps, shift, divides, beyond, endless, sized, parted,
+    fine, race, branch, unwritten, order, kept, wraps, shift, divides, beyond, endless, sized, parted,
     crowded, late
 ];
 "#;
@@ -219,10 +231,15 @@ fn what_no_shader_may_do_is_named_with_its_line() {
         "unordered",
     ]);
     says(&[
+        "kept",
+        "depends on the order of the invocations",
+        "which elements are written does, too",
+    ]);
+    says(&[
         "sized",
         "depends on the size of subgroups",
         "depends(subgroup_size)",
     ]);
     says(&["endless", "was ended after 2 s"]);
-    assert!(said.contains("14 kernels: 13 with faults"), "{said}");
+    assert!(said.contains("15 kernels: 14 with faults"), "{said}");
 }

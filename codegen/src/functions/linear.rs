@@ -185,15 +185,17 @@ impl Evaluator<'_> {
                 }
                 Ok(Value::Vector(to, converted))
             }
-            (swizzle, []) if places(swizzle, all.len()).is_some() => {
-                let own = components(&self.part(own, "component"));
-                let places = places(swizzle, all.len()).unwrap_or_default();
-                Ok(Value::Vector(
-                    scalar,
-                    places.into_iter().map(|i| own[i].clone()).collect(),
-                ))
-            }
-            _ => Err(self.refuse(frame, span, format!("a vector's `{name}` has no form here"))),
+            _ => match places(name, all.len()).filter(|_| args.is_empty()) {
+                Some(places) => {
+                    let own = components(&self.part(own, "component"));
+                    let all = places.into_iter().map(|i| own[i].clone());
+                    Ok(Value::Vector(scalar, all.collect()))
+                }
+                None => {
+                    let reason = format!("a vector's `{name}` has no form here");
+                    Err(self.refuse(frame, span, reason))
+                }
+            },
         }
     }
 

@@ -16,8 +16,9 @@
 //!   not known are kept in their order. Constants are folded as `f32` computes them, to the bit.
 //! - A function with `#[function]` stays a call where another one calls it. Every other one is put in
 //!   place.
-//! - Loops over what is not known stay loops, as do those of `unroll!` without an index; all others
-//!   are unrolled.
+//! - Loops over what is not known stay loops, as do those of `unroll!` without an index; short ones, and those that
+//!   choose elements of an array, are unrolled.
+//! - A branch that returns does so in the text, too, where the language can (`ends`).
 //! - What has no form is refused with file, line and reason. Nothing is guessed.
 //!
 //! What proves the texts are tests: each is compiled and run in stubs that include it, and compared

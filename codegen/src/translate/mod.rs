@@ -57,11 +57,7 @@ use reading::Dropped;
 /// What a final module has that naga does not read, though the texts that are made of it say it: for those who give
 /// SPIR-V to naga, as wgpu does.
 pub fn refused_by_naga(spirv: &[u8]) -> Option<&'static str> {
-    let words: Vec<u32> = spirv
-        .chunks_exact(4)
-        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-        .collect();
-    let module = spirv::load(&words, "").ok()?;
+    let module = spirv::load(&spirv::words(spirv, "").ok()?, "").ok()?;
     reading::refused(&module)
 }
 

@@ -93,13 +93,16 @@ fn dropped(module: &Module, instruction: &Instruction) -> Option<String> {
     })
 }
 
+/// The types of results.
+fn types_of<'a>(all: impl Iterator<Item = &'a Instruction>) -> HashMap<Word, Word> {
+    all.filter_map(|it| Some((it.result_id?, it.result_type?)))
+        .collect()
+}
+
 /// What naga's reader refuses of a final module, which its writers are given otherwise: for those who read SPIR-V with
 /// naga, as wgpu does.
 pub fn refused(module: &Module) -> Option<&'static str> {
-    let types: HashMap<Word, Word> = module
-        .all_inst_iter()
-        .filter_map(|it| Some((it.result_id?, it.result_type?)))
-        .collect();
+    let types = types_of(module.all_inst_iter());
     let ty = |value: Word| global(module, *types.get(&value)?);
     // `tests/upstream/naga-layers`.
     let sizes: HashMap<Word, u32> = module
@@ -216,10 +219,7 @@ fn plain_depths(module: &mut Module) -> bool {
 /// naga looks for the type of a coordinate without the layer, which nobody may have used. It is part
 /// of the final SPIR-V, which others read with naga, too.
 pub fn coordinate_types(module: &mut Module) {
-    let types: HashMap<Word, Word> = module
-        .all_inst_iter()
-        .filter_map(|it| Some((it.result_id?, it.result_type?)))
-        .collect();
+    let types = types_of(module.all_inst_iter());
     let mut wanted = Vec::new();
     for it in module.functions.iter().flat_map(|it| it.all_inst_iter()) {
         let (image, coordinate) = match op(it) {
@@ -259,10 +259,7 @@ pub fn late_operands(module: &mut Module) {
         return;
     };
     for function in &mut module.functions {
-        let made = function.all_inst_iter();
-        let types: HashMap<Word, Word> = made
-            .filter_map(|it| Some((it.result_id?, it.result_type?)))
-            .collect();
+        let types = types_of(function.all_inst_iter());
         for block in &mut function.blocks {
             let own: HashSet<Word> = block
                 .instructions

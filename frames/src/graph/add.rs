@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use hankel_dsl::native::describe::{Output, Role, Stage};
+use hankel_dsl::native::describe::{ConstantValue, Output, Role, Stage};
 use hankel_host::device::slots;
 use hankel_host::device::{Blend, Format, TextureShape};
 
@@ -26,7 +26,7 @@ enum Size {
 struct Named {
     kernel: Cow<'static, str>,
     args: Vec<(Cow<'static, str>, Argument)>,
-    constants: Vec<(Cow<'static, str>, u32)>,
+    constants: Vec<(Cow<'static, str>, ConstantValue)>,
 }
 
 impl Named {
@@ -99,14 +99,26 @@ impl Named {
         let mut values = Vec::new();
         let mut names = Vec::new();
         for param in params {
-            let Role::Constant { default, .. } = param.role else {
+            let Role::Constant {
+                default, scalar, ..
+            } = param.role
+            else {
                 continue;
             };
             let given = self.constants.iter().find(|(name, _)| *name == param.name);
+            let default = ConstantValue::of_word(scalar, default);
             let value = given.map_or(default, |(_, value)| *value);
-            allowed(param.inputs.domain.as_ref(), value)
-                .map_err(|problem| place.argument(&param.name, problem))?;
-            values.push(value);
+            let word = value.word(scalar).ok_or_else(|| {
+                format!(
+                    "it is {}, which `{value}` is not",
+                    ConstantValue::kind(scalar)
+                )
+            });
+            let word = word.and_then(|word| {
+                allowed(param.inputs.domain.as_ref(), value.number())?;
+                Ok(word)
+            });
+            values.push(word.map_err(|problem| place.argument(&param.name, problem))?);
             names.push(param.name.as_str());
         }
         match self.constants.iter().find(|(n, _)| !names.contains(&&**n)) {
@@ -258,8 +270,12 @@ impl AddCompute<'_> {
     }
 
     /// Gives a specialisation constant; without it, it has its default.
-    pub fn constant(mut self, name: impl Into<Cow<'static, str>>, value: u32) -> Self {
-        self.call.constants.push((name.into(), value));
+    pub fn constant(
+        mut self,
+        name: impl Into<Cow<'static, str>>,
+        value: impl Into<ConstantValue>,
+    ) -> Self {
+        self.call.constants.push((name.into(), value.into()));
         self
     }
 
@@ -477,8 +493,12 @@ impl AddDraw<'_> {
     }
 
     /// Gives a specialisation constant; without it, it has its default.
-    pub fn constant(mut self, name: impl Into<Cow<'static, str>>, value: u32) -> Self {
-        let name = name.into();
+    pub fn constant(
+        mut self,
+        name: impl Into<Cow<'static, str>>,
+        value: impl Into<ConstantValue>,
+    ) -> Self {
+        let (name, value) = (name.into(), value.into());
         self.stage().constants.push((name, value));
         self
     }

@@ -602,8 +602,7 @@ impl Graph {
 }
 
 /// Whether a constant may have this value.
-pub(super) fn allowed(domain: Option<&Domain>, value: u32) -> std::result::Result<(), String> {
-    let value = f64::from(value);
+pub(super) fn allowed(domain: Option<&Domain>, value: f64) -> std::result::Result<(), String> {
     match domain {
         Some(Domain::Values { values }) if !values.contains(&value) => {
             Err(format!("it is {value}, but must be one of {values:?}"))

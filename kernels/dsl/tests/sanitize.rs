@@ -3,13 +3,15 @@
 
 use hankel_dsl::access::ReadWrite;
 use hankel_dsl::format::R32Uint;
-use hankel_dsl::glam::UVec2;
+use hankel_dsl::glam::{UVec2, Vec4};
 use hankel_dsl::native::describe::TexelFormat;
 use hankel_dsl::native::sanitize::Order;
-use hankel_dsl::native::{Arg, Call, CallError, Mode, TextureMut, TextureRef};
+use hankel_dsl::native::{
+    self, Address, Arg, Call, CallError, Filter, Mode, TextureMut, TextureRef,
+};
 use hankel_dsl::{
-    Atomics, Shared, SharedAtomics, StorageMut, StorageTexture2d, Texture2dArray, barrier, kernel,
-    storage_barrier,
+    Atomics, Sampler, Shared, SharedAtomics, StorageMut, StorageTexture2d, Texture2dArray,
+    TextureCube, barrier, kernel, storage_barrier,
 };
 
 /// Reads what its neighbour writes.
@@ -143,7 +145,18 @@ fn sample(
         .x
 }
 
+/// A cube in the direction that its element has.
+#[kernel(compute, threads(8))]
+fn around(
+    #[element] at: Vec4,
+    #[texture] sky: TextureCube<'_>,
+    #[sampler] sampler: Sampler,
+) -> f32 {
+    sky.sample_level(sampler, at.truncate(), 0.0).x
+}
+
 hankel_dsl::kernels![
+    around,
     sample,
     neighbour,
     both,
@@ -361,6 +374,44 @@ fn texels_levels_and_layers_that_are_not_there_are_named() {
         assert!(message.contains(&place), "{message}");
         // Otherwise the nearest one is read.
         read(wrong, Mode::REFERENCE).unwrap();
+    }
+}
+
+#[test]
+fn a_cube_that_is_sampled_in_no_direction_is_named() {
+    let read = |z: f32, mode| {
+        let entry = entries().into_iter().find(|e| e.kernel.name == "around");
+        let mut places = [Vec4::X; 8];
+        places[5] = Vec4::new(0.0, 0.0, z, 1.0);
+        let mut out = [1.0_f32; 8];
+        (entry.unwrap().run)(&mut Call {
+            args: vec![
+                Arg::Bytes(bytemuck::cast_slice(&places)),
+                Arg::Texture(TextureRef {
+                    size: [1, 1, 1],
+                    levels: 1,
+                    layers: 6,
+                    samples: 1,
+                    format: TexelFormat::R32Float,
+                    bytes: &[0; 24],
+                }),
+                Arg::Sampler(native::Sampler::new(Filter::Linear, Address::ClampToEdge)),
+                Arg::BytesMut(bytemuck::cast_slice_mut(&mut out)),
+            ],
+            constants: vec![],
+            mode,
+        })
+        .map_err(|e| e.to_string())?;
+        Ok::<_, String>(out)
+    };
+    let sanitized = Mode::sanitized(Order::Ascending);
+    assert_eq!(read(-1e-3, sanitized), Ok([0.0; 8]));
+    for none in [0.0, -0.0, f32::from_bits(7)] {
+        let message = read(none, sanitized).unwrap_err();
+        let words = "invocation (5, 0, 0) samples a cube in the direction (0, 0, 0)";
+        assert!(message.contains(words), "{message}");
+        // Otherwise some texel is read.
+        assert_eq!(read(none, Mode::REFERENCE), Ok([0.0; 8]));
     }
 }
 

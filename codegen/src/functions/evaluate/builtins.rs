@@ -45,19 +45,20 @@ impl Evaluator<'_> {
             ("i32", Value::Scalar(e)) if e.ty == Type::I32 || e.ty == Type::U32 => {
                 Value::Scalar(builtin(Builtin::ToI32, vec![e]))
             }
-            ("u32", Value::Scalar(e)) if e.ty == Type::F32 => {
-                Value::Scalar(self.saturated(e, Scalar::U32))
+            ("u32" | "i32", Value::Scalar(e)) if e.ty == Type::F32 => {
+                let whole = if to == "u32" {
+                    Scalar::U32
+                } else {
+                    Scalar::I32
+                };
+                Value::Scalar(self.saturated(e, whole))
             }
-            ("i32", Value::Scalar(e)) if e.ty == Type::F32 => {
-                Value::Scalar(self.saturated(e, Scalar::I32))
-            }
-            ("u32", Value::Scalar(e)) if e.ty == Type::BOOL => {
-                let [one, none] = [1, 0].map(|v| literal(Literal::U32(v)));
-                Value::Scalar(builtin(Builtin::Select, vec![e, one, none]))
-            }
-            ("i32", Value::Scalar(e)) if e.ty == Type::BOOL => {
-                let [one, none] = [1, 0].map(|v| literal(Literal::I32(v)));
-                Value::Scalar(builtin(Builtin::Select, vec![e, one, none]))
+            ("u32" | "i32", Value::Scalar(e)) if e.ty == Type::BOOL => {
+                let number = |v: i32| match to {
+                    "u32" => literal(Literal::U32(v.cast_unsigned())),
+                    _ => literal(Literal::I32(v)),
+                };
+                Value::Scalar(builtin(Builtin::Select, vec![e, number(1), number(0)]))
             }
             ("usize" | "u64" | "i64" | "u128" | "i128" | "isize", _) if known_int.is_some() => {
                 Value::Int(known_int.unwrap_or(0))

@@ -243,7 +243,6 @@ impl Evaluator<'_> {
     fn is_elementary(&self, home: ModuleId, source: &syn::ItemFn) -> bool {
         let path = &self.tree.modules[home].path;
         path.len() == 3
-            && path[2] != "native"
             && path[..2] == ["hankel_dsl", "math"]
             && matches!(source.vis, syn::Visibility::Public(_))
             && source.attrs.iter().any(|a| a.path().is_ident("must_use"))

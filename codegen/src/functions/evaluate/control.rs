@@ -165,8 +165,9 @@ impl Evaluator<'_> {
     pub(super) fn no_return(&self, frame: &Frame, done: Done<Value>, span: Span) -> Done<Value> {
         match done {
             Err(Stop::Return(_)) => {
-                let reason = "a `return` inside of a loop, or within too many branches, has no form here: keep \
-                              the value in a variable, `break`, and give it at the end";
+                let reason = "this `return` has no form here: it is in a loop, within too many branches, or beside a \
+                              variable with the name of one that is read later. Keep the value in a variable, and \
+                              give it at the end";
                 Err(self.refuse(frame, span, reason))
             }
             other => other,
@@ -219,7 +220,7 @@ impl Evaluator<'_> {
             return Err(self.refuse(frame, m.expr.span(), reason));
         };
         let kept = self.kept("matched", e, Rank::Part);
-        // No name of the source has two underscores and that.
+        // No variable of a source is called so.
         let name = syn::Ident::new("__matched", m.expr.span());
         let mut chain: Option<syn::Expr> = None;
         for arm in m.arms.iter().rev() {

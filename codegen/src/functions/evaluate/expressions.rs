@@ -195,7 +195,6 @@ impl Evaluator<'_> {
             let ty = if is_real { "f32" } else { first };
             match (ty, second.as_str()) {
                 ("f32", "IS_WIDE") => return Ok(Value::bool(false)),
-                ("f32", "EPSILON") => return Ok(Value::Scalar(float(f32::EPSILON))),
                 (ty, name) => {
                     if let Some(number) = limit_of(ty, name) {
                         return Ok(number);
@@ -239,12 +238,15 @@ impl Evaluator<'_> {
             Some((_, Item::Function(_) | Item::Struct(_))) => {
                 Ok(Value::Path(frame.module, Rc::new(p.clone())))
             }
-            _ => match names.join("::").as_str() {
-                path if constant_of(path).is_some() => Ok(constant_of(path).unwrap_or(Value::Unit)),
-                // A variant of an enumeration, or a function that the call knows.
-                _ if names.len() > 1 => Ok(Value::Variant(names.join("::"))),
-                name => Err(self.refuse(frame, p.span(), format!("`{name}` is not found"))),
-            },
+            _ => {
+                let path = names.join("::");
+                match constant_of(&path) {
+                    Some(constant) => Ok(constant),
+                    // A variant of an enumeration, or a function that the call knows.
+                    None if names.len() > 1 => Ok(Value::Variant(path)),
+                    None => Err(self.refuse(frame, p.span(), format!("`{path}` is not found"))),
+                }
+            }
         }
     }
 
@@ -312,6 +314,7 @@ impl Evaluator<'_> {
 /// A number type's limit, by its name.
 fn limit_of(ty: &str, name: &str) -> Option<Value> {
     Some(match (ty, name) {
+        ("f32", "EPSILON") => Value::Scalar(float(f32::EPSILON)),
         ("f32", "MAX") => Value::Scalar(float(f32::MAX)),
         ("f32", "MIN") => Value::Scalar(float(f32::MIN)),
         ("f32", "MIN_POSITIVE") => Value::Scalar(float(f32::MIN_POSITIVE)),

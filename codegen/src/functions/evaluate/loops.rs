@@ -55,7 +55,7 @@ impl Evaluator<'_> {
             return Ok(Value::Unit);
         }
         // Written out if that is short or all of it is known; and where it must be, for elements of an array.
-        let is_short = last - first <= FEW_TURNS || self.is_known_after(frame, &f.body);
+        let is_short = last - first <= FEW_TURNS || self.assigns_what_is_known(frame, &f.body);
         let ways: &[Option<Scalar>] = if is_short {
             &[None, Some(Scalar::I32), Some(Scalar::U32)]
         } else {
@@ -282,7 +282,7 @@ impl Evaluator<'_> {
     }
 
     /// Whether all that a body assigns is known before it.
-    fn is_known_after(&self, frame: &Frame, body: &syn::Block) -> bool {
+    fn assigns_what_is_known(&self, frame: &Frame, body: &syn::Block) -> bool {
         let mut names = BTreeSet::new();
         assigned(quote::quote!(#body), &mut names);
         names
@@ -366,7 +366,8 @@ impl Evaluator<'_> {
         };
         let name = turns.index.to_string();
         // Without an index nothing tells one turn from another: it stays a loop.
-        if name.starts_with('_') && to - from > 2 && !self.is_known_after(frame, &turns.body) {
+        if name.starts_with('_') && to - from > 2 && !self.assigns_what_is_known(frame, &turns.body)
+        {
             let number = |i: i128| {
                 int_literal(i, Scalar::U32)
                     .map(literal)

@@ -154,7 +154,7 @@ impl<'a> Evaluator<'a> {
             Err(Stop::Return(_) | Stop::Leave(_)) => Err(Refusal::at(
                 &self.tree.modules[module].file,
                 source.sig.span(),
-                "this function leaves what it is not in",
+                "`break` and `continue` stand in a loop",
             )),
         }
     }

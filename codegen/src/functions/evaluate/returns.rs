@@ -72,7 +72,8 @@ fn absorbed(
     rest: &[syn::Stmt],
     copied: &mut usize,
 ) -> Option<syn::Expr> {
-    let mut side = |e: &syn::Expr| side(statements(e), local, rest, copied);
+    let follows = Follows { local, rest };
+    let mut side = |e: &syn::Expr| follows.side(statements(e), BTreeSet::new(), copied);
     Some(match e {
         syn::Expr::If(i) => {
             let mut i = i.clone();
@@ -94,7 +95,9 @@ fn absorbed(
         syn::Expr::Match(m) => {
             let mut m = m.clone();
             for arm in &mut m.arms {
-                *arm.body = block(side(&arm.body)?, m.brace_token);
+                let bound = names_of(&arm.pat);
+                let side = follows.side(statements(&arm.body), bound, copied)?;
+                *arm.body = block(side, m.brace_token);
             }
             syn::Expr::Match(m)
         }
@@ -122,51 +125,63 @@ fn statements(e: &syn::Expr) -> Vec<syn::Stmt> {
     }
 }
 
-/// One side of a branch with what follows the branch, unless it ends itself.
-fn side(
-    mut stmts: Vec<syn::Stmt>,
-    local: Option<&syn::Local>,
-    rest: &[syn::Stmt],
-    copied: &mut usize,
-) -> Option<Vec<syn::Stmt>> {
-    if ends(&stmts) {
-        return Some(ended(stmts, copied));
-    }
-    *copied += rest.len();
-    if *copied > MOST_COPIED {
-        return None;
-    }
-    let bound = local.map(|l| names_of(&l.pat)).unwrap_or_default();
-    let mut hidden = BTreeSet::new();
-    for stmt in &stmts {
-        if let syn::Stmt::Local(l) = stmt {
-            hidden.extend(names_of(&l.pat));
+/// What follows a branch.
+struct Follows<'a> {
+    /// The `let` that takes the branch's value.
+    local: Option<&'a syn::Local>,
+    rest: &'a [syn::Stmt],
+}
+
+impl Follows<'_> {
+    /// One side of the branch with what follows, unless the side ends itself. `hidden` are names that its pattern binds.
+    fn side(
+        &self,
+        mut stmts: Vec<syn::Stmt>,
+        mut hidden: BTreeSet<String>,
+        copied: &mut usize,
+    ) -> Option<Vec<syn::Stmt>> {
+        if ends(&stmts) {
+            return Some(ended(stmts, copied));
         }
-    }
-    let read: BTreeSet<String> = rest.iter().flat_map(names_of).collect();
-    if hidden
-        .iter()
-        .any(|name| read.contains(name) && !bound.contains(name))
-    {
-        return None;
-    }
-    if let Some(local) = local {
-        let Some(syn::Stmt::Expr(value, None)) = stmts.pop() else {
+        *copied += self.rest.len();
+        if *copied > MOST_COPIED {
             return None;
-        };
-        let mut local = local.clone();
-        if let Some(init) = &mut local.init {
-            *init.expr = value;
         }
-        stmts.push(syn::Stmt::Local(local));
-    } else if !rest.is_empty()
-        && let Some(syn::Stmt::Expr(_, semicolon @ None)) = stmts.last_mut()
-    {
-        // What was a value of no kind is a statement now.
-        *semicolon = Some(syn::token::Semi::default());
+        for stmt in &stmts {
+            match stmt {
+                syn::Stmt::Local(l) => hidden.extend(names_of(&l.pat)),
+                syn::Stmt::Item(syn::Item::Const(c)) => {
+                    hidden.insert(c.ident.to_string());
+                }
+                _ => {}
+            }
+        }
+        let bound = self.local.map(|l| names_of(&l.pat)).unwrap_or_default();
+        let read: BTreeSet<String> = self.rest.iter().flat_map(names_of).collect();
+        if hidden
+            .iter()
+            .any(|name| read.contains(name) && !bound.contains(name))
+        {
+            return None;
+        }
+        if let Some(local) = self.local {
+            let Some(syn::Stmt::Expr(value, None)) = stmts.pop() else {
+                return None;
+            };
+            let mut local = local.clone();
+            if let Some(init) = &mut local.init {
+                *init.expr = value;
+            }
+            stmts.push(syn::Stmt::Local(local));
+        } else if !self.rest.is_empty()
+            && let Some(syn::Stmt::Expr(_, semicolon @ None)) = stmts.last_mut()
+        {
+            // The branch's value was `()`: it is a statement now.
+            *semicolon = Some(syn::token::Semi::default());
+        }
+        stmts.extend_from_slice(self.rest);
+        Some(ended(stmts, copied))
     }
-    stmts.extend_from_slice(rest);
-    Some(ended(stmts, copied))
 }
 
 /// Whether the last statement returns on every way.

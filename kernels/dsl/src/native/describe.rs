@@ -1009,9 +1009,27 @@ pub enum ConstantValue {
     Float(f64),
 }
 
+impl From<bool> for ConstantValue {
+    fn from(b: bool) -> Self {
+        Self::Bool(b)
+    }
+}
+
 impl From<u32> for ConstantValue {
     fn from(n: u32) -> Self {
         Self::Integer(n.into())
+    }
+}
+
+impl From<i32> for ConstantValue {
+    fn from(n: i32) -> Self {
+        Self::Integer(n.into())
+    }
+}
+
+impl From<f32> for ConstantValue {
+    fn from(x: f32) -> Self {
+        Self::Float(x.into())
     }
 }
 
@@ -1048,6 +1066,17 @@ impl ConstantValue {
         }
     }
 
+    /// What values of that type are, in words.
+    #[must_use]
+    pub const fn kind(scalar: Scalar) -> &'static str {
+        match scalar {
+            Scalar::I32 => "a whole number from -2147483648 to 2147483647",
+            Scalar::F32 => "a number within the range of `f32`",
+            Scalar::Bool => "`true` or `false`",
+            _ => "a whole number from 0 to 4294967295",
+        }
+    }
+
     /// As a number.
     #[must_use]
     pub fn number(self) -> f64 {
@@ -1072,7 +1101,7 @@ impl core::str::FromStr for ConstantValue {
         match text.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(Self::Float(x)),
             _ => Err(std::format!(
-                "a specialisation constant is a number, `true` or `false`, which `{text}` is not"
+                "a specialisation constant is a whole number, a fraction, `true` or `false`, which `{text}` is not"
             )),
         }
     }
