@@ -13,6 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use hankel_dsl::F16;
 use hankel_dsl::native::describe::{self, ConstantValue, Kernel, Stage, Type};
 use rspirv::dr::Operand;
 use rspirv::spirv::{Decoration, Op};
@@ -638,6 +639,10 @@ fn number(scalar: describe::Scalar, bytes: &[u8]) -> Value {
         S::U32 => word.map(|b| u32::from_le_bytes(*b).into()),
         S::I32 => word.map(|b| i32::from_le_bytes(*b).into()),
         S::Bool => word.map(|b| (u32::from_le_bytes(*b) != 0).into()),
+        S::F16 => bytes.first_chunk::<2>().map(|b| {
+            let half = F16::from_bits(u16::from_le_bytes(*b).into());
+            serde_json::json!(half.get())
+        }),
         S::F64 => long.map(|b| serde_json::json!(f64::from_le_bytes(*b))),
         S::U64 => long.map(|b| u64::from_le_bytes(*b).into()),
         S::I64 => long.map(|b| i64::from_le_bytes(*b).into()),

@@ -634,6 +634,11 @@ const fn comparison(compare: Compare) -> &'static str {
 fn vertex_format(ty: &Type) -> Option<String> {
     let (scalar, size) = match ty {
         Type::Scalar { scalar } => (scalar, 1),
+        // Two halves are a number of 32 bits.
+        Type::Vector {
+            scalar: Scalar::F16,
+            ..
+        } => (&Scalar::U32, 1),
         Type::Vector { scalar, size } => (scalar, *size),
         Type::Array { .. } | Type::Struct { .. } => return None,
     };
@@ -641,7 +646,7 @@ fn vertex_format(ty: &Type) -> Option<String> {
         Scalar::F32 => "float32",
         Scalar::U32 => "uint32",
         Scalar::I32 => "sint32",
-        Scalar::F64 | Scalar::U64 | Scalar::I64 | Scalar::Bool => return None,
+        Scalar::F64 | Scalar::U64 | Scalar::I64 | Scalar::Bool | Scalar::F16 => return None,
     };
     Some(match size {
         1 => stem.into(),

@@ -262,6 +262,7 @@ fn from_f64(scalar: Scalar, x: f64) -> Number {
         Scalar::U64 => Number::U64(x as u64),
         Scalar::I64 => Number::I64(x as i64),
         Scalar::Bool => Number::U32(u32::from(x != 0.0)),
+        Scalar::F16 => Number::half(x),
     }
 }
 
@@ -467,7 +468,7 @@ fn parse(scalar: Scalar, text: &str) -> Result<Number, String> {
                 _ => Err(format!("`{text}` is neither 0 nor 1")),
             };
         }
-        Scalar::F32 | Scalar::F64 | Scalar::U32 | Scalar::I32 => {}
+        Scalar::F32 | Scalar::F64 | Scalar::U32 | Scalar::I32 | Scalar::F16 => {}
     }
     let Ok(wide) = text.parse::<f64>() else {
         return Err(format!("`{text}` is not a number"));

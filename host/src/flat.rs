@@ -1,6 +1,7 @@
 //! Structures taken apart into their numbers: one name, type and place for each, as columns of a
 //! table or as values to generate and compare.
 
+use hankel_dsl::F16;
 use hankel_dsl::native::describe::{Inputs, Layout, Scalar, Type};
 
 use crate::device::slots::scalar_bytes;
@@ -115,9 +116,17 @@ pub enum Number {
     U64(u64),
     /// `i64`.
     I64(i64),
+    /// The bits of an [`F16`].
+    F16(u16),
 }
 
 impl Number {
+    /// The nearest [`F16`].
+    #[must_use]
+    pub fn half(x: f64) -> Self {
+        Self::F16(F16::new(x as f32).to_bits() as u16)
+    }
+
     /// Reads the number of type `scalar` at the start of `bytes`; 0 if there are too few. A truth
     /// value is a `u32`.
     #[must_use]
@@ -132,6 +141,7 @@ impl Number {
             Scalar::I32 => Self::I32(i32::from_le_bytes(take(bytes))),
             Scalar::U64 => Self::U64(u64::from_le_bytes(take(bytes))),
             Scalar::I64 => Self::I64(i64::from_le_bytes(take(bytes))),
+            Scalar::F16 => Self::F16(u16::from_le_bytes(take(bytes))),
         }
     }
 
@@ -144,6 +154,7 @@ impl Number {
             Self::I32(x) => bytes[..4].copy_from_slice(&x.to_le_bytes()),
             Self::U64(x) => bytes[..8].copy_from_slice(&x.to_le_bytes()),
             Self::I64(x) => bytes[..8].copy_from_slice(&x.to_le_bytes()),
+            Self::F16(x) => bytes[..2].copy_from_slice(&x.to_le_bytes()),
         }
     }
 
@@ -157,6 +168,7 @@ impl Number {
             Self::I32(x) => x.into(),
             Self::U64(x) => x as f64,
             Self::I64(x) => x as f64,
+            Self::F16(bits) => F16::from_bits(bits.into()).get().into(),
         }
     }
 }
@@ -171,6 +183,7 @@ impl std::fmt::Display for Number {
             Self::I32(x) => write!(f, "{x}"),
             Self::U64(x) => write!(f, "{x}"),
             Self::I64(x) => write!(f, "{x}"),
+            Self::F16(bits) => write!(f, "{:?}", F16::from_bits((*bits).into()).get()),
         }
     }
 }
@@ -282,6 +295,7 @@ mod tests {
             Number::I32(-7),
             Number::U64(u64::MAX),
             Number::I64(i64::MIN),
+            Number::half(-0.1),
         ] {
             n.write(&mut b);
             let scalar = match n {
@@ -291,10 +305,12 @@ mod tests {
                 Number::I32(_) => Scalar::I32,
                 Number::U64(_) => Scalar::U64,
                 Number::I64(_) => Scalar::I64,
+                Number::F16(_) => Scalar::F16,
             };
             assert_eq!(Number::read(scalar, &b), n);
         }
         assert_eq!(Number::F32(0.1).to_string(), "0.1");
+        assert_eq!(Number::half(0.1).to_string(), "0.099975586");
         assert_eq!(
             Number::F64(0.1f32.into()).to_string(),
             "0.10000000149011612"

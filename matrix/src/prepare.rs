@@ -263,6 +263,11 @@ fn distances(ty: &Type) -> Value {
 fn value(ty: &Type) -> Result<Value, String> {
     let (scalar, size) = match ty {
         Type::Scalar { scalar } => (*scalar, 1),
+        // Two halves are a number of 32 bits.
+        Type::Vector {
+            scalar: describe::Scalar::F16,
+            ..
+        } => (describe::Scalar::U32, 1),
         Type::Vector { scalar, size } => (*scalar, *size),
         Type::Array { .. } | Type::Struct { .. } => {
             return Err("only scalars and vectors pass between stages".into());
@@ -276,6 +281,7 @@ fn value(ty: &Type) -> Result<Value, String> {
             return Err("64-bit values do not pass between stages".into());
         }
         describe::Scalar::Bool => return Err("truth values do not pass between stages".into()),
+        describe::Scalar::F16 => return Err("halves in memory do not pass between stages".into()),
     };
     Ok(Value { scalar, size })
 }

@@ -81,7 +81,8 @@ const KNOWN: [(&[&str], &str); 29] = [
         &["cannot cast between pointer types", "to `*["],
         "a part of an array is only there where it is used, `&a[i..i + 2]`; what gives one part after the other, or \
          several (`windows`, `chunks`, `split_at_mut`), is not: count an index, `for i in 0..N { … a[i] … }`. An array \
-         beside an iterator of references (`a.iter().zip([1, 2])`) is taken by reference, too: `.zip(&[1, 2])`",
+         beside an iterator of references (`a.iter().zip([1, 2])`) is taken by reference, too: `.zip(&[1, 2])`. Of four \
+         adapters in a row (`zip`, `skip`, `map`, `max`) compute the last ones in a loop, `for (p, q) in …`",
     ),
     (
         &["cannot cast between pointer types"],

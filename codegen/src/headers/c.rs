@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use hankel_dsl::native::describe::{Scalar, Type};
 
-use super::{Layouts, Part, one_line, padded, parts};
+use super::{Layouts, Part, held, one_line, padded, parts};
 use crate::files::sha256;
 use crate::manifest::KernelEntry;
 use crate::{Language, VERSION};
@@ -137,10 +137,11 @@ fn c_type(layouts: &Layouts, ty: &Type) -> (String, String) {
             Scalar::U64 => "uint64_t",
             Scalar::I64 => "int64_t",
             Scalar::I32 => "int32_t",
+            Scalar::F16 => "uint16_t",
         }
         .to_owned()
     };
-    match ty {
+    match held(ty) {
         Type::Scalar { scalar: it } => (scalar(it), String::new()),
         Type::Vector { scalar: it, size } => (scalar(it), format!("[{size}]")),
         Type::Array {

@@ -200,6 +200,20 @@ fn has_double(layout: &Layout) -> bool {
     layout.fields.iter().any(|field| double(&field.ty))
 }
 
+/// What a value is in memory: two halves are a number of 32 bits.
+fn held(ty: &Type) -> &Type {
+    const WORD: &Type = &Type::Scalar {
+        scalar: Scalar::U32,
+    };
+    match ty {
+        Type::Vector {
+            scalar: Scalar::F16,
+            ..
+        } => WORD,
+        other => other,
+    }
+}
+
 /// The Rust type of a scalar in memory.
 fn scalar_name(scalar: Scalar) -> &'static str {
     match scalar {

@@ -20,7 +20,7 @@ const MOST_BLOCKS: usize = 8;
 
 /// What is known of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Known {
+pub(super) enum Known {
     Truth(bool),
     Number(u32),
 }
@@ -250,7 +250,7 @@ impl Exit {
 }
 
 /// The blocks of a function, and what comes before what.
-struct Graph<'a> {
+pub(super) struct Graph<'a> {
     function: &'a Function,
     known: &'a HashMap<Word, Known>,
     ends: Vec<End>,
@@ -264,7 +264,7 @@ struct Graph<'a> {
 }
 
 impl<'a> Graph<'a> {
-    fn of(function: &'a Function, known: &'a HashMap<Word, Known>) -> Self {
+    pub(super) fn of(function: &'a Function, known: &'a HashMap<Word, Known>) -> Self {
         let labels: HashMap<Word, usize> = function
             .blocks
             .iter()
@@ -411,8 +411,19 @@ impl<'a> Graph<'a> {
         })
     }
 
-    fn dominates(&self, one: usize, other: usize) -> bool {
+    /// Whether each way to a block comes through another one.
+    pub(super) fn dominates(&self, one: usize, other: usize) -> bool {
         self.above(other).any(|block| block == one)
+    }
+
+    /// The header and the merge block of each loop.
+    pub(super) fn loops(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.loops.iter().map(|it| (it.header, it.merge))
+    }
+
+    /// How many blocks each way to a block comes through.
+    pub(super) fn depth(&self, block: usize) -> usize {
+        self.above(block).count()
     }
 
     fn is_in(&self, found: &Loop, block: usize) -> bool {

@@ -50,6 +50,7 @@ use crate::comment;
 use crate::error::{Failure, Step, guarded};
 use crate::lint::Finding;
 use crate::placement::Placement;
+use crate::spirv::behind::copy_behind_loops;
 use crate::spirv::uniform::{self, Group, Memory};
 use crate::{Error, Language, VERSION, spirv};
 use reading::Dropped;
@@ -308,9 +309,9 @@ impl Ir {
     fn of(spirv: rspirv::dr::Module, kernel: &Kernel) -> Result<Self, Failure> {
         let name = kernel.name.as_str();
         let dropped = Dropped::of(&spirv);
-        let words = reading::with_number_masks(&spirv)
-            .map_or_else(|| spirv::store(&spirv), |it| spirv::store(&it));
-        let bytes = spirv::bytes(&words);
+        let mut given = reading::with_number_masks(&spirv).unwrap_or_else(|| spirv.clone());
+        copy_behind_loops(&mut given);
+        let bytes = spirv::bytes(&spirv::store(&given));
         let read = || {
             let mut module = parse(&bytes, name)?;
             cleanup::restore_sampling(&mut module, &dropped.sampling);

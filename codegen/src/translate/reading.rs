@@ -434,55 +434,58 @@ fn remainders(module: &mut Module) -> bool {
     changed
 }
 
-/// Where each byte of a 32-bit number comes from: a number and a byte of it, lowest first.
-type Bytes = [Option<(Word, usize)>; 4];
+/// Where each byte of a number of 32 or 64 bits comes from: a number and a byte of it, lowest first. Bytes that are 0, or
+/// beyond the number, come from none.
+type Bytes = [Option<(Word, usize)>; 8];
 
 struct Numbers {
     /// What makes each number of the functions.
     made: HashMap<Word, Instruction>,
-    constants: HashMap<Word, u32>,
+    constants: HashMap<Word, u64>,
 }
 
 impl Numbers {
-    fn bytes(&self, number: Word, depth: u32) -> Option<Bytes> {
-        let leaf = [0, 1, 2, 3].map(|byte| Some((number, byte)));
+    fn bytes(&self, number: Word, size: usize, depth: u32) -> Option<Bytes> {
+        let leaf = std::array::from_fn(|byte| (byte < size).then_some((number, byte)));
         let Some(it) = self.made.get(&number).filter(|_| depth > 0) else {
             return Some(leaf);
         };
         let (left, right) = (id(it, 0), id(it, 1));
         let constant = |word: Option<Word>| self.constants.get(&word?).copied();
+        let of = |word: Option<Word>| self.bytes(word?, size, depth - 1);
         match op(it) {
             Op::ShiftLeftLogical | Op::ShiftRightLogical => {
-                let Some(shift) = constant(right).filter(|by| by % 8 == 0 && *by < 32) else {
+                let is_whole = |by: &u64| by.is_multiple_of(8) && *by < 8 * size as u64;
+                let Some(shift) = constant(right).filter(is_whole) else {
                     return Some(leaf);
                 };
-                let from = self.bytes(left?, depth - 1)?;
+                let from = of(left)?;
                 let by = shift as usize / 8;
                 Some(std::array::from_fn(|byte| match op(it) {
-                    Op::ShiftLeftLogical => byte.checked_sub(by).and_then(|byte| from[byte]),
+                    Op::ShiftLeftLogical if byte < size => {
+                        byte.checked_sub(by).and_then(|byte| from[byte])
+                    }
+                    Op::ShiftLeftLogical => None,
                     _ => from.get(byte + by).copied().flatten(),
                 }))
             }
             Op::BitwiseAnd => {
-                let (mask, of) = match (constant(left), constant(right)) {
-                    (_, Some(mask)) => (mask, left?),
-                    (Some(mask), _) => (mask, right?),
+                let (mask, masked) = match (constant(left), constant(right)) {
+                    (_, Some(mask)) => (mask, left),
+                    (Some(mask), _) => (mask, right),
                     _ => return Some(leaf),
                 };
                 let mask = mask.to_le_bytes();
                 if mask.iter().any(|byte| !matches!(byte, 0 | 0xff)) {
                     return Some(leaf);
                 }
-                let from = self.bytes(of, depth - 1)?;
+                let from = of(masked)?;
                 Some(std::array::from_fn(|byte| {
                     from[byte].filter(|_| mask[byte] != 0)
                 }))
             }
             Op::BitwiseOr => {
-                let (a, b) = (
-                    self.bytes(left?, depth - 1)?,
-                    self.bytes(right?, depth - 1)?,
-                );
+                let (a, b) = (of(left)?, of(right)?);
                 let apart = a.iter().zip(&b).all(|(a, b)| a.is_none() || b.is_none());
                 if !apart {
                     return Some(leaf);
@@ -493,14 +496,35 @@ impl Numbers {
         }
     }
 
-    /// The number whose bytes, in the other order, `number` is made of.
-    fn swapped(&self, number: Word) -> Option<Word> {
-        let bytes = self.bytes(number, 8)?;
+    /// The number of `size` bytes whose bytes, in the other order, `number` is made of.
+    fn swapped(&self, number: Word, size: usize) -> Option<Word> {
+        let bytes = self.bytes(number, size, 12)?;
         let (source, _) = bytes[0]?;
-        let all = (0..4).all(|byte| bytes[byte] == Some((source, 3 - byte)));
+        let all = (0..size).all(|byte| bytes[byte] == Some((source, size - 1 - byte)));
         (all && source != number).then_some(source)
     }
 }
+
+/// The bytes of a number of 32 bits in the other order, `constants` being those of [`SWAPS`].
+fn swap(
+    steps: &mut Sequence<'_, '_>,
+    ty: Word,
+    number: Word,
+    constants: [(Word, Word); 3],
+) -> Word {
+    let mut bits = steps.then(Op::BitReverse, ty, &[number]);
+    for (by, mask) in constants {
+        let low = steps.then(Op::BitwiseAnd, ty, &[bits, mask]);
+        let up = steps.then(Op::ShiftLeftLogical, ty, &[low, by]);
+        let high = steps.then(Op::ShiftRightLogical, ty, &[bits, by]);
+        let down = steps.then(Op::BitwiseAnd, ty, &[high, mask]);
+        bits = steps.then(Op::BitwiseOr, ty, &[up, down]);
+    }
+    bits
+}
+
+/// How far bits are moved to be in the other order within each byte, and which of them.
+const SWAPS: [(u32, u32); 3] = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f)];
 
 /// Exchanged bytes by way of exchanged bits, of which DXC makes nothing else.
 fn swapped_bytes(module: &mut Module) -> bool {
@@ -510,11 +534,16 @@ fn swapped_bytes(module: &mut Module) -> bool {
         .flat_map(|function| function.all_inst_iter())
         .filter_map(|it| Some((it.result_id?, it.clone())))
         .collect();
+    let value = |it: &Instruction| match it.operands.first() {
+        Some(Operand::LiteralBit32(bits)) => Some(u64::from(*bits)),
+        Some(Operand::LiteralBit64(bits)) => Some(*bits),
+        _ => None,
+    };
     let constants = module
         .types_global_values
         .iter()
         .filter(|it| op(it) == Op::Constant)
-        .filter_map(|it| Some((it.result_id?, literal(it, 0)?)))
+        .filter_map(|it| Some((it.result_id?, value(it)?)))
         .collect();
     let numbers = Numbers { made, constants };
     let mut changed = false;
@@ -523,22 +552,30 @@ fn swapped_bytes(module: &mut Module) -> bool {
             return None;
         }
         let (ty, result) = (it.result_type?, it.result_id?);
-        if editor.integer_type(ty) != Some((32, false)) {
-            return None;
-        }
-        let source = numbers.swapped(result)?;
-        let steps_of = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f)];
-        let constants = steps_of.map(|(by, mask)| (editor.word(by), editor.word(mask)));
-        let mut steps = Sequence::new(editor, 0);
-        let mut bits = steps.then(Op::BitReverse, ty, &[source]);
-        for (by, mask) in constants {
-            let low = steps.then(Op::BitwiseAnd, ty, &[bits, mask]);
-            let up = steps.then(Op::ShiftLeftLogical, ty, &[low, by]);
-            let high = steps.then(Op::ShiftRightLogical, ty, &[bits, by]);
-            let down = steps.then(Op::BitwiseAnd, ty, &[high, mask]);
-            bits = steps.then(Op::BitwiseOr, ty, &[up, down]);
-        }
+        let size = match editor.integer_type(ty) {
+            Some((32, false)) => 4,
+            Some((64, false)) => 8,
+            _ => return None,
+        };
+        let source = numbers.swapped(result, size)?;
+        let constants = SWAPS.map(|(by, mask)| (editor.word(by), editor.word(mask)));
         changed = true;
+        if size == 4 {
+            let mut steps = Sequence::new(editor, 0);
+            swap(&mut steps, ty, source, constants);
+            return Some(steps.ending_in(result));
+        }
+        let (word, half) = (editor.word_type(), editor.word(32));
+        let mut steps = Sequence::new(editor, 0);
+        let low = steps.then(Op::UConvert, word, &[source]);
+        let high = steps.then(Op::ShiftRightLogical, ty, &[source, half]);
+        let high = steps.then(Op::UConvert, word, &[high]);
+        let [low, high] = [low, high].map(|number| {
+            let swapped = swap(&mut steps, word, number, constants);
+            steps.then(Op::UConvert, ty, &[swapped])
+        });
+        let low = steps.then(Op::ShiftLeftLogical, ty, &[low, half]);
+        steps.then(Op::BitwiseOr, ty, &[low, high]);
         Some(steps.ending_in(result))
     });
     changed

@@ -2,7 +2,8 @@
 //! A.2), as a picture of the upper half of all directions.
 
 use hankel_dsl::glam::{UVec2, Vec2, Vec3, Vec4};
-use hankel_dsl::math::{acos, exp, sin_cos, tan};
+use hankel_dsl::math::native::{acos, exp};
+use hankel_dsl::math::{sin_cos, tan};
 use hankel_dsl::{Element, Real, kernel};
 
 /// What the sky depends on.
@@ -54,7 +55,7 @@ fn perez(coefficients: &[Vec4; 5], cosine: f32, angle: f32, cos_angle: f32) -> V
     parity(
         ulp = 256,
         absolute = 1e-5,
-        why = "languages that cannot pin arithmetic add up in another order, 2 ulp in each exponential; sums of unlike signs enlarge that"
+        why = "each exponential may be off by 3 + 2 abs(x) ulp, x being at most 4, and languages that cannot pin arithmetic add up in another order; sums of unlike signs enlarge that"
     )
 )]
 pub fn sky_model(#[element] sky: Conditions) -> Model {
@@ -126,9 +127,9 @@ pub fn sky_model(#[element] sky: Conditions) -> Model {
     pinned,
     parity(
         ulp = 1,
-        absolute = 0.0,
+        absolute = 8e-3,
         non_finite,
-        why = "rounding to the format is the driver's choice; exponentials of absurd numbers overflow"
+        why = "the arc cosine may be off by 6.77e-5, which moves x, y and luminance by 8e-6 with these coefficients, and a colour by 8e-3 where y is 0.03; rounding to the format is the driver's choice; exponentials of absurd numbers overflow"
     )
 )]
 pub fn sky(

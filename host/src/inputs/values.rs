@@ -118,7 +118,7 @@ impl Values {
                 }
                 (scalar, domain) => {
                     let domain = domain.as_ref().unwrap_or(&FLOATS);
-                    float(scalar, self.float(domain, scalar == Scalar::F64))
+                    float(scalar, self.float(domain, scalar))
                 }
             };
             number.write(&mut element[leaf.offset..]);
@@ -141,7 +141,7 @@ impl Values {
         }
     }
 
-    fn float(&mut self, domain: &Domain, double: bool) -> f64 {
+    fn float(&mut self, domain: &Domain, scalar: Scalar) -> f64 {
         let (a, b) = match *domain {
             Domain::Values { ref values } if !values.is_empty() => {
                 return values[self.rng.usize(..values.len())];
@@ -166,30 +166,31 @@ impl Values {
                     _ => a + (b - a) * t,
                 }
             }
-            (Class::Hostile, _) => self.absurd(double),
+            (Class::Hostile, _) => self.absurd(scalar),
         }
     }
 
     /// Any finite number, the extreme ones often.
-    fn absurd(&mut self, double: bool) -> f64 {
+    fn absurd(&mut self, scalar: Scalar) -> f64 {
         let (least, most) = self.magnitudes;
         loop {
-            let x = self.any_absurd(double);
+            let x = self.any_absurd(scalar);
             if x == 0.0 || (least..=most).contains(&x.abs()) {
                 return x;
             }
         }
     }
 
-    fn any_absurd(&mut self, double: bool) -> f64 {
-        let (largest, normal, least) = if double {
-            (f64::MAX, f64::MIN_POSITIVE, f64::from_bits(1))
-        } else {
-            (
+    fn any_absurd(&mut self, scalar: Scalar) -> f64 {
+        let half = |bits: u16| Number::F16(bits).to_f64();
+        let (largest, normal, least) = match scalar {
+            Scalar::F64 => (f64::MAX, f64::MIN_POSITIVE, f64::from_bits(1)),
+            Scalar::F16 => (half(0x7bff), half(0x0400), half(0x0001)),
+            _ => (
                 f32::MAX.into(),
                 f32::MIN_POSITIVE.into(),
                 f32::from_bits(1).into(),
-            )
+            ),
         };
         let sign = if self.rng.bool() { 1.0 } else { -1.0 };
         sign * match self.rng.u32(..12) {
@@ -199,15 +200,15 @@ impl Values {
             3 => normal,
             4 => largest,
             5 => largest * self.rng.f64(),
-            6 => 1e30,
-            7 => 1e-30,
-            8 => 1e6 * self.rng.f64(),
+            6 => f64::min(1e30, largest),
+            7 => f64::max(1e-30, least),
+            8 => f64::min(1e6, largest) * self.rng.f64(),
             9 => self.rng.f64(),
             _ => loop {
-                let x = if double {
-                    f64::from_bits(self.rng.u64(..))
-                } else {
-                    f32::from_bits(self.rng.u32(..)).into()
+                let x = match scalar {
+                    Scalar::F64 => f64::from_bits(self.rng.u64(..)),
+                    Scalar::F16 => half(self.rng.u16(..)),
+                    _ => f32::from_bits(self.rng.u32(..)).into(),
                 };
                 if x.is_finite() {
                     break x;
@@ -298,7 +299,7 @@ impl Values {
         let format: TexelFormat = shape.format.texel();
         let mut bytes = vec![0; shape.bytes()];
         for texel in bytes.chunks_exact_mut(format.bytes()) {
-            let v = Vec4::from_array([(); 4].map(|()| self.float(&domain, false) as f32));
+            let v = Vec4::from_array([(); 4].map(|()| self.float(&domain, Scalar::F32) as f32));
             // A depth buffer holds nothing else.
             let v = if depth {
                 v.clamp(Vec4::ZERO, Vec4::ONE)
@@ -333,10 +334,10 @@ fn held(format: TexelFormat, domain: Option<Domain>) -> Domain {
 }
 
 fn float(scalar: Scalar, x: f64) -> Number {
-    if scalar == Scalar::F64 {
-        Number::F64(x)
-    } else {
-        Number::F32(x as f32)
+    match scalar {
+        Scalar::F64 => Number::F64(x),
+        Scalar::F16 => Number::half(x),
+        _ => Number::F32(x as f32),
     }
 }
 

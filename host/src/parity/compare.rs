@@ -33,6 +33,26 @@ pub fn ulp_f64(a: f64, b: f64) -> u64 {
     }
 }
 
+/// As [`ulp_f32`], of the bits of halves.
+fn ulp_f16(a: u16, b: u16) -> u64 {
+    let is_nan = |bits: u16| bits & 0x7fff > 0x7c00;
+    match (is_nan(a), is_nan(b)) {
+        (true, true) => 0,
+        (false, false) => ordered_f16(a).abs_diff(ordered_f16(b)).into(),
+        _ => u64::MAX,
+    }
+}
+
+/// A half's place among all halves, both zeros at 0.
+fn ordered_f16(bits: u16) -> i32 {
+    let magnitude = i32::from(bits & 0x7fff);
+    if bits >> 15 == 1 {
+        -magnitude
+    } else {
+        magnitude
+    }
+}
+
 /// A float's place among all floats, both zeros at 0.
 fn ordered_f32(x: f32) -> i64 {
     let magnitude = i64::from(x.to_bits() & 0x7fff_ffff);
@@ -66,8 +86,6 @@ fn flushed(number: Number) -> Number {
 pub enum Kind {
     /// A number in memory.
     Scalar(Scalar),
-    /// Half a float: a channel of a 16-bit float texture.
-    Half,
     /// A step of a normalised channel of this format.
     Normalised(TexelFormat),
     /// A channel of 8 or 16 bits of this format.
@@ -81,9 +99,9 @@ impl Kind {
     #[must_use]
     pub fn spelled(&self, x: f64) -> String {
         let is_integer = match self {
-            Self::Scalar(it) => !matches!(it, Scalar::F32 | Scalar::F64),
+            Self::Scalar(it) => !matches!(it, Scalar::F32 | Scalar::F64 | Scalar::F16),
             Self::Integer(_) => true,
-            Self::Half | Self::Normalised(_) => false,
+            Self::Normalised(_) => false,
             Self::Packed(format) => format.is_integer(),
         };
         match is_integer {
@@ -97,7 +115,7 @@ impl Kind {
     pub const fn of(format: TexelFormat) -> Self {
         match (format.stored(), format.numbers()) {
             (Stored::Float32, _) => Self::Scalar(Scalar::F32),
-            (Stored::Float16, _) => Self::Half,
+            (Stored::Float16, _) => Self::Scalar(Scalar::F16),
             (Stored::Unorm { .. } | Stored::Snorm { .. }, _) => Self::Normalised(format),
             (Stored::Integer { bits: 32 }, Channels::Sint) => Self::Scalar(Scalar::I32),
             (Stored::Integer { bits: 32 }, _) => Self::Scalar(Scalar::U32),
@@ -111,7 +129,6 @@ impl Kind {
     pub const fn bytes(self) -> usize {
         match self {
             Self::Scalar(s) => crate::device::slots::scalar_bytes(s),
-            Self::Half => 2,
             Self::Normalised(format) | Self::Integer(format) | Self::Packed(format) => {
                 format.channel_bytes()
             }
@@ -131,10 +148,11 @@ impl Kind {
                     (Number::I32(a), Number::I32(b)) => a.cmp(&b),
                     (Number::U64(a), Number::U64(b)) => a.cmp(&b),
                     (Number::I64(a), Number::I64(b)) => a.cmp(&b),
+                    (Number::F16(a), Number::F16(b)) => ordered_f16(a).cmp(&ordered_f16(b)),
                     _ => Ordering::Equal,
                 }
             }
-            Self::Half | Self::Normalised(_) | Self::Integer(_) | Self::Packed(_) => {
+            Self::Normalised(_) | Self::Integer(_) | Self::Packed(_) => {
                 a[..self.bytes()].cmp(&b[..self.bytes()])
             }
         }
@@ -158,27 +176,10 @@ impl Kind {
                     (Number::I32(a), Number::I32(b)) => a.abs_diff(b).into(),
                     (Number::U64(a), Number::U64(b)) => a.abs_diff(b),
                     (Number::I64(a), Number::I64(b)) => a.abs_diff(b),
+                    (Number::F16(a), Number::F16(b)) => ulp_f16(a, b),
                     _ => u64::MAX,
                 };
                 Distance::new(ulp, a.to_f64(), b.to_f64())
-            }
-            Self::Half => {
-                let read = |v: &[u8]| v.first_chunk().map_or(0, |c| u16::from_le_bytes(*c));
-                let (x, y) = (half(read(a)), half(read(b)));
-                let ordered = |bits: u16| {
-                    let magnitude = i32::from(bits & 0x7fff);
-                    if bits >> 15 == 1 {
-                        -magnitude
-                    } else {
-                        magnitude
-                    }
-                };
-                let ulp = match (x.is_nan(), y.is_nan()) {
-                    (true, true) => 0,
-                    (false, false) => ordered(read(a)).abs_diff(ordered(read(b))).into(),
-                    _ => u64::MAX,
-                };
-                Distance::new(ulp, x, y)
             }
             Self::Normalised(format) => {
                 let ((a, value_a), (b, value_b)) = (step(format, a), step(format, b));
@@ -236,13 +237,6 @@ fn step(format: TexelFormat, bytes: &[u8]) -> (i64, f64) {
         _ => (unsigned, (1 << (8 * format.channel_bytes())) - 1),
     };
     (number, number as f64 / most as f64)
-}
-
-/// A 16-bit float's value.
-fn half(bits: u16) -> f64 {
-    let mut texel = [0; 8];
-    texel[..2].copy_from_slice(&bits.to_le_bytes());
-    TexelFormat::Rgba16Float.load(&texel).x.into()
 }
 
 /// How far apart two values are.
@@ -355,7 +349,11 @@ mod tests {
         let d = Kind::Integer(TexelFormat::Rgba16Uint).compare(&[0xff, 0xff], &[0, 0xff], false);
         assert_eq!((d.ulp, d.a), (255, 65535.0));
         // 1.0 and the next half float.
-        let d = Kind::Half.compare(&0x3c00u16.to_le_bytes(), &0x3c01u16.to_le_bytes(), false);
+        let d = Kind::Scalar(Scalar::F16).compare(
+            &0x3c00u16.to_le_bytes(),
+            &0x3c01u16.to_le_bytes(),
+            false,
+        );
         assert_eq!((d.ulp, d.a, d.absolute), (1, 1.0, 1.0 / 1024.0));
         let d =
             Kind::Scalar(Scalar::F32).compare(&1f32.to_le_bytes(), &f32::NAN.to_le_bytes(), false);

@@ -239,6 +239,11 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
 fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), ExecuteError> {
     let (scalar, size) = match ty {
         Type::Scalar { scalar } => (*scalar, 1),
+        // Two halves are a number of 32 bits.
+        Type::Vector {
+            scalar: Scalar::F16,
+            ..
+        } => (Scalar::U32, 1),
         Type::Vector { scalar, size } => (*scalar, *size),
         Type::Array { .. } | Type::Struct { .. } => {
             return Err(bad(kernel, "only scalars and vectors pass between stages"));
@@ -252,6 +257,7 @@ fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), Execut
             return Err(bad(kernel, "64-bit values do not pass between stages"));
         }
         Scalar::Bool => return Err(bad(kernel, "truth values do not pass between stages")),
+        Scalar::F16 => return Err(bad(kernel, "halves in memory do not pass between stages")),
     };
     let text = if size == 1 {
         name.to_string()

@@ -53,6 +53,12 @@ pub fn wide(#[element] state: u64, #[element] by: u32) -> u64 {
     (next >> by) ^ (next / (state | 1)) ^ turned
 }
 
+/// Numbers with their bytes in the other order.
+#[kernel(compute, threads(64))]
+pub fn swapped_bytes(#[element] a: u32, #[element] b: u64) -> (u32, u64) {
+    (a.swap_bytes(), b.swap_bytes())
+}
+
 /// A sum, and its distance from zero.
 #[kernel(compute, threads(64))]
 pub fn signed_wide(#[element] a: i64, #[element] b: i32) -> (i64, u64) {
@@ -337,6 +343,25 @@ pub fn half_directions(#[element] pair: Halves) -> OwnHalves {
         functions: Vec3::from(direction).extend(f32::from(three.length())),
         others: (all / Half::new(4.0)).into(),
     }
+}
+
+/// A colour halfway to grey.
+#[kernel(
+    compute,
+    threads(64),
+    parity(
+        ulp = 1,
+        why = "a driver may add in another order, and a half be rounded to its neighbour"
+    )
+)]
+pub fn faded(
+    #[element]
+    #[range(0.0..=4.0)]
+    colour: F16x4,
+) -> F16x4 {
+    let colour = Vec4::from(colour).clamp(Vec4::ZERO, Vec4::splat(4.0));
+    let grey = Vec4::splat((colour.x + colour.y + colour.z) * (1.0 / 3.0));
+    ((colour + grey) * 0.5).into()
 }
 
 #[cfg(not(target_arch = "spirv"))]

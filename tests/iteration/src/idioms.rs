@@ -59,6 +59,19 @@ pub fn in_order(#[element] x: UVec4) -> u32 {
     u32::from(up) | u32::from(down) << 1 | u32::from(by_bits) << 2
 }
 
+/// How many elements are less than the next one, whether they read the same backwards, whether they come before that
+/// order, and the largest but for the first.
+#[kernel(compute, threads(64))]
+pub fn rising(#[element] x: UVec4) -> UVec4 {
+    let a = x.to_array();
+    let rises = a.iter().zip(a.iter().skip(1)).filter(|(p, q)| p < q);
+    let count = rises.count() as u32;
+    let is_same = a.iter().eq(a.iter().rev());
+    let is_less = a.iter().lt(a.iter().rev());
+    let largest = a.into_iter().skip(1).max();
+    UVec4::new(count, is_same.into(), is_less.into(), largest.unwrap_or(0))
+}
+
 /// Where a number stands among those in order.
 #[kernel(compute, threads(64))]
 pub fn placed(#[element] x: u32) -> u32 {

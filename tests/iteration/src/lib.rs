@@ -48,6 +48,7 @@ hankel_dsl::kernels![
     neighbours,
     sorted,
     in_order,
+    rising,
     placed,
     chosen,
     numbered_pairs,

@@ -300,7 +300,7 @@ fn scalar(host: &Host, scalar: Scalar) -> &'static str {
         Scalar::F32 => host.scalars[0],
         Scalar::U32 => host.scalars[1],
         Scalar::I32 => host.scalars[2],
-        Scalar::F64 | Scalar::U64 | Scalar::I64 | Scalar::Bool => {
+        Scalar::F64 | Scalar::U64 | Scalar::I64 | Scalar::Bool | Scalar::F16 => {
             panic!("functions are of 32-bit numbers")
         }
     }

@@ -710,6 +710,11 @@ fn vertex_format(ty: &Type) -> Option<wgpu::VertexFormat> {
     use wgpu::VertexFormat as F;
     let (scalar, size) = match ty {
         Type::Scalar { scalar } => (*scalar, 1),
+        // Two halves are a number of 32 bits.
+        Type::Vector {
+            scalar: Scalar::F16,
+            ..
+        } => (Scalar::U32, 1),
         Type::Vector { scalar, size } => (*scalar, *size),
         Type::Array { .. } | Type::Struct { .. } => return None,
     };

@@ -193,8 +193,7 @@ operators! {
 /// Two numbers of 16 bits in a buffer or a uniform: a `u32`, the first in the lower half, as WGSL's
 /// `pack2x16float` and GLSL's `packHalf2x16` lay them out.
 ///
-/// To parity it is an integer: inputs are any bits, infinities and NaN among them, unless a function
-/// makes them.
+/// Parity gives and compares its two numbers as halves: `#[range]` and its kin are those of both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct F16x2(u32);

@@ -970,6 +970,8 @@ pub enum Scalar {
     I64,
     /// A truth value: 32 bits that are 0 or 1.
     Bool,
+    /// 16-bit float, of which a [`F16x2`](crate::F16x2) has two: a vector here, one number of 32 bits in shaders.
+    F16,
 }
 
 impl Scalar {
@@ -984,6 +986,7 @@ impl Scalar {
             Self::U64 => "u64",
             Self::I64 => "i64",
             Self::Bool => "bool",
+            Self::F16 => "f16",
         }
     }
 
@@ -993,6 +996,7 @@ impl Scalar {
         match self {
             Self::F64 | Self::U64 | Self::I64 => 8,
             Self::F32 | Self::U32 | Self::I32 | Self::Bool => 4,
+            Self::F16 => 2,
         }
     }
 }

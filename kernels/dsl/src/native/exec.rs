@@ -702,6 +702,7 @@ impl<B: LaneBody> Work for LaneChunk<'_, B> {
             // The last group begins early enough to be whole: some results are computed twice.
             let first = done.min(last);
             let group = &mut chunk[first..first + L::LANES];
+            lanes::fetch_to_write(group);
             body.many::<L>(&uniforms, start + first, group);
             done = first + L::LANES;
         }

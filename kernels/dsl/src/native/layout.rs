@@ -11,6 +11,7 @@ use bytemuck::Pod;
 use glam::{IVec2, IVec3, IVec4, Mat4, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 
 use super::describe::{Field, Inputs, Layout, Precision, Scalar, Type};
+use super::lanes;
 use crate::{Bool, F16x2, Real};
 
 /// A value that a buffer can hold: the same bytes on the host and in a shader.
@@ -82,7 +83,7 @@ leaf! {
     u64, 8, Type::Scalar { scalar: Scalar::U64 };
     i64, 8, Type::Scalar { scalar: Scalar::I64 };
     Bool, 4, Type::Scalar { scalar: Scalar::Bool };
-    F16x2, 4, Type::Scalar { scalar: Scalar::U32 };
+    F16x2, 4, Type::Vector { scalar: Scalar::F16, size: 2 };
     Vec2, 8, Type::Vector { scalar: Scalar::F32, size: 2 };
     Vec3, 16, Type::Vector { scalar: Scalar::F32, size: 3 };
     Vec4, 16, Type::Vector { scalar: Scalar::F32, size: 4 };
@@ -230,7 +231,9 @@ pub unsafe trait Lanewise<S: Real + Pod>: Pod {
         let count = const { scalars::<Self, L, Self::Over<L>>() };
         // SAFETY: the counterpart is an array of so many lanes.
         let columns = unsafe { slice::from_raw_parts_mut(over.as_mut_ptr().cast(), count) };
-        L::columns(&rows[..L::LANES], columns);
+        let rows = &rows[..L::LANES];
+        lanes::fetch_next(rows);
+        L::columns(rows, columns);
         // SAFETY: `Lane::columns` filled all of them.
         unsafe { over.assume_init() }
     }

@@ -11,7 +11,7 @@
 //! derivative of a root, none of a weight, and nothing that is singular where a root is at infinity
 //! (Theorem 14 there).
 
-use hankel_dsl::{Real, apart, array_element, array_element_mut, lit, unroll};
+use hankel_dsl::{Mask, Real, apart, array_element, array_element_mut, lit, unroll};
 
 use super::kernel::{Kernel, fine};
 use super::recurrence::{Recurrence, beyond, finite, power_of_two};
@@ -110,13 +110,18 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     };
 
     // All in powers of u times the reach. (K(u) / K(0)) is Σ e_i u^i.
-    let (rest, factor) = minor::<R, A, N>(&kernel, &e, kernel.reach / reach);
+    let per_reach = if const { A::TWICE } {
+        kernel.reach / reach
+    } else {
+        one
+    };
+    let (rest, factor) = minor::<R, A, N>(&kernel, &e, per_reach);
     let blend = overestimation.saturate();
     let own_share = R::select(kernel.turned, blend - one, blend);
     let minor_share = R::select(kernel.turned, -one, one);
     let minor_share = R::select(kernel.few.gt(zero), minor_share, zero);
     let sign = R::select(kernel.turned, -one, one);
-    let per_length = sign * (reach / recurrence.unit);
+    let per_length = sign * (reach * recurrence.per_unit);
     let limit = limit::<R>();
     let present = recurrence.total.gt(zero);
     let upstream = R::select(present, finite(d_bound, lit!(1e12)), zero);
@@ -174,13 +179,25 @@ fn adjoint<R: Real, A: Arithmetic<R>, const N: usize>(
     }
     // The total is the last factor: it may be large where the others are small.
     let d_eta = own_weight.times(slope).rounded().clamp(-limit, limit) * -upstream;
-    let most = beyond::<R>();
-    let d_eta = d_eta * recurrence.total.min(most / d_eta.abs().max(one));
+    let d_eta = times_total(d_eta, recurrence.total);
     let mut m = [zero; MAX_MOMENTS];
     unroll!(i in 0..(2 * N + 1), max 13, {
         m[i] = q[i].rounded() * upstream;
     });
     Gradient { m, eta: d_eta }
+}
+
+/// The product with a total, whose magnitude is limited to [`beyond`], and never infinite on its way.
+#[inline(always)]
+fn times_total<R: Real>(x: R, total: R) -> R {
+    let one: R = lit!(1.0);
+    let most = beyond::<R>();
+    let mut factor = total;
+    // Natively, a total of up to 1 needs no quotient: `x` is at most `most`.
+    if const { cfg!(target_arch = "spirv") } || total.gt(one).any() {
+        factor = total.min(most / x.abs().max(one));
+    }
+    x * factor
 }
 
 /// The largest magnitude of a derivative.
@@ -374,14 +391,14 @@ fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
     } else {
         least_three(&kernel.e)
     };
-    let first = exact_root::<R, A, N>(e, first * per_reach);
+    let first = exact_root::<R, A, N>(e, first, per_reach);
     let rest = deflated::<R, A, N>(e, first);
     let single = single::<R, A, N>(&rest, first);
     if const { N < 4 } {
         (rest, single)
     } else {
         let of_single = (&rest, &single);
-        let second = exact_root::<R, A, N>(e, second * per_reach);
+        let second = exact_root::<R, A, N>(e, second, per_reach);
         let rest = if const { N == 4 } {
             deflated::<R, A, 3>(&rest, second)
         } else if const { N == 5 } {
@@ -396,7 +413,7 @@ fn minor<R: Real, A: Arithmetic<R>, const N: usize>(
         if const { N < 6 } {
             (rest_of_two, factor_of_two)
         } else {
-            let third = exact_root::<R, A, N>(e, third * per_reach);
+            let third = exact_root::<R, A, N>(e, third, per_reach);
             let rest = deflated::<R, A, 4>(&rest, third);
             let triple = triple::<R, A, N>(&rest, first, second, third);
             let is_triple = kernel.few.gt(lit!(2.0));
@@ -425,13 +442,16 @@ fn selected<R: Real, A: Arithmetic<R>, const N: usize>(
 /// How often a root is improved: each time its error is cubed, until it is that of the coefficients.
 const REFINEMENTS: usize = 3;
 
-/// The negative root of the polynomial next to `v`, with all digits that the coefficients have; 0 stays.
+/// The negative root of the polynomial next to `v`, with all digits that the coefficients have; 0 stays. In twice the
+/// digits `per_reach` takes `v` to the polynomial's unit.
 #[apart(R, if A::TWICE)]
 #[inline(always)]
-fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R) -> A {
+fn exact_root<R: Real, A: Arithmetic<R>, const N: usize>(e: &Fine<A>, v: R, per_reach: R) -> A {
     let zero: R = lit!(0.0);
     let mut root = A::of(v);
     if const { A::TWICE } {
+        let v = v * per_reach;
+        root = A::of(v);
         let quarter: R = lit!(0.25);
         let least: R = lit!(1e-37);
         unroll!(_step in 0..REFINEMENTS, max 7, loop if is_long::<R, A>(N), {

@@ -68,7 +68,7 @@ fn represent<R: Real, A: Arithmetic<R>, const N: usize>(
         weights: [zero; MAX],
         own: kernel.own * recurrence.total,
     };
-    let per_length = kernel.reach / recurrence.unit;
+    let per_length = kernel.reach * recurrence.per_unit;
     unroll!(i in 0..N, max 7, {
         let weight = small_weight_of::<R, A, N>(&kernel, roots[i]).clamp(zero, kernel.others);
         found.weights[i] = weight * recurrence.total;

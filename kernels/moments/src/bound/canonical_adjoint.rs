@@ -120,7 +120,7 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
     };
     let per_middle = one / middle;
     let reach = kernel.reach * middle;
-    let per_length = reach / recurrence.unit;
+    let per_length = reach * recurrence.per_unit;
     let mut places = [Place {
         t: zero,
         tau: one,
@@ -150,7 +150,7 @@ pub fn canonical_adjoint<R: Real, const N: usize>(
         power = (power * turned_length).clamp(-limit, limit);
     });
     let most: R = lit!(1e37);
-    let reach = kernel.reach / recurrence.unit;
+    let reach = kernel.reach * recurrence.per_unit;
     let of_distances = (sign * of_distances * reach).clamp(-limit, limit) * reach;
     let of_own = kernel.own * q[1];
     let of_own = of_own * large.min(most / of_own.abs().max(one));

@@ -219,7 +219,16 @@ fn of_recurrence<R: Real, A: Arithmetic<R>, const N: usize>(
     });
     kernel[0] = square;
 
-    let (e, reach) = reversed::<R, N>(&kernel);
+    let (e, reach) = if const { N == 1 && !A::TWICE } {
+        // Of one root, the reciprocal is a quotient.
+        let mut e = [one; MAX + 1];
+        let half: R = lit!(0.5);
+        let nearest = half / R::epsilon();
+        e[1] = (kernel[1] / square).clamp(-nearest, nearest);
+        (e, one)
+    } else {
+        reversed::<R, N>(&kernel)
+    };
     Kernel {
         a,
         b,
@@ -531,10 +540,14 @@ fn reversed<R: Real, const N: usize>(kernel: &[R; MAX + 1]) -> (Monic<R>, R) {
     let half: R = lit!(0.5);
     let tiny: R = lit!(1e-30);
     let nearest = half / R::epsilon();
-    let ratio = |k: R| k / kernel[0].max(k.abs() * tiny);
-    let first = ratio(kernel[1]).clamp(-nearest, nearest);
+    let mut most = kernel[1].abs();
+    unroll!(i in 2..(N + 1), max 7, {
+        most = most.max(kernel[i].abs());
+    });
+    let per_first = one / kernel[0].max(most * tiny);
+    let first = (kernel[1] * per_first).clamp(-nearest, nearest);
     let limit = nearest * nearest;
-    let second = ratio(kernel[2]).clamp(-limit, limit);
+    let second = (kernel[2] * per_first).clamp(-limit, limit);
     let squares = (first * first - second * lit!(2.0)).max(zero);
     let reach = squares.sqrt().clamp(lit!(1e-6), nearest);
     let per_reach = one / reach;
@@ -542,7 +555,7 @@ fn reversed<R: Real, const N: usize>(kernel: &[R; MAX + 1]) -> (Monic<R>, R) {
     let mut e = [one; MAX + 1];
     let mut power = per_reach;
     unroll!(i in 1..(N + 1), max 7, {
-        e[i] = (ratio(kernel[i]) * power).clamp(-largest, largest);
+        e[i] = (kernel[i] * per_first * power).clamp(-largest, largest);
         power *= per_reach;
     });
     (e, reach)

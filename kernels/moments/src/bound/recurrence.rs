@@ -29,10 +29,10 @@ pub(crate) struct Recurrence<R, A> {
     pub spread: R,
     /// The squared mean's share of it.
     pub rest: R,
-    /// The unit of length, near the root of the mean square distance: a power of two in twice the
+    /// The reciprocal of the unit of length, near the root of the mean square distance: a power of two in twice the
     /// digits. Otherwise that of the depths for N up to 2, where no high powers occur and a rounding
     /// less counts, and else the root itself.
-    pub unit: R,
+    pub per_unit: R,
     /// `m_0`, or 0 if it is not a positive number.
     pub total: R,
     /// The query point, or where it was moved to.
@@ -486,31 +486,24 @@ fn by_chebyshev<R: Real, A: Arithmetic<R>, const N: usize>(
     // The complement where that rounds less.
     let rest = R::select(spread.lt(lit!(0.5)), one - spread, mean * mean / square);
     let most = farthest::<R, A, N>() * farthest::<R, A, N>();
-    if const { A::TWICE } {
-        let per_unit = one / unit;
+    let mut per_unit = one;
+    if const { A::TWICE || N > 2 } {
+        per_unit = one / unit;
         let per_square = per_unit * per_unit;
         unroll!(k in 0..N, max 7, {
             a[k] = a[k].scaled(per_unit);
             b[k + 1] = b[k + 1].scaled(per_square).within(zero, most);
         });
         square *= per_square;
-    } else if const { N > 2 } {
-        unroll!(k in 0..N, max 7, {
-            a[k] = A::of(a[k].rounded() / unit);
-            b[k + 1] = A::of((b[k + 1].rounded() / square).min(most));
-        });
-        square = one;
-    } else {
-        unit = one;
     }
-    unit *= length;
+    per_unit *= per_length;
     Recurrence {
         a,
         b,
         square,
         spread,
         rest,
-        unit,
+        per_unit,
         total,
         query: moved,
     }

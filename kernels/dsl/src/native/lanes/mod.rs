@@ -12,6 +12,8 @@ use crate::math::Elementary;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod number;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+mod permute;
 mod register;
 mod transpose;
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -128,6 +130,42 @@ macro_rules! scalar {
 scalar!(f32, Avx2F32, Avx512F32, NeonF32; root: 0x3f35_04f3, fraction: 0x007f_ffff, sign: 0x8000_0000);
 scalar!(f64, Avx2F64, Avx512F64, NeonF64;
     root: 0x3fe6_a09e_667f_3bcd, fraction: 0x000f_ffff_ffff_ffff, sign: 0x8000_0000_0000_0000);
+
+/// Bytes of a cache line.
+#[cfg(target_arch = "x86_64")]
+const LINE: usize = 64;
+
+/// Asks for as many rows as these that follow them in memory, if any do: the next group's, while this one is computed.
+#[inline(always)]
+pub(super) fn fetch_next<T>(rows: &[T]) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let start = rows.as_ptr().wrapping_add(rows.len()).cast::<i8>();
+        for at in (0..size_of_val(rows)).step_by(LINE) {
+            // SAFETY: an address that is not mapped does nothing.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(at)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = rows;
+}
+
+/// Asks for memory that results will be written to, so that it has arrived when they have been computed.
+#[inline(always)]
+pub(super) fn fetch_to_write<T>(slots: &[T]) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use core::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
+        let start = slots.as_ptr().cast::<i8>();
+        for at in (0..size_of_val(slots)).step_by(LINE) {
+            // SAFETY: all of it is within the slice.
+            unsafe { _mm_prefetch::<_MM_HINT_ET0>(start.wrapping_add(at)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = slots;
+}
 
 /// What is done with lanes.
 pub trait Work {

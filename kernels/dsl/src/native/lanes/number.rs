@@ -9,11 +9,13 @@ use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Su
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
 use super::Scalar;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use super::permute;
 use super::register::Register;
-use super::transpose::{self, Table};
+use super::transpose;
 use crate::math::Elementary;
 use crate::native::layout::Lane;
-use crate::{Mask, Real};
+use crate::{Mask, Real, unroll};
 
 // No closures over lanes, nor functions as arguments: what is not inlined into the code of an instruction set is compiled
 // for the baseline processor.
@@ -21,7 +23,7 @@ use crate::{Mask, Real};
 /// A type for each register, not one that is generic over registers: rustc inlines the operations of registers into those
 /// of concrete types, once, where LLVM would do it at each place that uses them.
 macro_rules! lanes {
-    ($(#[$doc:meta])* $name:ident, $mask_name:ident: two of $register:ty, $features:literal) => {
+    ($(#[$doc:meta])* $name:ident, $mask_name:ident: two of $register:ty, by $by:ident, $features:literal) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         pub struct $name($register, $register);
@@ -33,11 +35,11 @@ macro_rules! lanes {
         const _: () = {
             type R = $register;
             type Number = <R as Register>::Number;
-            lanes!(@all $features $name, $mask_name, 2: 0 1);
+            lanes!(@all $features $by $name, $mask_name, 2: 0 1);
         };
     };
     // `$registers` is how many registers there are, `$i` are the fields that hold them.
-    (@all $features:literal $name:ident, $mask_name:ident, $registers:literal: $($i:tt)+) => {
+    (@all $features:literal $by:ident $name:ident, $mask_name:ident, $registers:literal: $($i:tt)+) => {
         lanes!(@operator $features $name Add add AddAssign add_assign: $($i)+);
         lanes!(@operator $features $name Sub sub SubAssign sub_assign: $($i)+);
         lanes!(@operator $features $name Mul mul MulAssign mul_assign: $($i)+);
@@ -199,53 +201,41 @@ macro_rules! lanes {
             }
             #[inline(always)]
             fn columns<T: Pod>(rows: &[T], columns: &mut [MaybeUninit<Self>]) {
-                let (width, step) = (Table::<R, T>::WIDTH, Table::<R, T>::STEP);
                 let table = cast_slice(rows);
-                let rows = R::LANES * width;
-                let mut at = 0;
-                while at < width {
+                let rows = R::LANES * $by::Table::<R, T>::WIDTH;
+                unroll!(group in 0..($by::Table::<R, T>::WIDTH.div_ceil($by::Table::<R, T>::STEP)), {
                     // The last ones may overlap others.
-                    let from = at.min(width - step);
-                    let some = [$(transpose::columns::<R, T>(&table[$i * rows..], from)),+];
-                    columns[from].write(Self($(some[$i][0]),+));
-                    if const { Table::<R, T>::STEP > 1 } {
-                        columns[from + 1].write(Self($(some[$i][1]),+));
-                    }
-                    if const { Table::<R, T>::STEP > 2 } {
-                        columns[from + 2].write(Self($(some[$i][2]),+));
-                    }
-                    if const { Table::<R, T>::STEP > 3 } {
-                        columns[from + 3].write(Self($(some[$i][3]),+));
-                    }
-                    at += step;
-                }
+                    let from = const {
+                        let last = $by::Table::<R, T>::WIDTH - $by::Table::<R, T>::STEP;
+                        let from = group * $by::Table::<R, T>::STEP;
+                        if from < last { from } else { last }
+                    };
+                    let some = [$($by::Table::<R, T>::columns(&table[$i * rows..], from)),+];
+                    unroll!(k in 0..$by::MOST, {
+                        if const { k < $by::Table::<R, T>::STEP } {
+                            columns[from + k].write(Self($(some[$i][k]),+));
+                        }
+                    });
+                });
             }
             #[inline(always)]
             fn put_columns<T: Pod>(columns: &[Self], rows: &mut [T]) {
-                let (width, step) = (Table::<R, T>::WIDTH, Table::<R, T>::STEP);
                 let table = cast_slice_mut(rows);
-                let rows = R::LANES * width;
-                let mut at = 0;
-                while at < width {
-                    let from = at.min(width - step);
-                    let a = columns[from];
-                    let (mut b, mut c, mut d) = (a, a, a);
-                    if const { Table::<R, T>::STEP > 1 } {
-                        b = columns[from + 1];
-                    }
-                    if const { Table::<R, T>::STEP > 2 } {
-                        c = columns[from + 2];
-                    }
-                    if const { Table::<R, T>::STEP > 3 } {
-                        d = columns[from + 3];
-                    }
-                    $(transpose::put_columns::<R, T>(
-                        [a.$i, b.$i, c.$i, d.$i],
-                        &mut table[$i * rows..],
-                        from,
-                    );)+
-                    at += step;
-                }
+                let rows = R::LANES * $by::Table::<R, T>::WIDTH;
+                unroll!(group in 0..($by::Table::<R, T>::WIDTH.div_ceil($by::Table::<R, T>::STEP)), {
+                    let from = const {
+                        let last = $by::Table::<R, T>::WIDTH - $by::Table::<R, T>::STEP;
+                        let from = group * $by::Table::<R, T>::STEP;
+                        if from < last { from } else { last }
+                    };
+                    let mut some = [$([columns[from].$i; $by::MOST]),+];
+                    unroll!(k in 0..$by::MOST, {
+                        if const { k < $by::Table::<R, T>::STEP } {
+                            $(some[$i][k] = columns[from + k].$i;)+
+                        }
+                    });
+                    $($by::Table::<R, T>::put_columns(&some[$i], &mut table[$i * rows..], from);)+
+                });
             }
         }
 
@@ -402,30 +392,30 @@ macro_rules! lanes {
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX2's `f32`.
-    Avx2F32, Avx2F32Mask: two of super::x86::F32x8, "avx2,fma"
+    Avx2F32, Avx2F32Mask: two of super::x86::F32x8, by transpose, "avx2,fma"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX2's `f64`.
-    Avx2F64, Avx2F64Mask: two of super::x86::F64x4, "avx2,fma"
+    Avx2F64, Avx2F64Mask: two of super::x86::F64x4, by transpose, "avx2,fma"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f32`.
-    Avx512F32, Avx512F32Mask: two of super::x86::F32x16, "avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
+    Avx512F32, Avx512F32Mask: two of super::x86::F32x16, by permute, "avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 lanes! {
     /// AVX-512's `f64`.
-    Avx512F64, Avx512F64Mask: two of super::x86::F64x8, "avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
+    Avx512F64, Avx512F64Mask: two of super::x86::F64x8, by transpose, "avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
     /// NEON's `f32`.
-    NeonF32, NeonF32Mask: two of super::neon::F32x4, "neon"
+    NeonF32, NeonF32Mask: two of super::neon::F32x4, by transpose, "neon"
 }
 #[cfg(target_arch = "aarch64")]
 lanes! {
     /// NEON's `f64`.
-    NeonF64, NeonF64Mask: two of super::neon::F64x2, "neon"
+    NeonF64, NeonF64Mask: two of super::neon::F64x2, by transpose, "neon"
 }

@@ -13,6 +13,9 @@ use bytemuck::{Pod, Zeroable};
 
 use super::register::Register;
 
+/// The most columns that come at once.
+pub const MOST: usize = 4;
+
 /// A table for registers `R` whose rows are of type `T`.
 pub struct Table<R, T>(PhantomData<(R, T)>);
 
@@ -43,97 +46,95 @@ impl<R: Register, T> Table<R, T> {
 
 // Conditions are `const` blocks: the compiler then never sees what they exclude.
 
-/// The first [`Table::STEP`] of these are columns of `table` from `first` on. It has a row for each lane.
-#[inline(always)]
-pub fn columns<R: Register, T: Pod>(table: &[R::Number], first: usize) -> [R; 4] {
-    let row = Table::<R, T>::ROWS;
-    if const { Table::<R, T>::WIDTH == 1 } {
-        return [R::spread(R::load(table, 0)); 4];
-    }
-    if const { Table::<R, T>::WHOLE_ROWS } {
-        let low = R::deinterleave(R::load(table, 0), R::load(table, 8));
-        let high = R::deinterleave(R::load(table, 16), R::load(table, 24));
-        let (a, c) = R::deinterleave(low.0, high.0);
-        let (b, d) = R::deinterleave(low.1, high.1);
-        return [R::spread(a), R::spread(b), R::spread(c), R::spread(d)];
-    }
-    if const { R::PER_BLOCK == 2 } {
-        let (a, b) = R::unpack(load::<R, T>(table, first), load::<R, T>(table, row + first));
-        return [a, b, a, b];
-    }
-    if const { Table::<R, T>::WIDTH == 2 } {
-        let (a, b) = R::deinterleave(R::load(table, 0), R::load(table, R::LANES));
-        let (a, b) = (R::spread(a), R::spread(b));
-        return [a, b, a, b];
-    }
-    if const { Table::<R, T>::WIDTH == 3 } {
-        // Nothing follows the last row: these start a number early, and are turned back.
-        let last = load::<R, T>(table, 3 * row - 1);
-        return transpose([
-            load::<R, T>(table, 0),
-            load::<R, T>(table, row),
-            load::<R, T>(table, 2 * row),
-            R::rotate(last),
-        ]);
-    }
-    transpose([
-        load::<R, T>(table, first),
-        load::<R, T>(table, row + first),
-        load::<R, T>(table, 2 * row + first),
-        load::<R, T>(table, 3 * row + first),
-    ])
-}
-
-/// Stores the first [`Table::STEP`] of these into the columns of `table` from `first` on.
-#[inline(always)]
-pub fn put_columns<R: Register, T: Pod>(
-    [a, b, c, d]: [R; 4],
-    table: &mut [R::Number],
-    first: usize,
-) {
-    let row = Table::<R, T>::ROWS;
-    if const { Table::<R, T>::WIDTH == 1 } {
-        return R::store(R::align(a), table, 0);
-    }
-    if const { Table::<R, T>::WHOLE_ROWS } {
-        let ac = R::interleave(R::align(a), R::align(c));
-        let bd = R::interleave(R::align(b), R::align(d));
-        let (low, high) = (R::interleave(ac.0, bd.0), R::interleave(ac.1, bd.1));
-        R::store(low.0, table, 0);
-        R::store(low.1, table, 8);
-        R::store(high.0, table, 16);
-        return R::store(high.1, table, 24);
-    }
-    if const { R::PER_BLOCK == 2 } {
-        let (low, high) = R::unpack(a, b);
-        store::<R, T>(low, table, first);
-        return store::<R, T>(high, table, row + first);
-    }
-    if const { Table::<R, T>::WIDTH == 2 } {
-        let (low, high) = R::interleave(R::align(a), R::align(b));
-        R::store(low, table, 0);
-        return R::store(high, table, R::LANES);
-    }
-    if const { Table::<R, T>::WIDTH == 3 } {
-        let [r0, r1, r2, r3] = transpose([a, b, c, c]);
-        // A row's fourth number is overwritten by the next row.
-        store::<R, T>(r0, table, 0);
-        store::<R, T>(r1, table, row);
-        store::<R, T>(r2, table, 2 * row);
-        // The last row has none.
-        let mut last = [R::Number::zeroed(); 16];
-        R::store(r3, &mut last, 0);
-        for i in 0..Table::<R, T>::BLOCKS {
-            let length = if i + 1 < Table::<R, T>::BLOCKS { 4 } else { 3 };
-            table[3 * row + 3 * i..][..length].copy_from_slice(&last[4 * i..][..length]);
+impl<R: Register, T: Pod> Table<R, T> {
+    /// The first [`Self::STEP`] of these are columns of `table` from `first` on. It has a row for each lane.
+    #[inline(always)]
+    pub fn columns(table: &[R::Number], first: usize) -> [R; MOST] {
+        let row = Self::ROWS;
+        if const { Self::WIDTH == 1 } {
+            return [R::spread(R::load(table, 0)); 4];
         }
-        return;
+        if const { Self::WHOLE_ROWS } {
+            let low = R::deinterleave(R::load(table, 0), R::load(table, 8));
+            let high = R::deinterleave(R::load(table, 16), R::load(table, 24));
+            let (a, c) = R::deinterleave(low.0, high.0);
+            let (b, d) = R::deinterleave(low.1, high.1);
+            return [R::spread(a), R::spread(b), R::spread(c), R::spread(d)];
+        }
+        if const { R::PER_BLOCK == 2 } {
+            let (a, b) = R::unpack(load::<R, T>(table, first), load::<R, T>(table, row + first));
+            return [a, b, a, b];
+        }
+        if const { Self::WIDTH == 2 } {
+            let (a, b) = R::deinterleave(R::load(table, 0), R::load(table, R::LANES));
+            let (a, b) = (R::spread(a), R::spread(b));
+            return [a, b, a, b];
+        }
+        if const { Self::WIDTH == 3 } {
+            // Nothing follows the last row: these start a number early, and are turned back.
+            let last = load::<R, T>(table, 3 * row - 1);
+            return transpose([
+                load::<R, T>(table, 0),
+                load::<R, T>(table, row),
+                load::<R, T>(table, 2 * row),
+                R::rotate(last),
+            ]);
+        }
+        transpose([
+            load::<R, T>(table, first),
+            load::<R, T>(table, row + first),
+            load::<R, T>(table, 2 * row + first),
+            load::<R, T>(table, 3 * row + first),
+        ])
     }
-    let [r0, r1, r2, r3] = transpose([a, b, c, d]);
-    store::<R, T>(r0, table, first);
-    store::<R, T>(r1, table, row + first);
-    store::<R, T>(r2, table, 2 * row + first);
-    store::<R, T>(r3, table, 3 * row + first);
+
+    /// Stores the first [`Self::STEP`] of these into the columns of `table` from `first` on.
+    #[inline(always)]
+    pub fn put_columns(&[a, b, c, d]: &[R; MOST], table: &mut [R::Number], first: usize) {
+        let row = Self::ROWS;
+        if const { Self::WIDTH == 1 } {
+            return R::store(R::align(a), table, 0);
+        }
+        if const { Self::WHOLE_ROWS } {
+            let ac = R::interleave(R::align(a), R::align(c));
+            let bd = R::interleave(R::align(b), R::align(d));
+            let (low, high) = (R::interleave(ac.0, bd.0), R::interleave(ac.1, bd.1));
+            R::store(low.0, table, 0);
+            R::store(low.1, table, 8);
+            R::store(high.0, table, 16);
+            return R::store(high.1, table, 24);
+        }
+        if const { R::PER_BLOCK == 2 } {
+            let (low, high) = R::unpack(a, b);
+            store::<R, T>(low, table, first);
+            return store::<R, T>(high, table, row + first);
+        }
+        if const { Self::WIDTH == 2 } {
+            let (low, high) = R::interleave(R::align(a), R::align(b));
+            R::store(low, table, 0);
+            return R::store(high, table, R::LANES);
+        }
+        if const { Self::WIDTH == 3 } {
+            let [r0, r1, r2, r3] = transpose([a, b, c, c]);
+            // A row's fourth number is overwritten by the next row.
+            store::<R, T>(r0, table, 0);
+            store::<R, T>(r1, table, row);
+            store::<R, T>(r2, table, 2 * row);
+            // The last row has none.
+            let mut last = [R::Number::zeroed(); 16];
+            R::store(r3, &mut last, 0);
+            for i in 0..Self::BLOCKS {
+                let length = if i + 1 < Self::BLOCKS { 4 } else { 3 };
+                table[3 * row + 3 * i..][..length].copy_from_slice(&last[4 * i..][..length]);
+            }
+            return;
+        }
+        let [r0, r1, r2, r3] = transpose([a, b, c, d]);
+        store::<R, T>(r0, table, first);
+        store::<R, T>(r1, table, row + first);
+        store::<R, T>(r2, table, 2 * row + first);
+        store::<R, T>(r3, table, 3 * row + first);
+    }
 }
 
 /// One block of each row that a register holds blocks of.
@@ -218,8 +219,8 @@ mod tests {
             )*};
         }
         for (_, level) in levels() {
-            widths!(level, f32: 1 2 3 4 5 6 7 8 9 10 11 12 13);
-            widths!(level, f64: 1 2 3 4 5 6 7 8 9 10 11 12 13);
+            widths!(level, f32: 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17);
+            widths!(level, f64: 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17);
         }
     }
 }
