@@ -13,7 +13,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hankel_dsl::F16;
 use hankel_dsl::native::describe::{self, ConstantValue, Kernel, Stage, Type};
 use rspirv::dr::Operand;
 use rspirv::spirv::{Decoration, Op};
@@ -25,7 +24,7 @@ use crate::Language;
 use crate::build::{Generated, Modules, Request, Variant, assemble};
 use crate::error::{Error, Failure, Result};
 use crate::folder::MOST_BYTES;
-use crate::headers::Layouts;
+use crate::headers::{Layouts, held};
 use crate::manifest::{self, Binding, Interface, KernelEntry, LanguageEntry, StageName, Versions};
 use crate::placement::Placement;
 use crate::spirv;
@@ -610,7 +609,7 @@ fn add_fields(
 /// What lies at the start of `bytes`; `null` where they end before it does.
 fn value(ty: &Type, bytes: &[u8]) -> Value {
     let at = |offset: usize| bytes.get(offset..).unwrap_or_default();
-    match ty {
+    match held(ty) {
         Type::Scalar { scalar } => number(*scalar, bytes),
         Type::Vector { scalar, size } => (0..*size as usize)
             .map(|i| number(*scalar, at(i * scalar.bytes())))
@@ -639,10 +638,9 @@ fn number(scalar: describe::Scalar, bytes: &[u8]) -> Value {
         S::U32 => word.map(|b| u32::from_le_bytes(*b).into()),
         S::I32 => word.map(|b| i32::from_le_bytes(*b).into()),
         S::Bool => word.map(|b| (u32::from_le_bytes(*b) != 0).into()),
-        S::F16 => bytes.first_chunk::<2>().map(|b| {
-            let half = F16::from_bits(u16::from_le_bytes(*b).into());
-            serde_json::json!(half.get())
-        }),
+        S::F16 => bytes
+            .first_chunk::<2>()
+            .map(|b| u16::from_le_bytes(*b).into()),
         S::F64 => long.map(|b| serde_json::json!(f64::from_le_bytes(*b))),
         S::U64 => long.map(|b| u64::from_le_bytes(*b).into()),
         S::I64 => long.map(|b| i64::from_le_bytes(*b).into()),

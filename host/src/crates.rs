@@ -70,6 +70,8 @@ impl Native<'_> {
             Native::Of(names) => names,
             Native::Checked(names) => {
                 flags.push("-Coverflow-checks=on".into());
+                // For the author's line of what fails within another crate.
+                flags.push("-Cdebuginfo=line-tables-only".into());
                 names
             }
         };

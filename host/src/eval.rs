@@ -488,6 +488,10 @@ fn parse(scalar: Scalar, text: &str) -> Result<Number, String> {
             Ok(x) if x.is_finite() => Ok(Number::F32(x)),
             _ => Err(too_large("f32")),
         },
+        Scalar::F16 => match Number::half(wide) {
+            half if half.to_f64().is_finite() => Ok(half),
+            _ => Err(too_large("a half: at most 65504")),
+        },
         _ => {
             let (name, least, most) = if scalar == Scalar::U32 {
                 ("u32", 0.0, f64::from(u32::MAX))
@@ -678,6 +682,8 @@ mod tests {
         assert_eq!(parse(Scalar::F32, " 0.1 "), Ok(Number::F32(0.1)));
         assert_eq!(parse(Scalar::F64, "-1e-320"), Ok(Number::F64(-1e-320)));
         assert_eq!(parse(Scalar::U32, "4294967295"), Ok(Number::U32(u32::MAX)));
+        assert_eq!(parse(Scalar::F16, "-0.5"), Ok(Number::F16(0xb800)));
+        assert_eq!(parse(Scalar::F16, "0.099975586"), Ok(Number::F16(0x2e66)));
         assert_eq!(parse(Scalar::I32, "-2147483648"), Ok(Number::I32(i32::MIN)));
         // Rounded once: by way of f64 it would be the float above.
         let text = "1.00000005960464477540";
@@ -694,6 +700,7 @@ mod tests {
             (Scalar::F64, "+Infinity", "not finite"),
             (Scalar::F32, "1e39", "too large for f32"),
             (Scalar::F64, "1e309", "too large for f64"),
+            (Scalar::F16, "70000", "too large for a half"),
             (Scalar::U32, "4294967296", "not in the range of u32"),
             (Scalar::U32, "-1", "not in the range of u32"),
             (Scalar::I32, "2147483648", "not in the range of i32"),

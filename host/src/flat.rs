@@ -124,7 +124,14 @@ impl Number {
     /// The nearest [`F16`].
     #[must_use]
     pub fn half(x: f64) -> Self {
-        Self::F16(F16::new(x as f32).to_bits() as u16)
+        let near = x as f32;
+        let exact = f64::from(near) == x || !near.is_finite();
+        // What an `f32` does not hold is cut off, and its last bit set: so there is no tie that is none, and no second
+        // rounding.
+        let beyond = f64::from(near).abs() > x.abs();
+        let cut = near.to_bits() - u32::from(beyond && !exact);
+        let odd = f32::from_bits(cut | u32::from(!exact));
+        Self::F16(F16::new(odd).to_bits() as u16)
     }
 
     /// Reads the number of type `scalar` at the start of `bytes`; 0 if there are too few. A truth
@@ -311,6 +318,11 @@ mod tests {
         }
         assert_eq!(Number::F32(0.1).to_string(), "0.1");
         assert_eq!(Number::half(0.1).to_string(), "0.099975586");
+        // A little above the middle of two halves, which as an `f32` it would be.
+        let above = 1.0 + 2_f64.powi(-11) + 2_f64.powi(-40);
+        assert_eq!(Number::half(above), Number::F16(0x3c01));
+        assert_eq!(Number::half(-above), Number::F16(0xbc01));
+        assert_eq!(Number::half(1.0 + 2_f64.powi(-11)), Number::F16(0x3c00));
         assert_eq!(
             Number::F64(0.1f32.into()).to_string(),
             "0.10000000149011612"

@@ -71,6 +71,7 @@ fn a_kernel_that_does_not_come_back_is_named_with_its_row() {
 
 const FAULTS: &str = r#"//! Test.
 #![no_std]
+use hankel_dsl::glam::UVec4;
 use hankel_dsl::{Atomics, Buffer, Shared, StorageMut, barrier, dpdx, kernel, subgroup_add};
 /// Right: its numbers do not meet.
 #[kernel(compute, threads(64))]
@@ -169,9 +170,14 @@ pub fn late(#[varying] x: f32, #[atomic] count: Atomics<'_>) -> f32 {
     count.add(0, 1);
     dpdx(x)
 }
+/// Multiplies what wraps, within glam.
+#[kernel(compute, threads(64))]
+pub fn scaled(#[element] v: UVec4) -> UVec4 {
+    v * 1_664_525
+}
 hankel_dsl::kernels![
     fine, race, branch, unwritten, order, kept, wraps, shift, divides, beyond, endless, sized, parted,
-    crowded, late
+    crowded, late, scaled
 ];
 "#;
 
@@ -208,6 +214,14 @@ fn what_no_shader_may_do_is_named_with_its_line() {
             ["shift", "attempt to shift left with overflow", "src/"],
         ),
         ("7 / x", ["divides", "attempt to divide by zero", "src/"]),
+        (
+            "v * 1_664_525",
+            [
+                "scaled",
+                "attempt to multiply with overflow",
+                "called from src/",
+            ],
+        ),
         ("table.get(i", ["beyond", "out of", "src/"]),
         (
             "        subgroup_add(1)",
@@ -241,5 +255,5 @@ fn what_no_shader_may_do_is_named_with_its_line() {
         "depends(subgroup_size)",
     ]);
     says(&["endless", "was ended after 2 s"]);
-    assert!(said.contains("15 kernels: 14 with faults"), "{said}");
+    assert!(said.contains("16 kernels: 15 with faults"), "{said}");
 }

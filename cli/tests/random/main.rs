@@ -295,6 +295,25 @@ fn rust_gpu_refuses_two_arms_that_do_nothing() {
 }
 
 #[test]
+fn rust_gpu_loses_a_choice_in_an_inner_loop() {
+    if !has_compiler() {
+        return;
+    }
+    let case = root().join("tests/upstream/rust-gpu-lost-choice/case.rs");
+    let case = fs::read_to_string(case).expect("the case");
+    let library = format!(
+        "//! A case.\n#![no_std]\nuse hankel_dsl::glam::UVec4;\nuse hankel_dsl::*;\n{case}\nkernels![wrong];\n"
+    );
+    let columns = ["native".to_owned(), "spirv".to_owned()];
+    let bench = Bench::new("lost-choice", columns.to_vec());
+    let report = bench.report(&library, &columns).expect("it compiles");
+    assert!(
+        report.to_string().contains("beyond what is allowed"),
+        "mended: say so in tests/upstream/README.md; {report}"
+    );
+}
+
+#[test]
 fn a_seed_makes_one_program_and_others_others() {
     let texts: Vec<String> = (0..50)
         .map(|seed| write::library(&[&program::program(seed)]))

@@ -55,7 +55,7 @@ impl Layouts {
     /// The spelling of a type in the manifest: `f32`, `vec4<f32>`, `array<f32, 4>`, or the name of
     /// a structure.
     pub fn spell(&self, ty: &Type) -> String {
-        match ty {
+        match held(ty) {
             Type::Scalar { scalar } => scalar.name().into(),
             Type::Vector { scalar, size } => format!("vec{size}<{}>", scalar.name()),
             Type::Array {
@@ -200,8 +200,8 @@ fn has_double(layout: &Layout) -> bool {
     layout.fields.iter().any(|field| double(&field.ty))
 }
 
-/// What a value is in memory: two halves are a number of 32 bits.
-fn held(ty: &Type) -> &Type {
+/// What a value is in memory and in texts: two halves are a number of 32 bits.
+pub(crate) fn held(ty: &Type) -> &Type {
     const WORD: &Type = &Type::Scalar {
         scalar: Scalar::U32,
     };

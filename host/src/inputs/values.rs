@@ -336,7 +336,7 @@ fn held(format: TexelFormat, domain: Option<Domain>) -> Domain {
 fn float(scalar: Scalar, x: f64) -> Number {
     match scalar {
         Scalar::F64 => Number::F64(x),
-        Scalar::F16 => Number::half(x),
+        Scalar::F16 => Number::half(x.clamp(-65504.0, 65504.0)),
         _ => Number::F32(x as f32),
     }
 }

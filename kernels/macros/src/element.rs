@@ -197,7 +197,14 @@ fn one(
                 align
             };
             const UNIFORM_ARRAY: bool = size_of::<#this>().is_multiple_of(16);
-            const UNIFORM: bool = true #(&& <#types as layout::Element>::UNIFORM)*;
+            const IS_STRUCTURE: bool = true;
+            const UNIFORM: bool = true #(&& <#types as layout::Element>::UNIFORM && (
+                !<#types as layout::Element>::IS_STRUCTURE
+                    || ::core::mem::offset_of!(#this, #names).is_multiple_of(16)
+                        && (size_of::<#types>().is_multiple_of(16)
+                            || ::core::mem::offset_of!(#this, #names) + size_of::<#types>()
+                                == size_of::<#this>())
+            ))*;
             fn ty() -> describe::Type {
                 describe::Type::Struct {
                     layout: describe::Layout {

@@ -156,7 +156,7 @@ impl Kernel {
                 let name = &p.name;
                 let concrete = self.concrete(ty, v);
                 let message = format!(
-                    "uniform `{name}`: an array in a uniform buffer needs elements of a multiple of 16 bytes, such as Vec4"
+                    "uniform `{name}`: in a uniform buffer, elements of an array take a multiple of 16 bytes, such as Vec4, and a structure within another one begins and ends at a multiple of 16 bytes; F16x4 is a structure of 8 bytes: take two F16x2"
                 );
                 let few = p.push.then(|| {
                     let message = format!(

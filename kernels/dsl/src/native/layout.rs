@@ -25,6 +25,8 @@ pub trait Element: Pod + Send + Sync {
     const ALIGN: usize;
     /// Whether an array of it may be in a uniform buffer (its stride is a multiple of 16).
     const UNIFORM_ARRAY: bool;
+    /// Whether it is a structure, which begins and ends at a multiple of 16 bytes within another one in a uniform buffer.
+    const IS_STRUCTURE: bool = false;
     /// Whether it may be in a uniform buffer.
     const UNIFORM: bool;
     /// Its type.

@@ -19,6 +19,7 @@ use core::fmt;
 use core::ops::Range;
 use core::panic::Location;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::backtrace::Backtrace;
 use std::boxed::Box;
 use std::collections::HashMap;
 use std::string::{String, ToString};
@@ -255,12 +256,34 @@ fn keep_places() {
         let before = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
             if here() {
-                PANICKED.set(info.location().map(ToString::to_string));
+                PANICKED.set(info.location().map(|at| match called_from(at.file()) {
+                    Some(line) => format!("{at}, called from {line}"),
+                    None => at.to_string(),
+                }));
             } else {
                 before(info);
             }
         }));
     });
+}
+
+/// The line of the author's that led into a file of somebody else: of `core`, or of a crate from a registry. Only known
+/// where the kernels' crate has been compiled with lines.
+fn called_from(file: &str) -> Option<String> {
+    let is_foreign = |file: &str| {
+        file.starts_with("/rustc/") || file.contains("/registry/src/") || file.contains("/library/")
+    };
+    if !is_foreign(file) {
+        return None;
+    }
+    let own = env!("CARGO_MANIFEST_DIR");
+    let trace = Backtrace::force_capture().to_string();
+    let mut places = trace
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("at "));
+    // What is foreign, after the first of it.
+    let found = places.find(|at| !is_foreign(at) && !at.contains(own) && at.contains(".rs:"));
+    found.map(|at| at.strip_prefix("./").unwrap_or(at).into())
 }
 
 /// Where the last panic of this thread's session came from.
