@@ -72,6 +72,7 @@ impl Native<'_> {
                 flags.push("-Coverflow-checks=on".into());
                 // For the author's line of what fails within another crate.
                 flags.push("-Cdebuginfo=line-tables-only".into());
+                flags.push("-Cstrip=none".into());
                 names
             }
         };

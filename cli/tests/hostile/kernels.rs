@@ -219,7 +219,7 @@ fn what_no_shader_may_do_is_named_with_its_line() {
             [
                 "scaled",
                 "attempt to multiply with overflow",
-                "called from src/",
+                "called from bad/src/",
             ],
         ),
         ("table.get(i", ["beyond", "out of", "src/"]),

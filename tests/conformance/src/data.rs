@@ -198,7 +198,15 @@ pub struct HalfResults {
 }
 
 /// Arithmetic on halves: each result is rounded to one.
-#[kernel(compute, threads(64), inputs = inputs::halves)]
+#[kernel(
+    compute,
+    threads(64),
+    inputs = inputs::halves,
+    parity(
+        non_finite,
+        why = "sums, products and quotients may be beyond 65504"
+    )
+)]
 pub fn halves(#[element] pair: Halves) -> HalfResults {
     let (a, b) = (pair.a, pair.b);
     let sums = F16x2::new(a.x() + b.x(), a.y() - b.y());

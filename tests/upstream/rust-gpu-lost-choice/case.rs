@@ -1,3 +1,4 @@
+/// `a` becomes `c` only where `x.w & 3` is 0.
 #[kernel(compute, threads(64))]
 pub fn wrong(#[element] x: UVec4) -> UVec4 {
     let (mut a, mut c) = (x.x, x.z);
