@@ -21,6 +21,7 @@ use crate::error::{During, Error, Result};
 use crate::files::sha256;
 use crate::kept::Kept;
 use crate::messages::Messages;
+use crate::spirv::assigned::copy_assigned;
 use crate::spirv::fingerprint::{self, Fingerprint};
 use crate::spirv::{self, divide, unlinked};
 
@@ -115,7 +116,8 @@ impl Unlinked<'_> {
         let rlink = Rlink::of(&rlink, &folder, &name)?;
         let object = std::fs::read(&rlink.object).ok()?;
         let words = unlinked::lean(&spirv::words(&object, &name).ok()?);
-        let module = spirv::load(&words, &name).ok()?;
+        let mut module = spirv::load(&words, &name).ok()?;
+        copy_assigned(&mut module);
         rlink.remove_others(&folder, &name);
         let kept = Kept::within(self.linked_dir.join(&name));
         let base = self.base()?;

@@ -1,5 +1,6 @@
 //! SPIR-V binaries: reading, writing, and the small edits that spirv-opt has no pass for.
 
+pub(crate) mod assigned;
 pub(crate) mod behind;
 pub mod bounds;
 pub(crate) mod branches;

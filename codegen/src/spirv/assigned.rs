@@ -1,0 +1,101 @@
+//! What a variable is set to, as a value of its own.
+//!
+//! A loop may set a variable to the value that it has. SPIR-T, by which rust-gpu's linker structures control flow, may
+//! then take another variable of that loop for it (`tests/upstream/rust-gpu-lost-choice`). A copy is another value to
+//! it. spirv-opt removes all copies.
+
+use std::collections::{HashMap, HashSet};
+
+use rspirv::dr::{Function, Instruction, Module, Operand};
+use rspirv::spirv::{Op, Word};
+
+use super::{id, op};
+
+/// Copies what is stored in variables that are stored to more than once, where it is not computed there and then.
+pub fn copy_assigned(module: &mut Module) {
+    let plain = types_without_pointers(module);
+    let Some(header) = &mut module.header else {
+        return;
+    };
+    for function in &mut module.functions {
+        let several = stored_several_times(function);
+        let mut given: HashMap<Word, Word> = HashMap::new();
+        let parameters = function.parameters.iter();
+        let instructions = function.blocks.iter().flat_map(|it| &it.instructions);
+        for it in parameters.chain(instructions) {
+            let is_given = matches!(
+                op(it),
+                Op::FunctionParameter | Op::Load | Op::FunctionCall | Op::Phi
+            );
+            if let (true, Some(value), Some(ty)) = (is_given, it.result_id, it.result_type)
+                && plain.contains(&ty)
+            {
+                given.insert(value, ty);
+            }
+        }
+        for block in &mut function.blocks {
+            let mut instructions = Vec::with_capacity(block.instructions.len());
+            for mut it in block.instructions.drain(..) {
+                if op(&it) == Op::Store
+                    && id(&it, 0).is_some_and(|to| several.contains(&to))
+                    && let Some(value) = id(&it, 1)
+                    && let Some(ty) = given.get(&value)
+                {
+                    let copied = vec![Operand::IdRef(value)];
+                    let copy =
+                        Instruction::new(Op::CopyObject, Some(*ty), Some(header.bound), copied);
+                    it.operands[1] = Operand::IdRef(header.bound);
+                    header.bound += 1;
+                    instructions.push(copy);
+                }
+                instructions.push(it);
+            }
+            block.instructions = instructions;
+        }
+    }
+}
+
+/// Numbers, vectors, and what is made of them. The linker follows pointers through variables, and through no copies.
+fn types_without_pointers(module: &Module) -> HashSet<Word> {
+    let mut plain = HashSet::new();
+    for it in &module.types_global_values {
+        let of =
+            |count: usize| (0..count).all(|at| id(it, at).is_some_and(|ty| plain.contains(&ty)));
+        let is_plain = match op(it) {
+            Op::TypeBool | Op::TypeInt | Op::TypeFloat => true,
+            Op::TypeVector | Op::TypeMatrix | Op::TypeArray => of(1),
+            Op::TypeStruct => of(it.operands.len()),
+            _ => false,
+        };
+        if let (true, Some(ty)) = (is_plain, it.result_id) {
+            plain.insert(ty);
+        }
+    }
+    plain
+}
+
+/// The variables of a function that two instructions or more store to, as a whole.
+fn stored_several_times(function: &Function) -> HashSet<Word> {
+    let mut stores: HashMap<Word, usize> = HashMap::new();
+    for it in function.all_inst_iter() {
+        match op(it) {
+            Op::Variable if it.operands.len() > 1 => {
+                if let Some(variable) = it.result_id {
+                    *stores.entry(variable).or_default() += 1;
+                }
+            }
+            Op::Store => {
+                if let Some(to) = id(it, 0) {
+                    *stores.entry(to).or_default() += 1;
+                }
+            }
+            _ => {}
+        }
+    }
+    let is_variable = |it: &&Instruction| op(it) == Op::Variable;
+    let variables = function.all_inst_iter().filter(is_variable);
+    variables
+        .filter_map(|it| it.result_id)
+        .filter(|it| stores.get(it).is_some_and(|count| *count > 1))
+        .collect()
+}
