@@ -149,6 +149,9 @@ fn intervals_enclose_the_bounds() {
 fn reproduces<const N: usize>() {
     for row in rows("generic-symmetric", N, 200) {
         let found = canonical::<f64, N>(row.m, row.eta);
+        // Moments that N points without the depth nearly have are nearly those of no distribution: rounding of the
+        // moments alone moves the points.
+        let limit = if found.own < 1e-10 { 5e-13 } else { 1e-14 };
         for k in 0..=2 * N {
             let mut sum = DoubleDouble::from(found.own) * power(row.eta, k);
             let mut terms = f64::from(sum).abs();
@@ -161,7 +164,7 @@ fn reproduces<const N: usize>() {
             }
             let rest = f64::from(sum - row.m[k].into()).abs();
             assert!(
-                rest <= 1e-13 * terms,
+                rest <= limit * terms,
                 "n = {N} {row:?} {k}: {rest:e} of {terms:e}"
             );
         }
