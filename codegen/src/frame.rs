@@ -24,7 +24,7 @@ use crate::Language;
 use crate::build::{Generated, Modules, Request, Variant, assemble};
 use crate::error::{Error, Failure, Result};
 use crate::folder::MOST_BYTES;
-use crate::headers::{Layouts, held};
+use crate::headers::Layouts;
 use crate::manifest::{self, Binding, Interface, KernelEntry, LanguageEntry, StageName, Versions};
 use crate::placement::Placement;
 use crate::spirv;
@@ -609,7 +609,7 @@ fn add_fields(
 /// What lies at the start of `bytes`; `null` where they end before it does.
 fn value(ty: &Type, bytes: &[u8]) -> Value {
     let at = |offset: usize| bytes.get(offset..).unwrap_or_default();
-    match held(ty) {
+    match ty.in_shader() {
         Type::Scalar { scalar } => number(*scalar, bytes),
         Type::Vector { scalar, size } => (0..*size as usize)
             .map(|i| number(*scalar, at(i * scalar.bytes())))

@@ -632,16 +632,7 @@ const fn comparison(compare: Compare) -> &'static str {
 
 /// `float32x3` and the like.
 fn vertex_format(ty: &Type) -> Option<String> {
-    let (scalar, size) = match ty {
-        Type::Scalar { scalar } => (scalar, 1),
-        // Two halves are a number of 32 bits.
-        Type::Vector {
-            scalar: Scalar::F16,
-            ..
-        } => (&Scalar::U32, 1),
-        Type::Vector { scalar, size } => (scalar, *size),
-        Type::Array { .. } | Type::Struct { .. } => return None,
-    };
+    let (scalar, size) = ty.components()?;
     let stem = match scalar {
         Scalar::F32 => "float32",
         Scalar::U32 => "uint32",

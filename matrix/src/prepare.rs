@@ -261,18 +261,9 @@ fn distances(ty: &Type) -> Value {
 
 /// A type that passes between stages.
 fn value(ty: &Type) -> Result<Value, String> {
-    let (scalar, size) = match ty {
-        Type::Scalar { scalar } => (*scalar, 1),
-        // Two halves are a number of 32 bits.
-        Type::Vector {
-            scalar: describe::Scalar::F16,
-            ..
-        } => (describe::Scalar::U32, 1),
-        Type::Vector { scalar, size } => (*scalar, *size),
-        Type::Array { .. } | Type::Struct { .. } => {
-            return Err("only scalars and vectors pass between stages".into());
-        }
-    };
+    let (scalar, size) = ty
+        .components()
+        .ok_or("only scalars and vectors pass between stages")?;
     let scalar = match scalar {
         describe::Scalar::F32 => Scalar::F32,
         describe::Scalar::U32 => Scalar::U32,

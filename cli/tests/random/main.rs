@@ -347,6 +347,7 @@ fn programs_have_all_that_there_is() {
         "barrier()",
         "exact",
         " & 3) as usize] = ",
+        ") = (v",
         "f1(",
         "Vec3::new(",
         "swap_bytes",

@@ -230,6 +230,8 @@ impl Expr {
 pub enum Stmt {
     Let(u32, Expr),
     Assign(u32, Expr),
+    /// At once: mostly the values of other variables, or their own.
+    AssignBoth([u32; 2], [Expr; 2]),
     /// Four elements.
     Array(u32, [Expr; 4]),
     SetElement(u32, Expr, Expr),
@@ -317,6 +319,7 @@ pub fn expressions(statement: &Stmt) -> Vec<&Expr> {
         | Stmt::ContinueIf(e)
         | Stmt::Store(_, e)
         | Stmt::Exchange(_, _, e) => vec![e],
+        Stmt::AssignBoth(_, both) => both.iter().collect(),
         Stmt::Array(_, all) => all.iter().collect(),
         Stmt::SetElement(_, a, b) | Stmt::ReturnIf(a, b) | Stmt::Count(a, b) => vec![a, b],
         Stmt::Loop(..) => Vec::new(),
@@ -334,6 +337,7 @@ pub fn expressions_mut(statement: &mut Stmt) -> Vec<&mut Expr> {
         | Stmt::ContinueIf(e)
         | Stmt::Store(_, e)
         | Stmt::Exchange(_, _, e) => vec![e],
+        Stmt::AssignBoth(_, both) => both.iter_mut().collect(),
         Stmt::Array(_, all) => all.iter_mut().collect(),
         Stmt::SetElement(_, a, b) | Stmt::ReturnIf(a, b) | Stmt::Count(a, b) => vec![a, b],
         Stmt::Loop(..) => Vec::new(),
@@ -478,7 +482,7 @@ impl Maker {
     fn statement(&mut self, depth: u32) -> Stmt {
         loop {
             let assignable = !self.variables.is_empty();
-            return match self.chance.count(0, 21) {
+            return match self.chance.count(0, 23) {
                 0..=5 => {
                     let ty = self.chance.pick(&Ty::ALL);
                     let value = self.expr(ty, 3);
@@ -558,6 +562,11 @@ impl Maker {
                     self.variables.push((U32, id));
                     Stmt::Exchange(id, by, value)
                 }
+                22..=23 if assignable => {
+                    let targets = [self.variable(), self.variable()];
+                    let values = targets.map(|(ty, _)| self.moved(ty));
+                    Stmt::AssignBoth(targets.map(|(_, id)| id), values)
+                }
                 _ => continue,
             };
         }
@@ -566,6 +575,16 @@ impl Maker {
     fn variable(&mut self) -> (Ty, u32) {
         let all = self.variables.clone();
         self.chance.pick(&all)
+    }
+
+    /// Mostly the value of a variable. There is one of this type.
+    fn moved(&mut self, ty: Ty) -> Expr {
+        if self.chance.count(0, 3) == 0 {
+            return self.expr(ty, 2);
+        }
+        let all = self.variables.iter().filter(|v| v.0 == ty);
+        let all: Vec<u32> = all.map(|v| v.1).collect();
+        Expr::Variable(ty, self.chance.pick(&all))
     }
 
     fn expr(&mut self, ty: Ty, depth: u32) -> Expr {

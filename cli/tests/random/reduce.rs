@@ -209,6 +209,7 @@ fn settle(block: &mut Vec<Stmt>, known: &mut Vec<u32>) {
         }
         match statement {
             Stmt::Assign(id, _) | Stmt::SetElement(id, ..) if !known.contains(id) => return false,
+            Stmt::AssignBoth(both, _) if both.iter().any(|id| !known.contains(id)) => return false,
             _ => {}
         }
         let before = known.len();

@@ -234,6 +234,9 @@ impl Writer {
                 self.line(&format!("let mut v{id}: {ty} = {};", expr(value)));
             }
             Stmt::Assign(id, value) => self.line(&format!("v{id} = {};", expr(value))),
+            Stmt::AssignBoth([a, b], [x, y]) => {
+                self.line(&format!("(v{a}, v{b}) = ({}, {});", expr(x), expr(y)));
+            }
             Stmt::Array(id, all) => {
                 let (ty, all) = (all[0].ty().name(), all.each_ref().map(expr).join(", "));
                 self.line(&format!("let mut a{id}: [{ty}; 4] = [{all}];"));

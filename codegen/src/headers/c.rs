@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use hankel_dsl::native::describe::{Scalar, Type};
 
-use super::{Layouts, Part, held, one_line, padded, parts};
+use super::{Layouts, Part, one_line, padded, parts};
 use crate::files::sha256;
 use crate::manifest::KernelEntry;
 use crate::{Language, VERSION};
@@ -141,7 +141,7 @@ fn c_type(layouts: &Layouts, ty: &Type) -> (String, String) {
         }
         .to_owned()
     };
-    match held(ty) {
+    match ty.in_shader() {
         Type::Scalar { scalar: it } => (scalar(it), String::new()),
         Type::Vector { scalar: it, size } => (scalar(it), format!("[{size}]")),
         Type::Array {

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use hankel_dsl::native::describe::{Scalar, Type};
 use serde_json::json;
 
-use super::{Groups, InWgsl, Layouts, held, one_line, scalar_size};
+use super::{Groups, InWgsl, Layouts, one_line, scalar_size};
 use crate::manifest::{Binding, BindingKind, Constant, KernelEntry, StageName};
 use crate::{Language, VERSION};
 
@@ -183,10 +183,10 @@ fn on_webgpu(
 }
 
 fn type_of(layouts: &Layouts, ty: &Type) -> String {
-    match held(ty) {
+    match ty.in_shader() {
         Type::Scalar { .. } => "number".into(),
         Type::Vector { .. } => "ArrayLike<number>".into(),
-        Type::Array { element, .. } => match held(element) {
+        Type::Array { element, .. } => match element.in_shader() {
             Type::Scalar { .. } => "ArrayLike<number>".into(),
             element => format!("ReadonlyArray<{}>", type_of(layouts, element)),
         },
@@ -204,7 +204,7 @@ fn put(text: &mut String, layouts: &Layouts, ty: &Type, value: &str, at: &str, d
         put(text, layouts, element, &item, &place, depth + 1);
         let _ = writeln!(text, "{indent}}}");
     };
-    match held(ty) {
+    match ty.in_shader() {
         Type::Scalar { scalar } => {
             let setter = match scalar {
                 Scalar::F32 => "setFloat32",

@@ -55,7 +55,7 @@ impl Layouts {
     /// The spelling of a type in the manifest: `f32`, `vec4<f32>`, `array<f32, 4>`, or the name of
     /// a structure.
     pub fn spell(&self, ty: &Type) -> String {
-        match held(ty) {
+        match ty.in_shader() {
             Type::Scalar { scalar } => scalar.name().into(),
             Type::Vector { scalar, size } => format!("vec{size}<{}>", scalar.name()),
             Type::Array {
@@ -198,20 +198,6 @@ fn has_double(layout: &Layout) -> bool {
         }
     }
     layout.fields.iter().any(|field| double(&field.ty))
-}
-
-/// What a value is in memory and in texts: two halves are a number of 32 bits.
-pub(crate) fn held(ty: &Type) -> &Type {
-    const WORD: &Type = &Type::Scalar {
-        scalar: Scalar::U32,
-    };
-    match ty {
-        Type::Vector {
-            scalar: Scalar::F16,
-            ..
-        } => WORD,
-        other => other,
-    }
 }
 
 /// The Rust type of a scalar in memory.

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use hankel_dsl::native::describe::{Layout, Type};
 
 use super::{
-    Groups, InWgsl, Layouts, Part, held, one_line, padded, parts, scalar_name, scalar_size, size,
+    Groups, InWgsl, Layouts, Part, one_line, padded, parts, scalar_name, scalar_size, size,
 };
 use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::{Language, VERSION};
@@ -102,7 +102,7 @@ fn put(text: &mut String, ty: &Type, value: &str, at: &str, depth: usize) {
         inner(text, &item, &start);
         let _ = writeln!(text, "{indent}}}");
     };
-    match held(ty) {
+    match ty.in_shader() {
         Type::Vector { scalar, .. } => {
             each(text, scalar_size(*scalar), &|text, item, start| {
                 let ty = Type::Scalar { scalar: *scalar };
@@ -259,7 +259,7 @@ pub fn bytemuck(layouts: &Layouts) -> String {
 }
 
 fn rust_type(layouts: &Layouts, ty: &Type) -> String {
-    match held(ty) {
+    match ty.in_shader() {
         Type::Scalar { scalar } => scalar_name(*scalar).into(),
         Type::Vector { scalar, size } => format!("[{}; {size}]", scalar_name(*scalar)),
         Type::Array {

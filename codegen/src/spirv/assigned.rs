@@ -99,3 +99,50 @@ fn stored_several_times(function: &Function) -> HashSet<Word> {
         .filter(|it| stores.get(it).is_some_and(|count| *count > 1))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::store;
+    use super::super::tests::of_wgsl;
+    use crate::finish::{optimise, validate};
+    use crate::spirv::load;
+
+    use super::*;
+
+    fn copies(module: &Module) -> usize {
+        let all = module.functions.iter().flat_map(|it| it.all_inst_iter());
+        all.filter(|it| op(it) == Op::CopyObject).count()
+    }
+
+    /// How many copies a kernel has that assigns so to its variables.
+    fn copied(assignments: &str) -> usize {
+        let mut module = of_wgsl(&format!(
+            "@group(0) @binding(0) var<storage, read_write> x: array<u32>;
+             @compute @workgroup_size(1) fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+                 var a: u32; var c: u32;
+                 a = x[0]; c = x[1];
+                 {assignments}
+                 x[0] = a; x[1] = c;
+             }}"
+        ));
+        copy_assigned(&mut module);
+        let all = copies(&module);
+        let words = store(&module);
+        validate(&words, "test").unwrap();
+        let (words, _) = optimise(module, "test").unwrap();
+        assert_eq!(
+            copies(&load(&words, "test").unwrap()),
+            0,
+            "spirv-opt leaves none"
+        );
+        all
+    }
+
+    #[test]
+    fn what_a_variable_is_set_to_is_copied() {
+        assert_eq!(copied(""), 0, "each is set once");
+        assert_eq!(copied("c = c;"), 2, "both of its stores");
+        assert_eq!(copied("a = c; c = c;"), 4);
+        assert_eq!(copied("a = c + 1u;"), 1, "a sum is a value of its own");
+    }
+}

@@ -39,13 +39,24 @@ pub fn copy_behind_loops(module: &mut Module) {
             }
         }
         for left in loops(function) {
-            for (value, ty) in left.used_behind(function, &made) {
-                made.insert(header.bound, (left.merge, ty));
-                left.copy(function, value, ty, header.bound);
-                header.bound += 1;
-            }
+            let copies: Vec<_> = left
+                .used_behind(function, &made)
+                .into_iter()
+                .zip(header.bound..)
+                .map(|((value, ty), copy)| Copy { value, ty, copy })
+                .collect();
+            header.bound += copies.len() as Word;
+            made.extend(copies.iter().map(|it| (it.copy, (left.merge, it.ty))));
+            left.put(function, &copies);
         }
     }
+}
+
+/// A value, its type, and what stands for it behind the loop.
+struct Copy {
+    value: Word,
+    ty: Word,
+    copy: Word,
 }
 
 /// A loop, and what comes behind it.
@@ -93,8 +104,8 @@ impl Left {
         let mut places = HashMap::new();
         for block in &self.behind {
             for it in &function.blocks[*block].instructions {
-                for place in self.places(it) {
-                    let Some(value) = id(it, place) else {
+                for place in 0..it.operands.len() {
+                    let Some(value) = id(it, place).filter(|_| self.is_used(it, place)) else {
                         continue;
                     };
                     let Some((_, ty)) = made
@@ -115,25 +126,27 @@ impl Left {
         several.map(|(value, ty, _)| (value, ty)).collect()
     }
 
-    /// Which operands of an instruction behind the loop are used there: those of `OpPhi` where they come from.
-    fn places(&self, it: &Instruction) -> Vec<usize> {
-        let of_phi = op(it) == Op::Phi;
-        let is_used = |place: &usize| {
-            let comes_from = id(it, place + 1);
-            !of_phi
-                || place.is_multiple_of(2)
-                    && comes_from.is_some_and(|from| self.labels.contains(&from))
-        };
-        (0..it.operands.len()).filter(is_used).collect()
+    /// Whether an operand of an instruction behind the loop is used there: one of `OpPhi` is where it comes from.
+    fn is_used(&self, it: &Instruction, place: usize) -> bool {
+        let comes_from = || id(it, place + 1);
+        op(it) != Op::Phi
+            || place.is_multiple_of(2)
+                && comes_from().is_some_and(|from| self.labels.contains(&from))
     }
 
-    /// Copies a value where the loop is left, and puts the copy in its place behind that.
-    fn copy(&self, function: &mut Function, value: Word, ty: Word, copy: Word) {
+    /// Copies values where the loop is left, and puts the copies in their places behind that.
+    fn put(&self, function: &mut Function, copies: &[Copy]) {
+        if copies.is_empty() {
+            return;
+        }
+        let copy_of: HashMap<Word, Word> = copies.iter().map(|it| (it.value, it.copy)).collect();
         for block in &self.behind {
             for it in &mut function.blocks[*block].instructions {
-                for place in self.places(it) {
-                    if id(it, place) == Some(value) {
-                        it.operands[place] = Operand::IdRef(copy);
+                for place in 0..it.operands.len() {
+                    if let Some(copy) = id(it, place).and_then(|value| copy_of.get(&value))
+                        && self.is_used(it, place)
+                    {
+                        it.operands[place] = Operand::IdRef(*copy);
                     }
                 }
             }
@@ -143,11 +156,11 @@ impl Left {
             .iter()
             .position(|it| !matches!(op(it), Op::Phi | Op::Line | Op::NoLine))
             .unwrap_or(instructions.len());
-        let operands = vec![Operand::IdRef(value)];
-        instructions.insert(
-            first,
-            Instruction::new(Op::CopyObject, Some(ty), Some(copy), operands),
-        );
+        let made = copies.iter().map(|it| {
+            let value = vec![Operand::IdRef(it.value)];
+            Instruction::new(Op::CopyObject, Some(it.ty), Some(it.copy), value)
+        });
+        instructions.splice(first..first, made);
     }
 }
 

@@ -235,6 +235,7 @@ impl NativeDevice {
                     levels: texture.shape.levels,
                     layers: texture.shape.layers,
                     samples: texture.shape.samples,
+                    number: 0,
                     format: texture.shape.format.texel(),
                     bytes: texture.memory.get(),
                 })

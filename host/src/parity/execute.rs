@@ -237,18 +237,9 @@ fn helper(name: &str, stage: Stage, params: Vec<Param>, outputs: Vec<Output>) ->
 
 /// A scalar or vector type: its scalar, its components, its name in WGSL.
 fn interface(kernel: &Kernel, ty: &Type) -> Result<(Scalar, u32, String), ExecuteError> {
-    let (scalar, size) = match ty {
-        Type::Scalar { scalar } => (*scalar, 1),
-        // Two halves are a number of 32 bits.
-        Type::Vector {
-            scalar: Scalar::F16,
-            ..
-        } => (Scalar::U32, 1),
-        Type::Vector { scalar, size } => (*scalar, *size),
-        Type::Array { .. } | Type::Struct { .. } => {
-            return Err(bad(kernel, "only scalars and vectors pass between stages"));
-        }
-    };
+    let (scalar, size) = ty
+        .components()
+        .ok_or_else(|| bad(kernel, "only scalars and vectors pass between stages"))?;
     let name = match scalar {
         Scalar::F32 => "f32",
         Scalar::U32 => "u32",

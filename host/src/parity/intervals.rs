@@ -17,12 +17,14 @@
 //! down as well, at nine of the places, and the levels of even and of odd number are moved one after the other: of two
 //! neighbours, one may be rounded up and the other down.
 //!
-//! The filter's own sums round, too. Each channel is moved by 4 units of 2^-24 of the largest texel
-//! up and down; what the channels change is added up.
+//! The filter's own sums round, too: an interpolation is off by at most one unit of 2^-24 of the largest texel, natively
+//! and on the device. Texels of a plane take two interpolations, those of a volume three, and levels another one. So
+//! each channel of each texture is moved up and down by 4 to 8 units; what the channels change is added up.
 //!
-//! All that is read through one sampler is moved alike. What several samplers change is added up.
+//! Coordinates and levels of all that is read through one sampler are moved alike. What several samplers change is added
+//! up.
 
-use hankel_dsl::native::describe::{Kernel, Role, TextureKind};
+use hankel_dsl::native::describe::{Channels, Kernel, Role, TextureKind};
 use hankel_dsl::native::{Deviation, Levels};
 
 use super::execute::Written;
@@ -37,8 +39,8 @@ const PLACES_3D: [i16; 3] = [-4, 0, 4];
 const LEVEL: i16 = 4;
 /// Rounding of a product of two weights, in 1/1024: 1/512, half a step of 8 bits.
 const TWIST: i8 = 2;
-/// Rounding of the filter's sums, in 2^-24 of the largest texel: three sums, and products of two.
-const SUMS: i8 = 4;
+/// Rounding of an interpolation, natively and on the device, in 2^-24 of the largest texel.
+const INTERPOLATION: i8 = 2;
 
 /// Where a number may lie, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,6 +120,7 @@ impl Intervals {
             .map(|&x| Interval { low: x, high: x })
             .collect();
         let has_levels = case.args.iter().any(has_levels);
+        let textures = filtered(kernel);
         for sampler in samplers {
             let mut with = |deviation: Deviation| {
                 let mut moved = case.clone();
@@ -158,9 +161,13 @@ impl Intervals {
                 }
             }
             let mut sums = Vec::new();
-            for channel in 0..4 {
-                for sign in [-SUMS, SUMS] {
-                    let mut deviation = Deviation::NONE;
+            let rounding = INTERPOLATION * (grid.axes as i8 + i8::from(has_levels));
+            for (texture, channel) in textures.iter().flat_map(|it| (0..4).map(move |c| (*it, c))) {
+                for sign in [-rounding, rounding] {
+                    let mut deviation = Deviation {
+                        texture,
+                        ..Deviation::NONE
+                    };
                     deviation.channels[channel] = sign;
                     sums.push(with(deviation)?);
                 }
@@ -181,6 +188,20 @@ impl Intervals {
         }
         Ok(Some(Self(intervals)))
     }
+}
+
+/// The numbers of a kernel's textures that a sampler may interpolate.
+fn filtered(kernel: &Kernel) -> Vec<u8> {
+    let textures = kernel.params.iter().filter_map(|it| match &it.role {
+        Role::Texture { texture, .. } => Some(*texture),
+        _ => None,
+    });
+    let is_filtered = |it: &TextureKind| it.channels() == Channels::Float && !it.is_multisampled();
+    textures
+        .zip(0..)
+        .filter(|(texture, _)| is_filtered(texture))
+        .map(|(_, number)| number)
+        .collect()
 }
 
 /// Whether an argument is a texture with more than one level.

@@ -206,6 +206,7 @@ impl Arrived {
                     levels,
                     layers,
                     samples,
+                    number: 0,
                     format,
                     bytes,
                 }),
@@ -262,6 +263,7 @@ mod tests {
                     levels: 1,
                     layers: 1,
                     samples: 1,
+                    number: 0,
                     format,
                     bytes: &texels,
                 }),
@@ -273,6 +275,7 @@ mod tests {
                         level: 2,
                         twist: -1,
                         channels: [1, -2, 3, -4],
+                        texture: 2,
                     },
                     ..Sampler::new(Filter::Linear, Address::MirrorRepeat)
                 }),

@@ -114,6 +114,7 @@ fn texels(size: [u32; 3], levels: u32, format: TexelFormat, bytes: &[u8]) -> Arg
         levels,
         layers: 1,
         samples: 1,
+        number: 0,
         format,
         bytes,
     })
@@ -179,6 +180,7 @@ fn read(
         levels: 1,
         layers: 1,
         samples: 1,
+        number: 0,
         format: TexelFormat::R32Float,
         bytes: bytemuck::cast_slice(texels),
     };

@@ -20,6 +20,7 @@ fn the_bias_counts_once() {
         levels: 1,
         layers: 1,
         samples: 1,
+        number: 0,
         format: TexelFormat::Rg32Float,
         bytes: &bytes,
     });

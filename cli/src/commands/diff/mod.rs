@@ -91,15 +91,15 @@ pub fn run(args: &Diff, quiet: bool) -> Result<Outcome> {
         if found.beyond == 0 {
             say!("{kernel}: the same {} numbers", found.values);
         } else {
+            let most = match (found.largest_ulp, found.largest_absolute) {
+                (u64::MAX, _) => "of some pairs one is NaN".into(),
+                (ulp, Some(x)) => format!("by at most {ulp} ulp or {x:.2e}"),
+                (ulp, None) => format!("by at most {ulp} ulp or infinity"),
+            };
             say!(
-                "{kernel}: {} of {} numbers differ, by at most {} ulp or {}",
+                "{kernel}: {} of {} numbers differ, {most}",
                 found.beyond,
-                found.values,
-                found.largest_ulp,
-                match found.largest_absolute {
-                    Some(x) => format!("{x:.2e}"),
-                    None => "infinity".into(),
-                }
+                found.values
             );
         }
     }

@@ -708,17 +708,7 @@ struct Ready {
 /// A vertex attribute's format.
 fn vertex_format(ty: &Type) -> Option<wgpu::VertexFormat> {
     use wgpu::VertexFormat as F;
-    let (scalar, size) = match ty {
-        Type::Scalar { scalar } => (*scalar, 1),
-        // Two halves are a number of 32 bits.
-        Type::Vector {
-            scalar: Scalar::F16,
-            ..
-        } => (Scalar::U32, 1),
-        Type::Vector { scalar, size } => (*scalar, *size),
-        Type::Array { .. } | Type::Struct { .. } => return None,
-    };
-    Some(match (scalar, size) {
+    Some(match ty.components()? {
         (Scalar::F32, 1) => F::Float32,
         (Scalar::F32, 2) => F::Float32x2,
         (Scalar::F32, 3) => F::Float32x3,

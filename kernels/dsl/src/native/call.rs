@@ -43,6 +43,8 @@ pub struct TextureRef<'a> {
     pub samples: u32,
     /// Format of the texels; a depth is [`TexelFormat::R32Float`].
     pub format: TexelFormat,
+    /// Which of the textures it is that a kernel reads. A call numbers them, whatever this was.
+    pub number: u8,
     /// As many as [`texture_bytes`] says.
     pub bytes: &'a [u8],
 }
@@ -142,6 +144,8 @@ pub struct Deviation {
     /// What is added to each channel, in 2^-24 of the largest magnitude that is read: rounding of
     /// the filter's sums.
     pub channels: [i8; 4],
+    /// The texture that `channels` are for, by its number.
+    pub texture: u8,
 }
 
 impl Deviation {
@@ -152,6 +156,7 @@ impl Deviation {
         level: 0,
         twist: 0,
         channels: [0; 4],
+        texture: 0,
     };
 }
 

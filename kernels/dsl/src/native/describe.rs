@@ -952,6 +952,33 @@ pub enum Type {
     },
 }
 
+impl Type {
+    /// What a value is in shaders and in the texts beside them: two halves are one number of 32 bits.
+    #[must_use]
+    pub const fn in_shader(&self) -> &Self {
+        const WORD: &Type = &Type::Scalar {
+            scalar: Scalar::U32,
+        };
+        match self {
+            Self::Vector {
+                scalar: Scalar::F16,
+                ..
+            } => WORD,
+            other => other,
+        }
+    }
+
+    /// The scalar and the number of components that a scalar or a vector has [in shaders](Self::in_shader).
+    #[must_use]
+    pub const fn components(&self) -> Option<(Scalar, u32)> {
+        match self.in_shader() {
+            Self::Scalar { scalar } => Some((*scalar, 1)),
+            Self::Vector { scalar, size } => Some((*scalar, *size)),
+            Self::Array { .. } | Self::Struct { .. } => None,
+        }
+    }
+}
+
 /// A scalar type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -34,6 +34,8 @@ pub fn not_built(_: &mut Call<'_>) -> Result<(), CallError> {
 pub struct Args<'a> {
     args: vec::IntoIter<Arg<'a>>,
     constants: vec::IntoIter<u32>,
+    /// Textures that were taken.
+    textures: u8,
 }
 
 impl<'a> Args<'a> {
@@ -47,6 +49,7 @@ impl<'a> Args<'a> {
         Ok(Self {
             args: core::mem::take(&mut call.args).into_iter(),
             constants: core::mem::take(&mut call.constants).into_iter(),
+            textures: 0,
         })
     }
 
@@ -297,7 +300,9 @@ impl<'a> Args<'a> {
             );
             return Err(CallError::Texture { name, problem });
         }
-        Ok(t)
+        let number = self.textures;
+        self.textures = number.saturating_add(1);
+        Ok(TextureRef { number, ..t })
     }
 
     /// A texture to be written.

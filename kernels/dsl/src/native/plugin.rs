@@ -25,7 +25,7 @@ use super::sanitize::Order;
 use super::texel::FORMATS;
 
 /// Version of what crosses the border.
-pub const ABI: u32 = 5;
+pub const ABI: u32 = 6;
 
 /// The exported function's name.
 pub const SYMBOL: &str = "hankel_plugin";
@@ -98,6 +98,7 @@ struct RawSampler {
     channels: [i8; 4],
     twist: i8,
     levels: u8,
+    texture: u8,
 }
 
 impl RawSampler {
@@ -114,6 +115,7 @@ impl RawSampler {
             channels: sampler.deviation.channels,
             twist: sampler.deviation.twist,
             levels: sampler.deviation.levels as u8,
+            texture: sampler.deviation.texture,
         }
     }
 
@@ -137,6 +139,7 @@ impl RawSampler {
                 channels: self.channels,
                 twist: self.twist,
                 levels: *Levels::ALL.get(usize::from(self.levels))?,
+                texture: self.texture,
             },
         })
     }
@@ -203,6 +206,7 @@ impl RawArg {
                 levels: self.levels,
                 layers: self.layers,
                 samples: self.samples,
+                number: 0,
                 format: *FORMATS.get(self.format as usize)?,
                 bytes: bytes(),
             }),

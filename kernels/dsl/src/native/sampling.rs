@@ -291,6 +291,7 @@ fn filter(
     };
     match sampler.deviation.channels {
         [0, 0, 0, 0] => value,
+        _ if sampler.deviation.texture != t.number => value,
         channels => {
             let read = [taps.square(0, of), taps.square(1, of)];
             let largest = read.as_flattened().iter().map(|tap| tap.abs());
@@ -456,6 +457,7 @@ mod tests {
             levels,
             layers,
             samples: 1,
+            number: 0,
             format: TexelFormat::R32Float,
             bytes: bytemuck::cast_slice(texels),
         }

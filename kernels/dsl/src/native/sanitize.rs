@@ -270,8 +270,13 @@ fn keep_places() {
 /// The line of the author's that led into a file of somebody else: of `core`, or of a crate from a registry. Only known
 /// where the kernels' crate has been compiled with lines.
 fn called_from(file: &str) -> Option<String> {
+    // The standard library, as it is distributed and as sources; crates of a registry and of git.
     let is_foreign = |file: &str| {
-        file.starts_with("/rustc/") || file.contains("/registry/src/") || file.contains("/library/")
+        file.starts_with("/rustc/")
+            || ["/library/core/", "/library/alloc/", "/library/std/"]
+                .iter()
+                .chain(&["/registry/src/", "/git/checkouts/"])
+                .any(|within| file.contains(within))
     };
     if !is_foreign(file) {
         return None;

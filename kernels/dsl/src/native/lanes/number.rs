@@ -204,11 +204,8 @@ macro_rules! lanes {
                 let table = cast_slice(rows);
                 let rows = R::LANES * $by::Table::<R, T>::WIDTH;
                 unroll!(group in 0..($by::Table::<R, T>::WIDTH.div_ceil($by::Table::<R, T>::STEP)), {
-                    // The last ones may overlap others.
                     let from = const {
-                        let last = $by::Table::<R, T>::WIDTH - $by::Table::<R, T>::STEP;
-                        let from = group * $by::Table::<R, T>::STEP;
-                        if from < last { from } else { last }
+                        transpose::first_of(group, $by::Table::<R, T>::STEP, $by::Table::<R, T>::WIDTH)
                     };
                     let some = [$($by::Table::<R, T>::columns(&table[$i * rows..], from)),+];
                     unroll!(k in 0..$by::MOST, {
@@ -224,9 +221,7 @@ macro_rules! lanes {
                 let rows = R::LANES * $by::Table::<R, T>::WIDTH;
                 unroll!(group in 0..($by::Table::<R, T>::WIDTH.div_ceil($by::Table::<R, T>::STEP)), {
                     let from = const {
-                        let last = $by::Table::<R, T>::WIDTH - $by::Table::<R, T>::STEP;
-                        let from = group * $by::Table::<R, T>::STEP;
-                        if from < last { from } else { last }
+                        transpose::first_of(group, $by::Table::<R, T>::STEP, $by::Table::<R, T>::WIDTH)
                     };
                     let mut some = [$([columns[from].$i; $by::MOST]),+];
                     unroll!(k in 0..$by::MOST, {

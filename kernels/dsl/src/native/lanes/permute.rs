@@ -30,6 +30,19 @@ const fn by_blocks(width: usize) -> bool {
 /// Where each number of a register comes from: 0 to 15 in the first of two registers, 16 to 31 in the second.
 type Order = [i32; 16];
 
+/// The order of a register: for each lane `k` below `count`, where its number comes from.
+macro_rules! order {
+    ($k:ident in 0..$count:expr, $from:expr) => {{
+        let mut order: Order = [0; 16];
+        let mut $k = 0;
+        while $k < $count {
+            order[$k] = ($from) as i32;
+            $k += 1;
+        }
+        order
+    }};
+}
+
 /// The row that a lane has.
 const fn row(lane: usize) -> usize {
     4 * (lane % 4) + lane / 4
@@ -48,9 +61,7 @@ const fn start(width: usize, i: usize) -> usize {
 
 /// Four columns, from `4 group` on, of four rows: pairs `2 quad` and the next one.
 const fn quad(width: usize, group: usize, quad: usize) -> Order {
-    let mut order = [0; 16];
-    let mut k = 0;
-    while k < 16 {
+    order!(k in 0..16, {
         let (column, row) = (4 * group + k / 4, k % 4);
         let half = row / 2;
         let at = if width > MOST {
@@ -61,70 +72,43 @@ const fn quad(width: usize, group: usize, quad: usize) -> Order {
         } else {
             0
         };
-        order[k] = (16 * half + at) as i32;
-        k += 1;
-    }
-    order
+        16 * half + at
+    })
 }
 
 /// Two columns of eight rows: of each four columns the first two, or the others.
 const fn octet(others: bool) -> Order {
-    let mut order = [0; 16];
-    let mut k = 0;
-    while k < 16 {
+    order!(k in 0..16, {
         let (column, row) = (2 * others as usize + k / 8, k % 8);
-        order[k] = (16 * (row / 4) + 4 * column + row % 4) as i32;
-        k += 1;
-    }
-    order
+        16 * (row / 4) + 4 * column + row % 4
+    })
 }
 
 /// A column of all rows: of each two the first, or the other.
 const fn whole(other: bool) -> Order {
-    let mut order = [0; 16];
-    let mut k = 0;
-    while k < 16 {
-        let row = row(k);
-        order[k] = (16 * (row / 8) + 8 * other as usize + row % 8) as i32;
-        k += 1;
-    }
-    order
+    order!(k in 0..16, 16 * (row(k) / 8) + 8 * other as usize + row(k) % 8)
 }
 
 /// From two columns, those of the first eight rows, or of the others.
 const fn of_columns(others: bool) -> Order {
-    let mut order = [0; 16];
-    let mut k = 0;
-    while k < 16 {
-        order[k] = (16 * (k / 8) + lane(8 * others as usize + k % 8)) as i32;
-        k += 1;
-    }
-    order
+    order!(k in 0..16, 16 * (k / 8) + lane(8 * others as usize + k % 8))
 }
 
 /// From two columns of eight rows, and two others of them, four of the first four rows, or of the others, by rows.
 const fn of_octets(others: bool) -> Order {
-    let mut order = [0; 16];
-    let mut k = 0;
-    while k < 16 {
+    order!(k in 0..16, {
         let (row, column) = (4 * others as usize + k / 4, k % 4);
-        order[k] = (16 * (column / 2) + 8 * (column % 2) + row) as i32;
-        k += 1;
-    }
-    order
+        16 * (column / 2) + 8 * (column % 2) + row
+    })
 }
 
 /// From four columns of four rows, and the four others, the first two rows, or the others, as they are in memory.
 const fn of_quads(width: usize, others: bool) -> Order {
     let length = if width < MOST { width } else { MOST };
-    let mut order = [0; 16];
-    let mut k = 0;
-    while k < 2 * length {
+    order!(k in 0..2 * length, {
         let (row, column) = (2 * others as usize + k / length, k % length);
-        order[k] = (16 * (column / 4) + 4 * row + column % 4) as i32;
-        k += 1;
-    }
-    order
+        16 * (column / 4) + 4 * row + column % 4
+    })
 }
 
 #[inline(always)]

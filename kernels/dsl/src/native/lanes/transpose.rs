@@ -16,6 +16,12 @@ use super::register::Register;
 /// The most columns that come at once.
 pub const MOST: usize = 4;
 
+/// The first column of a group of `step` columns. The last group ends with the table, and may overlap the one before.
+pub const fn first_of(group: usize, step: usize, width: usize) -> usize {
+    let (first, last) = (group * step, width - step);
+    if first < last { first } else { last }
+}
+
 /// A table for registers `R` whose rows are of type `T`.
 pub struct Table<R, T>(PhantomData<(R, T)>);
 
