@@ -432,7 +432,7 @@ of_samples! {
             let distance = Real::max(Real::sqrt(square), 1e-20);
             let cosine = (toward.x * way.x + toward.y * way.y + toward.z * way.z) / distance;
             let phase = henyey_greenstein(medium.anisotropy, cosine);
-            let fall = 1.0 - light.colour.w + light.colour.w * (near * far * stretch);
+            let fall = 1.0 - light.falloff + light.falloff * (near * far * stretch);
             let within = within_cone(light, toward, distance);
             let unshaded = (within * within) * fall * phase;
             let after = ray.remains(transmittance(medium.extinction, end));

@@ -40,9 +40,11 @@ pub struct Light {
     /// Where the light is, in homogeneous coordinates: the unit vector towards it and 0 for a directional light,
     /// its place and 1 for a spot light.
     pub position: Vec4,
-    /// Of each channel the irradiance of a face that is turned to the light, at a distance of 1 from a spot
-    /// light; w: 1 if it falls off with the square of the distance, 0 if it does not.
-    pub colour: Vec4,
+    /// Of each channel the irradiance of a face that is turned to the light, at a distance of 1 from a spot light.
+    pub colour: Vec3,
+    /// 1 if the light falls off with the square of the distance, 0 if it does not.
+    #[range(0.0..=1.0)]
+    pub falloff: f32,
     /// The axis of a spot light, the way it shines, times a scale (x, y, z), and an offset (w): scale times the
     /// cosine of the angle from the axis, plus the offset, is 0 at the cone's edge and 1 where it begins to
     /// fade. Zeros and 1 for a light without a cone.
@@ -116,7 +118,7 @@ fn unshaded(light: &Light, world: Vec3, normal: Vec3) -> f32 {
     let length = Real::max(Real::sqrt(dot(normal, normal)), 1e-20);
     let cosine = Real::max(dot(normal, toward) / length / distance, 0.0);
     let within = within_cone(light, toward, distance);
-    let fall = Real::max(1.0 - light.colour.w + light.colour.w * square, 1e-20);
+    let fall = Real::max(1.0 - light.falloff + light.falloff * square, 1e-20);
     cosine * (within * within) / fall
 }
 

@@ -179,7 +179,8 @@ pub(super) fn light(bias: &Bias, moment_bias: f32, depth_bias: f32, radius: u32)
         row_depth: Vec4::new(0.0, 1.0, 0.0, 0.0),
         row_w: Vec4::W,
         position: Vec4::new(0.36, -0.8, 0.48, 0.0),
-        colour: Vec4::new(2.5, 2.0, 1.5, 0.0),
+        colour: Vec3::new(2.5, 2.0, 1.5),
+        falloff: 0.0,
         cone: Vec4::W,
         ambient: Vec4::new(0.1, 0.12, 0.15, 0.0),
         bias_target: Vec4::new(target.b1, target.b2, target.b3, target.b4),
@@ -199,7 +200,7 @@ pub(super) fn spot(light: &Light) -> Light {
         row_depth: light.row_depth * 2.0,
         row_w: Vec4::W * 2.0,
         position: Vec4::new(0.5, -1.0, 0.5, 1.0),
-        colour: light.colour.truncate().extend(1.0),
+        falloff: 1.0,
         cone: Vec4::new(0.0, 8.0, 0.0, -7.0),
         depth_bias: light.depth_bias * 4.0,
         ..*light

@@ -272,7 +272,7 @@ pub fn marched(request: &Request) -> Vec<Given> {
 pub fn marched_spot(request: &Request) -> Vec<Given> {
     let above = maps::spot(&light());
     let even = Light {
-        colour: above.colour.truncate().extend(0.0),
+        falloff: 0.0,
         ..above
     };
     let near = Light {
