@@ -267,7 +267,7 @@ fn traced(f: impl FnOnce()) -> Operations {
 
 /// Rows that run together: as many as lanes of AVX-512 take at once in `f32`. A loop goes on until the last of
 /// them is done, and its operations are done for all.
-pub const TOGETHER: usize = 32;
+pub const TOGETHER: usize = 64;
 
 /// Lanes that remember what they come from, on the thread where they were made. A number is only its place there, and its
 /// operations are calls: kernels are inlined wholly, and with values in them they were half of this crate's code.

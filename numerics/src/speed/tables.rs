@@ -250,7 +250,8 @@ impl Speed {
                  Operations are those of the kernel's source that a result depends on, as {TOGETHER} \
                  rows run together: a loop goes on until the last is done; `needed` is the arithmetic of \
                  rows that run alone, as a share of that. `reached` is the greater limit's share of the \
-                 time measured. All is counted in f32: in f64, loops for roots may take more turns.",
+                 time measured; above 100 % where quotients are computed beside other arithmetic, which \
+                 the limit adds up. All is counted in f32: in f64, loops for roots may take more turns.",
                 self.level
             ),
             [
