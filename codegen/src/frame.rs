@@ -24,7 +24,7 @@ use crate::Language;
 use crate::build::{Generated, Modules, Request, Variant, assemble};
 use crate::error::{Error, Failure, Result};
 use crate::folder::MOST_BYTES;
-use crate::headers::Layouts;
+use crate::headers::{Layouts, meaning};
 use crate::manifest::{self, Binding, Interface, KernelEntry, LanguageEntry, StageName, Versions};
 use crate::placement::Placement;
 use crate::spirv;
@@ -601,7 +601,7 @@ fn add_fields(
             size: field.size,
             ty: Layouts::default().spell(&field.ty),
             value: value(&field.ty, bytes.get(offset as usize..).unwrap_or_default()),
-            meaning: field.summary.clone(),
+            meaning: meaning(field),
         });
     }
 }

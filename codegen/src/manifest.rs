@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::build::Request;
 use crate::cost::Cost;
 use crate::error;
-use crate::headers::Layouts;
+use crate::headers::{Layouts, meaning};
 use crate::lint::Finding;
 use crate::placement::Placement;
 use crate::spirv::names::output_name;
@@ -593,7 +593,7 @@ pub(crate) fn layouts(layouts: &Layouts) -> BTreeMap<String, LayoutEntry> {
                 .iter()
                 .map(|field| FieldEntry {
                     name: field.name.clone(),
-                    summary: field.summary.clone(),
+                    summary: meaning(field),
                     ty: layouts.spell(&field.ty),
                     offset: field.offset,
                     size: field.size,

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use hankel_dsl::native::describe::{Scalar, Type};
 
-use super::{Layouts, Part, one_line, padded, parts};
+use super::{Layouts, Part, meaning, one_line, padded, parts};
 use crate::files::sha256;
 use crate::manifest::KernelEntry;
 use crate::{Language, VERSION};
@@ -25,7 +25,7 @@ pub fn header(layouts: &Layouts, kernels: &BTreeMap<String, KernelEntry>) -> Str
                     let _ = writeln!(text, "    uint8_t hankel_pad{number}[{bytes}];");
                 }
                 Part::Field(field) => {
-                    let summary = one_line(&field.summary).replace("*/", "* /");
+                    let summary = one_line(&meaning(field)).replace("*/", "* /");
                     if !summary.is_empty() {
                         let _ = writeln!(text, "    /* {summary} */");
                     }

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use hankel_dsl::native::describe::{Scalar, Type};
 use serde_json::json;
 
-use super::{Groups, InWgsl, Layouts, one_line, scalar_size};
+use super::{Groups, InWgsl, Layouts, meaning, one_line, scalar_size};
 use crate::manifest::{Binding, BindingKind, Constant, KernelEntry, StageName};
 use crate::{Language, VERSION};
 
@@ -139,7 +139,7 @@ pub fn types(
     for (name, layout) in layouts.iter() {
         let _ = writeln!(text, "\nexport interface {name} {{");
         for field in &layout.fields {
-            let summary = one_line(&field.summary).replace("*/", "* /");
+            let summary = one_line(&meaning(field)).replace("*/", "* /");
             if !summary.is_empty() {
                 let _ = writeln!(text, "  /** {summary} */");
             }

@@ -9,7 +9,7 @@ mod wgpu;
 
 use std::collections::BTreeMap;
 
-use hankel_dsl::native::describe::{Kernel, Layout, Output, Role, Scalar, Type};
+use hankel_dsl::native::describe::{Field, Kernel, Layout, Output, Role, Scalar, Type};
 
 use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::spirv::names::camel_case;
@@ -225,7 +225,7 @@ fn size(ty: &Type) -> u32 {
 /// What stands between the fields: `Some` bytes of padding, or a field.
 enum Part<'a> {
     Padding { bytes: u32, number: usize },
-    Field(&'a hankel_dsl::native::describe::Field),
+    Field(&'a Field),
 }
 
 fn parts(layout: &Layout) -> Vec<Part<'_>> {
@@ -247,6 +247,18 @@ fn parts(layout: &Layout) -> Vec<Part<'_>> {
     parts
 }
 
+/// What a field means: its documentation, and that a number of 32 bits is two halves, which its type does not say.
+pub(crate) fn meaning(field: &Field) -> String {
+    let halves = match &field.ty {
+        Type::Array { element, .. } if element.in_shader() != &**element => {
+            "Each number is two halves, the first one in its lower 16 bits."
+        }
+        ty if ty.in_shader() != ty => "Two halves, the first one in the lower 16 bits.",
+        _ => return field.summary.clone(),
+    };
+    format!("{} {halves}", field.summary).trim_start().into()
+}
+
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -266,7 +278,7 @@ fn padded(element: &Type, stride: u32) -> Option<(Scalar, u32)> {
 mod tests {
     use std::process::{Command, Output};
 
-    use hankel_dsl::native::describe::{Field, Inputs};
+    use hankel_dsl::native::describe::Inputs;
 
     use super::*;
 
@@ -313,6 +325,20 @@ mod tests {
                 field("precise", number(Scalar::F64), 72),
             ],
         }
+    }
+
+    #[test]
+    fn halves_are_told_where_the_type_does_not() {
+        let mut field = light().fields.remove(1);
+        assert_eq!(meaning(&field), "What a test needs.");
+        field.ty = Type::Vector {
+            scalar: Scalar::F16,
+            size: 2,
+        };
+        let halves = "Two halves, the first one in the lower 16 bits.";
+        assert_eq!(meaning(&field), format!("What a test needs. {halves}"));
+        field.summary.clear();
+        assert_eq!(meaning(&field), halves);
     }
 
     fn layouts() -> Layouts {

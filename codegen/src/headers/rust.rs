@@ -6,7 +6,7 @@ use std::fmt::Write;
 use hankel_dsl::native::describe::{Layout, Type};
 
 use super::{
-    Groups, InWgsl, Layouts, Part, one_line, padded, parts, scalar_name, scalar_size, size,
+    Groups, InWgsl, Layouts, Part, meaning, one_line, padded, parts, scalar_name, scalar_size, size,
 };
 use crate::manifest::{Binding, BindingKind, KernelEntry};
 use crate::{Language, VERSION};
@@ -38,7 +38,7 @@ pub fn module(
                     );
                 }
                 Part::Field(field) => {
-                    let summary = one_line(&field.summary);
+                    let summary = one_line(&meaning(field));
                     let summary = if summary.is_empty() {
                         field.name.as_str()
                     } else {
