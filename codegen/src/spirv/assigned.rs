@@ -140,9 +140,14 @@ mod tests {
 
     #[test]
     fn what_a_variable_is_set_to_is_copied() {
-        assert_eq!(copied(""), 0, "each is set once");
-        assert_eq!(copied("c = c;"), 2, "both of its stores");
+        assert_eq!(copied(""), 2, "naga initialises both, and then sets them");
+        assert_eq!(copied("c = c;"), 3);
         assert_eq!(copied("a = c; c = c;"), 4);
-        assert_eq!(copied("a = c + 1u;"), 1, "a sum is a value of its own");
+        assert_eq!(copied("a = c + 1u;"), 2, "a sum is a value of its own");
+        assert_eq!(
+            copied("var once = 7u; x[2] = once;"),
+            2,
+            "it is set once, and to a constant"
+        );
     }
 }

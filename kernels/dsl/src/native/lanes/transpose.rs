@@ -193,7 +193,7 @@ mod tests {
                 type Output = ();
                 #[inline(always)]
                 fn run<L: Lane<Scalar = $number>>(self) {
-                    const MOST: usize = 32;
+                    const MOST: usize = 64;
                     assert!(L::LANES <= MOST);
                     let row = |i| array::from_fn(|at| (WIDTH * i + at) as $number);
                     let table: [[$number; WIDTH]; MOST] = array::from_fn(row);
