@@ -562,22 +562,14 @@ impl Maker {
                     self.variables.push((U32, id));
                     Stmt::Exchange(id, by, value)
                 }
-                // Vectors are copied in memory, where rust-gpu still takes one for another.
-                22..=23 if assignable && self.numbers().len() > 1 => {
-                    let numbers = self.numbers();
-                    let targets = [(); 2].map(|()| self.chance.pick(&numbers));
+                22..=23 if assignable => {
+                    let targets = [self.variable(), self.variable()];
                     let values = targets.map(|(ty, _)| self.moved(ty));
                     Stmt::AssignBoth(targets.map(|(_, id)| id), values)
                 }
                 _ => continue,
             };
         }
-    }
-
-    fn numbers(&self) -> Vec<(Ty, u32)> {
-        let all = self.variables.iter().copied();
-        all.filter(|v| !matches!(v.0, Vec2 | Vec3 | Vec4 | UVec3))
-            .collect()
     }
 
     fn variable(&mut self) -> (Ty, u32) {

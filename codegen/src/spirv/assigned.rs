@@ -2,7 +2,8 @@
 //!
 //! A loop may set a variable to the value that it has. SPIR-T, by which rust-gpu's linker structures control flow, may
 //! then take another variable of that loop for it (`tests/upstream/rust-gpu-lost-choice`). A copy is another value to
-//! it. spirv-opt removes all copies.
+//! it. spirv-opt removes all copies. Vectors are copied from variable to variable, by `OpCopyMemory`: it becomes a load,
+//! a copy and a store.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,11 +15,12 @@ use super::{id, op};
 /// Copies what is stored in variables that are stored to more than once, where it is not computed there and then.
 pub fn copy_assigned(module: &mut Module) {
     let plain = types_without_pointers(module);
+    let pointees = pointees(module);
     let Some(header) = &mut module.header else {
         return;
     };
     for function in &mut module.functions {
-        let several = stored_several_times(function);
+        let several = stored_several_times(function, &pointees);
         let mut given: HashMap<Word, Word> = HashMap::new();
         let parameters = function.parameters.iter();
         let instructions = function.blocks.iter().flat_map(|it| &it.instructions);
@@ -36,8 +38,24 @@ pub fn copy_assigned(module: &mut Module) {
         for block in &mut function.blocks {
             let mut instructions = Vec::with_capacity(block.instructions.len());
             for mut it in block.instructions.drain(..) {
-                if op(&it) == Op::Store
-                    && id(&it, 0).is_some_and(|to| several.contains(&to))
+                if op(&it) == Op::CopyMemory
+                    && it.operands.len() == 2
+                    && let (Some(to), Some(from)) = (id(&it, 0), id(&it, 1))
+                    && let Some(ty) = several.get(&to)
+                    && plain.contains(ty)
+                {
+                    let (loaded, copy) = (header.bound, header.bound + 1);
+                    header.bound += 2;
+                    let of = |op, result, operand| {
+                        let operands = vec![Operand::IdRef(operand)];
+                        Instruction::new(op, Some(*ty), Some(result), operands)
+                    };
+                    instructions.push(of(Op::Load, loaded, from));
+                    instructions.push(of(Op::CopyObject, copy, loaded));
+                    let stored = vec![Operand::IdRef(to), Operand::IdRef(copy)];
+                    it = Instruction::new(Op::Store, None, None, stored);
+                } else if op(&it) == Op::Store
+                    && id(&it, 0).is_some_and(|to| several.contains_key(&to))
                     && let Some(value) = id(&it, 1)
                     && let Some(ty) = given.get(&value)
                 {
@@ -74,29 +92,36 @@ fn types_without_pointers(module: &Module) -> HashSet<Word> {
     plain
 }
 
-/// The variables of a function that two instructions or more store to, as a whole.
-fn stored_several_times(function: &Function) -> HashSet<Word> {
+/// What pointers of each type point to.
+fn pointees(module: &Module) -> HashMap<Word, Word> {
+    let pointers = module.types_global_values.iter();
+    let pointers = pointers.filter(|it| op(it) == Op::TypePointer);
+    pointers
+        .filter_map(|it| Some((it.result_id?, id(it, 1)?)))
+        .collect()
+}
+
+/// The variables of a function that two instructions or more store to, as a whole, and the types of their values.
+fn stored_several_times(
+    function: &Function,
+    pointees: &HashMap<Word, Word>,
+) -> HashMap<Word, Word> {
     let mut stores: HashMap<Word, usize> = HashMap::new();
     for it in function.all_inst_iter() {
-        match op(it) {
-            Op::Variable if it.operands.len() > 1 => {
-                if let Some(variable) = it.result_id {
-                    *stores.entry(variable).or_default() += 1;
-                }
-            }
-            Op::Store => {
-                if let Some(to) = id(it, 0) {
-                    *stores.entry(to).or_default() += 1;
-                }
-            }
-            _ => {}
+        let to = match op(it) {
+            Op::Variable if it.operands.len() > 1 => it.result_id,
+            Op::Store | Op::CopyMemory => id(it, 0),
+            _ => None,
+        };
+        if let Some(variable) = to {
+            *stores.entry(variable).or_default() += 1;
         }
     }
     let is_variable = |it: &&Instruction| op(it) == Op::Variable;
     let variables = function.all_inst_iter().filter(is_variable);
     variables
-        .filter_map(|it| it.result_id)
-        .filter(|it| stores.get(it).is_some_and(|count| *count > 1))
+        .filter_map(|it| Some((it.result_id?, *pointees.get(&it.result_type?)?)))
+        .filter(|(it, _)| stores.get(it).is_some_and(|count| *count > 1))
         .collect()
 }
 
