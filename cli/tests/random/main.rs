@@ -304,7 +304,7 @@ fn choices_in_inner_loops_are_kept() {
     let case = root().join("tests/upstream/rust-gpu-lost-choice/case.rs");
     let case = fs::read_to_string(case).expect("the case");
     let library = format!(
-        "//! A case.\n#![no_std]\nuse hankel_dsl::glam::UVec4;\nuse hankel_dsl::*;\n{case}\nkernels![wrong];\n"
+        "//! A case.\n#![no_std]\nuse hankel_dsl::glam::{{UVec3, UVec4}};\nuse hankel_dsl::*;\n{case}\nkernels![wrong, vector];\n"
     );
     let columns = ["native".to_owned(), "spirv".to_owned()];
     let bench = Bench::new("lost-choice", columns.to_vec());

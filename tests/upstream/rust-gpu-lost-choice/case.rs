@@ -16,3 +16,20 @@ pub fn wrong(#[element] x: UVec4) -> UVec4 {
     }
     UVec4::new(a, b, c, 0)
 }
+
+/// `c` stays a number, and `v` a vector: the loop assigns each to itself.
+#[kernel(compute, threads(64))]
+pub fn vector(#[element] x: UVec4) -> UVec4 {
+    let (mut v, mut c) = (UVec3::new(0, 0, 2), x.z);
+    if x.x == 7 {
+        v = UVec3::new(0, 0, 3);
+    } else if x.y == 5 {
+        let mut n = 0;
+        while n < 4 {
+            n += 1;
+            (c, c) = (c, c);
+            (v, v) = (v, v);
+        }
+    }
+    UVec4::new(1 % (v.z | 1), c, 0, 0)
+}
